@@ -22,16 +22,18 @@
  *   2. Compensated sums, linear equations
  *   3. The implicit step, by Newton's method
  *   4. Between steps
- *   5. Noise
- *   6. The solver
- *   7. Ensembles
- * body-sha256: 0e9f742280793e15ccd7a7071e4e9401d27896f9a055ce9ecb07522e1502d92b
+ *   5. Random numbers
+ *   6. Noise
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: 84959247ab731c844b6a4bbbb964abbd37aa4a4f2b51de22ffb3c423e5e85752
  */
 #include "double_well.h"
 
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <string.h>
 
 /* ---- The model ---- */
@@ -286,7 +288,7 @@ double_well_status double_well_kick(double_well_solver *s, const double change[d
     return double_well_OK;
 }
 
-/* ---- Noise ---- */
+/* ---- Random numbers ---- */
 /* Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
    (2011): the counter becomes four random words. */
 static void double_well_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
@@ -309,18 +311,29 @@ static double double_well_bits(uint32_t high, uint32_t low)
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Independent normal variates of variance 1, in pairs by Box and Muller, cut off at double_well_BOUND. */
+/* Two independent normal variates of variance 1 by Box and Muller, cut off at double_well_BOUND, from a
+   counter. */
+static void double_well_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
+{
+    double_well_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
+    const double radius = fmin(sqrt(-2.0 * log((double_well_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
+        double_well_BOUND);
+    const double angle = 6.283185307179586 * (double_well_bits(c[2], c[3]) * 0x1p-53);
+    normals[0] = radius * cos(angle);
+    normals[1] = radius * sin(angle);
+}
+
+/* ---- Noise ---- */
+/* Independent normal variates of variance 1. */
 static void double_well_normals(uint64_t seed, uint32_t member, uint64_t step,
     double normals[double_well_DRAWS])
 {
     for (int k = 0; k < double_well_DRAWS; k += 2) {
-        uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
-        double_well_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((double_well_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
-            double_well_BOUND);
-        const double angle = 6.283185307179586 * (double_well_bits(c[2], c[3]) * 0x1p-53);
-        normals[k] = radius * cos(angle);
-        if (k + 1 < double_well_DRAWS) normals[k + 1] = radius * sin(angle);
+        uint32_t counter[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
+        double pair[2];
+        double_well_two_normals(seed, counter, pair);
+        normals[k] = pair[0];
+        if (k + 1 < double_well_DRAWS) normals[k + 1] = pair[1];
     }
 }
 

@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 0f5aed305e988a6839c769beb58dce2c700e5a2b22c3e9f7126a82e0d06a823e
+ * body-sha256: 2fd3eb838f9a1cc81a9cbbf1ce9a4fe14f6d60bf5f67ce24795e4154ddb79c1c
  */
 #include "kdv.h"
 
@@ -910,8 +910,8 @@ kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps)
     for (; steps > 0 && status == kdv_OK; --steps) {
         status = kdv_try(s);
         s->steps += status == kdv_OK;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 

@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 856456f2f6d75ff1d27b7ee6ca825da019a2f04497cedd6a6df03f02c387b02f
+ * body-sha256: 9400eb25aa2ccd527a16e5c706abfc0274cb9205de83673e56cc121838c10f57
  */
 #include "point_vortices.h"
 
@@ -1039,8 +1039,8 @@ point_vortices_status point_vortices_integrate(point_vortices_solver *s, double 
     for (; steps > 0 && status == point_vortices_OK; --steps) {
         status = point_vortices_try(s);
         s->steps += status == point_vortices_OK;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
 

@@ -18,7 +18,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 1ebd2033e9b7779161906e50d4bb620d3385aacd26c61c680f94bb3a6d18a240
+# body-sha256: e4536fc0b71306ad799918e11ed1d802ab50e4d24a0ab0b8615acee70ad548c8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -967,16 +967,21 @@ def _unit(high, low):
     return ((high >> np.uint64(5)) * 67108864.0 + (low >> np.uint64(6))) * 2.0**-53
 
 
+def _two_normals(seed, counter):
+    """Two arrays of independent normal variates of variance 1 by Box and Muller, from the words of a counter."""
+    a, b, c, d = _philox(counter, (seed & 0xFFFFFFFF, seed >> 32))
+    radius = np.minimum(np.sqrt(-2.0 * np.log(_unit(a, b) + 2.0**-54)), BOUND)
+    angle = 6.283185307179586 * _unit(c, d)
+    return radius * np.cos(angle), radius * np.sin(angle)
+
+
 def _normals(seed, members, step):
-    """Normal variates of variance 1, in pairs by Box and Muller: (increments in a step, members)."""
+    """Normal variates of variance 1: (increments in a step, members)."""
     count, word, found = PARTS * len(SOURCES), 0xFFFFFFFF, []
     for pair in range((count + 1) // 2):
         counter = [np.full(members.shape, w, dtype=np.uint64) for w in (step & word, step >> 32, 0, pair)]
         counter[2] = members.astype(np.uint64)
-        a, b, c, d = _philox(counter, (seed & word, seed >> 32))
-        radius = np.minimum(np.sqrt(-2.0 * np.log(_unit(a, b) + 2.0**-54)), BOUND)
-        angle = 6.283185307179586 * _unit(c, d)
-        found += [radius * np.cos(angle), radius * np.sin(angle)]
+        found += _two_normals(seed, counter)
     return np.array(found[:count])
 
 

@@ -23,16 +23,18 @@
  *   2. Compensated sums, linear equations
  *   3. The implicit step, by Newton's method
  *   4. Between steps
- *   5. Noise
- *   6. The solver
- *   7. Ensembles
- * body-sha256: 926b4a1e8f746e180374f9773512e229eaaa1d1bd78ea306e57a3ff08cb4a08d
+ *   5. Random numbers
+ *   6. Noise
+ *   7. The solver
+ *   8. Ensembles
+ * body-sha256: f460489a6b8bb57418a2ef31c584b09e80fded1e9b396b08bf75aa13e2904e97
  */
 #include "thermal_spin.h"
 
 #include <float.h>
 #include <math.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <string.h>
 
 /* ---- The model ---- */
@@ -373,7 +375,7 @@ thermal_spin_status thermal_spin_kick(thermal_spin_solver *s, const double chang
     return thermal_spin_OK;
 }
 
-/* ---- Noise ---- */
+/* ---- Random numbers ---- */
 /* Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
    (2011): the counter becomes four random words. */
 static void thermal_spin_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
@@ -396,18 +398,29 @@ static double thermal_spin_bits(uint32_t high, uint32_t low)
     return (double)(high >> 5) * 67108864.0 + (double)(low >> 6);
 }
 
-/* Independent normal variates of variance 1, in pairs by Box and Muller, cut off at thermal_spin_BOUND. */
+/* Two independent normal variates of variance 1 by Box and Muller, cut off at thermal_spin_BOUND, from a
+   counter. */
+static void thermal_spin_two_normals(uint64_t seed, uint32_t c[4], double normals[2])
+{
+    thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
+    const double radius = fmin(sqrt(-2.0 * log((thermal_spin_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
+        thermal_spin_BOUND);
+    const double angle = 6.283185307179586 * (thermal_spin_bits(c[2], c[3]) * 0x1p-53);
+    normals[0] = radius * cos(angle);
+    normals[1] = radius * sin(angle);
+}
+
+/* ---- Noise ---- */
+/* Independent normal variates of variance 1. */
 static void thermal_spin_normals(uint64_t seed, uint32_t member, uint64_t step,
     double normals[thermal_spin_DRAWS])
 {
     for (int k = 0; k < thermal_spin_DRAWS; k += 2) {
-        uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
-        thermal_spin_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((thermal_spin_bits(c[0], c[1]) + 0.5) * 0x1p-53)),
-            thermal_spin_BOUND);
-        const double angle = 6.283185307179586 * (thermal_spin_bits(c[2], c[3]) * 0x1p-53);
-        normals[k] = radius * cos(angle);
-        if (k + 1 < thermal_spin_DRAWS) normals[k + 1] = radius * sin(angle);
+        uint32_t counter[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
+        double pair[2];
+        thermal_spin_two_normals(seed, counter, pair);
+        normals[k] = pair[0];
+        if (k + 1 < thermal_spin_DRAWS) normals[k + 1] = pair[1];
     }
 }
 

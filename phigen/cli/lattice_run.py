@@ -56,8 +56,8 @@ def run_lattice(
         try:
             made = solver.integrate(
                 start.state, float(run.step), run.steps, run.stride,
-                t0=float(run.start) if spec.time else None, output=output, checkpoints=kept, progress=progress,
-                parameters=start.arguments | parameters,
+                t0=float(run.start) if spec.time else None, seed=run.seed if spec.noise else None,
+                output=output, checkpoints=kept, progress=progress, parameters=start.arguments | parameters,
             )  # fmt: skip
         except StepError as error:
             failure, made = error, error.trajectory

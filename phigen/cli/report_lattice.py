@@ -78,7 +78,13 @@ def _measured(
     begin = float(run.start) if spec.time else None
     try:
         made = solver.integrate(
-            start.state, float(run.step), run.steps, run.stride, t0=begin, parameters=start.arguments
+            start.state,
+            float(run.step),
+            run.steps,
+            run.stride,
+            t0=begin,
+            seed=run.seed if spec.noise else None,
+            parameters=start.arguments,
         )
     except StepError as error:
         failure, made = error, error.trajectory

@@ -159,8 +159,9 @@ def verified_lattice(
     solvers = {target: lattice_solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
     begin = float(run.start) if spec.time else None
-    numbers = start_of(spec, run), float(run.step), run.steps
-    return verify_lattice(compilation, solvers, run.name, *numbers, t0=begin, quick=quick, single=single)
+    seed = run.seed if spec.noise else None
+    asked: dict[str, Any] = {"t0": begin, "seed": seed, "quick": quick, "single": single}
+    return verify_lattice(compilation, solvers, run.name, start_of(spec, run), float(run.step), run.steps, **asked)
 
 
 def fallen_short(verification: Verification) -> CheckError:

@@ -33,10 +33,16 @@ def cell_from_spec(spec: Spec) -> Cell:
         {name: (density, lattice.kinds[name]) for name, density in spec.casimirs.items()},
         spec.invariants,
         spec.time,
+        spec.forces,
+        spec.noise,
     )
-    small = [d for run in spec.runs.values() for d in _too_small(spec, cell, run)]
-    if small:
-        raise SpecError(small)
+    problems = [
+        *_not_along_bonds(spec, cell),
+        *_noise_beyond(spec, cell),
+        *(d for run in spec.runs.values() for d in _too_small(spec, cell, run)),
+    ]
+    if problems:
+        raise SpecError(problems)
     return cell
 
 
@@ -65,6 +71,24 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
         else:
             both[g, f] = neg(value)
     return {pair: e for pair, e in both.items() if not e.is_zero}
+
+
+def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
+    """What would have to be gathered along the bonds that brackets run along."""
+    given = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
+    for path, there in {**given, ("noise",): bool(spec.noise)}.items():
+        if there and cell.bond_bracket:
+            message = f"{path[-1]}: not with brackets along bonds"
+            yield spec.diagnostic(path, message, "forces: {vector: …} moves sites by themselves")
+
+
+def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
+    """Sources of noise that are not those of one site."""
+    for name, source in spec.noise.items():
+        if any(offset != cell.origin for _, offset in cell.places(source.hamiltonian).values()):
+            message = f"noise: {name} is that of a site, so its Hamiltonian names no neighbours"
+            hint = "each site has increments of its own, for a function of its own coordinates"
+            yield spec.diagnostic(("noise", name, "hamiltonian"), message, hint)
 
 
 def _too_small(spec: Spec, cell: Cell, run: Run) -> Iterator[Diagnostic]:

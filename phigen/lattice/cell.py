@@ -12,9 +12,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from phigen.spec.model import Parameter
+from phigen.spec.model import NO_FORCES, Parameter, SpecForces, SpecNoise
 from phigen.symbolic.expression import ZERO, Expression, gradient, mul, neg, symbol, total
 from phigen.symbolic.neighbours import ENDS, Neighbours, Offset, Place, minus, plus, steps
+from phigen.symbolic.symbols import increment
 
 GRID, GRAPH, PAIRS = "grid", "graph", "pairs"
 PERIODIC, OPEN = "periodic", "open"
@@ -31,6 +32,7 @@ class Cell:
     a bond. H is the sum of the densities; at open ends without those of their `terms` that reach beyond.
     ``casimirs`` maps names to a density and ``sites`` (one for each site), ``sum`` or ``product``; ``invariants`` are
     sums over sites. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is none.
+    ``forces`` and the sources of ``noise`` are those at a site; each site has noise of its own.
     """
 
     name: str
@@ -47,11 +49,18 @@ class Cell:
     casimirs: Mapping[str, tuple[Expression, str]] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
     time: str = ""
+    forces: SpecForces = NO_FORCES
+    noise: Mapping[str, SpecNoise] = field(default_factory=dict)
 
     @property
     def driven(self) -> bool:
-        """Whether H is no invariant: it depends on the time."""
-        return bool(self.time)
+        """Whether H is no invariant: it depends on the time, or forces or noise do work."""
+        return bool(self.time or self.forces or self.noise)
+
+    @property
+    def increments(self) -> tuple[str, ...]:
+        """The symbols of the increments that the noise of a site has in a step, one for each source."""
+        return tuple(increment(k) for k in range(len(self.noise)))
 
     # --- symbols
 
@@ -62,8 +71,9 @@ class Cell:
 
     @cached_property
     def neighbours(self) -> Neighbours:
-        """The symbols of what has a value at every site: of the fields, then of the parameters at sites."""
-        return Neighbours((*self.fields, *(p.name for p in self.parameters if p.at == "sites")), self.axes)
+        """The symbols of what has a value at every site: of fields, then of parameters at sites, then of noise."""
+        at_sites = (p.name for p in self.parameters if p.at == "sites")
+        return Neighbours((*self.fields, *at_sites, *self.increments), self.axes)
 
     @property
     def origin(self) -> Offset:
@@ -188,10 +198,20 @@ def bond_forces(cell: Cell) -> dict[str, Expression]:
 
 
 def vector_field(cell: Cell) -> dict[str, Expression]:
-    """ḟ at a site of a grid, for each field f, away from open ends."""
-    slopes = forces(cell)
+    """ḟ at a site of a grid, for each field f, away from open ends, but for noise."""
+    slopes, acting = forces(cell), cell.forces
+    moved = _tangent(cell, slopes)
+    if not acting:
+        return moved
+    damping = acting.damping or ZERO
+    pushed = {f: slopes[f] + acting.covector.get(f, ZERO) + damping * moved[f] for f in cell.fields}
+    return {f: e + acting.vector.get(f, ZERO) for f, e in _tangent(cell, pushed).items()}
+
+
+def _tangent(cell: Cell, covector: Mapping[str, Expression]) -> dict[str, Expression]:
+    """π of a covector field that is given at a site."""
     rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         base, offset = cell.place(other)
-        rates[f].append(entry * cell.shifted(slopes[base], offset))
+        rates[f].append(entry * cell.shifted(covector[base], offset))
     return {f: total(listed) for f, listed in rates.items()}

@@ -9,8 +9,8 @@ from itertools import combinations, product
 from typing import Any
 
 from phigen.lattice.cell import OPEN, Cell
-from phigen.spec.model import MatrixForm, Parameter, Run, Spec
-from phigen.symbolic.expression import ZERO, Expression, substitute, symbol, total
+from phigen.spec.model import MatrixForm, Parameter, Run, Spec, SpecForces, SpecNoise
+from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, total
 from phigen.symbolic.expression import product as product_of
 from phigen.symbolic.neighbours import ENDS, Offset, plus
 
@@ -126,6 +126,46 @@ class Expansion:
                     found |= {_free(name, site, taken): e for site, e in each.items()}
         return found
 
+    def forces(self) -> SpecForces:
+        """The forces. Damping that differs from site to site is a covector there."""
+        given = self.cell.forces
+        if not given:
+            return given
+        covector, vector = (
+            {self.names[f, site]: total(self._terms(e, site)) for f, e in listed.items() for site in self.sites}
+            for listed in (given.covector, given.vector)
+        )
+        damping = given.damping
+        if damping is not None and self.cell.places(damping):
+            field = self._field()
+            for (f, site), rate in field.items():
+                name = self.names[f, site]
+                covector[name] = covector.get(name, ZERO) + total(self._terms(damping, site)) * rate
+            damping = None
+        return SpecForces(covector, vector, damping)
+
+    def _field(self) -> dict[tuple[str, Site], Expression]:
+        """π∇H, by field and site."""
+        slopes = dict(zip(self.coordinates, gradient(total(self.hamiltonian_terms()), self.coordinates), strict=True))
+        rates: dict[str, list[Expression]] = {c: [] for c in self.coordinates}
+        for (a, b), entry in self.poisson().items():
+            rates[a].append(entry * slopes[b])
+        return {(f, site): total(rates[self.names[f, site]]) for f in self.cell.fields for site in self.sites}
+
+    def _terms(self, e: Expression, site: Site) -> list[Expression]:
+        """What the terms of an expression are at a site, without those that reach beyond open ends."""
+        return [found for term in self.cell.additive_terms(e) for found in [self.at(term, site)] if found is not None]
+
+    def noise(self) -> dict[str, SpecNoise]:
+        """The sources of noise of all sites, those of a site one after the other."""
+        found: dict[str, SpecNoise] = {}
+        taken = {*self.names.values(), *self.bond_names.values(), *(p.name for p in self.cell.parameters)}
+        for site in self.sites:
+            for name, source in self.cell.noise.items():
+                parts = [self.at(e, site) or ZERO for e in (source.hamiltonian, source.amplitude)]
+                found[_free(name, site, taken)] = SpecNoise(*parts)
+        return found
+
     def matrix(self) -> MatrixForm:
         """π as a matrix."""
         entries = self.poisson()
@@ -151,6 +191,8 @@ class Expansion:
             casimirs=self.casimirs(),
             invariants={name: total(self.summed(d)) for name, d in cell.invariants.items()},
             time=cell.time,
+            forces=self.forces(),
+            noise=self.noise(),
         )
 
     def numbers(self, parameters: Mapping[str, Any]) -> dict[str, float]:
@@ -180,7 +222,8 @@ def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()
         raise ValueError(f"bonds are pairs of different sites between 0 and {sizes[0] - 1}")
     taken = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants, *cell.times}
     sites = list(product(*map(range, sizes)))
-    names = {(n, s): _free(n, s, taken) for n in cell.neighbours.names for s in sites}
+    local = (n for n in cell.neighbours.names if n not in cell.increments)
+    names = {(n, s): _free(n, s, taken) for n in local for s in sites}
     own = [p.name for p in cell.parameters if p.at == "bonds"]
     bond_names = {(n, k): _free(n, (k,), taken) for n in own for k in range(len(ends))}
     return Expansion(cell, tuple(sizes), ends, names, bond_names)

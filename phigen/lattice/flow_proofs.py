@@ -6,10 +6,10 @@ its flow; and with these as constants, and neighbours that do not move, the moti
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from phigen.lattice.cell import Cell
-from phigen.lattice.parts import SiteMotion, summands_of
+from phigen.lattice.parts import CellFlow, SiteFields, SiteMotion, summands_of
 from phigen.lattice.sweeps import SplittingPlan
 from phigen.splitting.ring import KICK, TIME
 from phigen.splitting.statements import angles_added
@@ -24,12 +24,31 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     parts = [number(len(colours)) * s.expression for flow in flows for s, colours in flow.summands]
     rest = number(count) * total(s.expression for s in summands_of(cell)) - total(substitute(parts, {KICK: ZERO}))
     modified = any(KICK in symbols_of(flow.hamiltonian) for flow in flows)
-    name = "H = " + " + ".join(f"H_{k}" for k in range(1, len(flows) + 1)) + " at κ = 0" * modified
+    name = "H = " + " + ".join(f"H_{k}" for k, f in enumerate(flows, 1) if not f.force) + " at κ = 0" * modified
     yield decide_zero(name, [("", rest)], positive, f"sites of {count} colours" if count > 1 else "")
+    if cell.forces:
+        yield _forces(cell, flows, positive)
     for k, flow in enumerate(flows, 1):
         residuals = [r for motion in flow.motions for r in _residuals(motion)]
-        name = f"the flow Φ of H_{k} at each site: Φ_0 = 1, dΦ_t/dt = π∇H_{k}∘Φ_t"
+        what, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
+        name = f"the flow Φ of {what} at each site: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t"
         yield decide_zero(name, residuals, positive, flow.manner)
+    for source, flow in zip(cell.noise, plan.noise, strict=True):
+        residuals = [r for motion in flow.motions for r in _residuals(motion)]
+        name = f"the flow Φ of the noise {source} at each site: Φ_0 = 1, dΦ_t/dt = ΔW σπ∇g∘Φ_t"
+        yield decide_zero(name, residuals, positive, flow.manner)
+
+
+def _forces(cell: Cell, flows: Sequence[CellFlow], positive: Sequence[str]) -> Statement:
+    """The force parts are πζ + f together."""
+    at = SiteFields(cell)
+    moved: dict[str, list[Expression]] = {f: [] for f in cell.fields}
+    for flow in flows:
+        for f, e in flow.motions[0].rates.items() if flow.force else ():
+            moved[f].append(e)
+    residuals = [(f, at.tangent(f, at.push) + at.impulse(f) - total(listed)) for f, listed in moved.items()]
+    name = "πζ + f = " + " + ".join(f"F_{k}" for k, flow in enumerate(flows, 1) if flow.force)
+    return decide_zero(name, residuals, positive)
 
 
 def _residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:

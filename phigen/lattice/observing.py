@@ -25,8 +25,8 @@ def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     """How far energy, Casimirs and invariants are from their initial values, by name, each (frames,).
 
     Energy and invariants relative to their size at the start, or to the sum of the magnitudes of their terms where they
-    are small; Casimirs of sites by the site where they changed most. Where H depends on the time, the energy is less
-    the work that was done, in runs that are not too long.
+    are small; Casimirs of sites by the site where they changed most. Where H depends on the time, or forces act, the
+    energy is less the work that was done, in runs that are not too long.
     """
     found = _of_energy(cell, run)
     for name, values in run.casimirs.items():
@@ -42,7 +42,7 @@ def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     if not cell.driven:
         return {ENERGY: _relative(run.energy, run.energy_scale)}
-    if run.steps * run.x[0, 0].size <= MOST_BALANCED:
+    if not cell.noise and run.steps * run.x[0, 0].size <= MOST_BALANCED:
         try:
             work, _ = works(cell, run)
             return {BALANCE: _relative(run.energy - work, run.energy_scale)}

@@ -395,15 +395,64 @@ class PartSearch:
         return found
 
 
+class SiteFields:
+    """Covector and vector fields at sites, weighted at open ends; ``gathered`` is what bonds or pairs add to slopes."""
+
+    def __init__(self, cell: Cell, gathered: Mapping[str, Expression] | None = None) -> None:
+        self.cell, self.gathered = cell, gathered or {}
+        self._search = PartSearch(cell, Colouring(1, (0,) * len(cell.axes)))
+        self._every = [(s, 0) for s in summands_of(cell)]
+
+    def slope(self, field: str, shift: Offset = ()) -> Expression:
+        """∂H/∂field at the site ``shift`` away."""
+        return self._search.force(self._every, field, 0, shift) + self.gathered.get(field, ZERO)
+
+    def push(self, field: str, shift: Offset = ()) -> Expression:
+        """ζ of the forces, the damping with it, for a field at the site ``shift`` away."""
+        acting = self.cell.forces
+        found = self._shifted(acting.covector.get(field, ZERO), shift)
+        if acting.damping is None:
+            return found
+        return found + self._shifted(acting.damping, shift) * self.tangent(field, self.slope, shift)
+
+    def impulse(self, field: str) -> Expression:
+        """The vector force on a field."""
+        return self._shifted(self.cell.forces.vector.get(field, ZERO))
+
+    def noise(self, field: str, shift: Offset = ()) -> Expression:
+        """Σ ΔW σ ∂g/∂field at the site ``shift`` away, of the increments there."""
+        slopes = [
+            symbol(dw) * s.amplitude * gradient(s.hamiltonian, [field])[0]
+            for dw, s in zip(self.cell.increments, self.cell.noise.values(), strict=True)
+        ]
+        return self._shifted(total(slopes), shift)
+
+    def tangent(self, field: str, covector: Callable[[str, Offset], Expression], shift: Offset = ()) -> Expression:
+        """π of a covector field, for a field at the site ``shift`` away."""
+        found = []
+        for (f, other), entry in self.cell.bracket.items():
+            if f == field:
+                g, d = self.cell.place(other)
+                there = plus(shift or self.cell.origin, d) if self.cell.relation == GRID else shift
+                found.append((self.cell.shifted(entry, shift) if shift else entry) * covector(g, there))
+        return total(found)
+
+    def _shifted(self, e: Expression, shift: Offset = ()) -> Expression:
+        """What is at a site, at another; terms that reach beyond open ends are left out."""
+        cell = self.cell
+        if cell.relation != GRID or e.is_zero:
+            return e
+        at = [int(o) for o in shift or cell.origin]
+        terms = [(t, cell.extent(t)) for t in cell.additive_terms(e)]
+        return total(present(cell, low, high, at) * cell.shifted(t, tuple(at)) for t, (low, high) in terms)
+
+
 def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expression, ...]:
-    """ẋ of all fields at a site, weighted at open ends; ``gathered`` names what bonds or pairs add to a force."""
-    search = PartSearch(cell, Colouring(1, (0,) * len(cell.axes)))
-    every = [(s, 0) for s in summands_of(cell)]
-    rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
-    for (f, other), entry in cell.bracket.items():
-        g, d = cell.place(other)
-        rates[f].append(entry * (search.force(every, g, 0, d) + gathered.get(g, ZERO)))
-    return tuple(total(listed) for listed in rates.values())
+    """ẋ of all fields at a site, but for noise, weighted at open ends; ``gathered`` as `SiteFields` has it."""
+    at = SiteFields(cell, gathered)
+    if not cell.forces:
+        return tuple(at.tangent(f, at.slope) for f in cell.fields)
+    return tuple(at.tangent(f, lambda g, d: at.slope(g, d) + at.push(g, d)) + at.impulse(f) for f in cell.fields)
 
 
 def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequence[int]) -> Expression:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.cell import Cell
 from phigen.lattice.graphs import sums_by_field
 from phigen.lattice.kernels import site_kernel
-from phigen.lattice.parts import Colouring, PartSearch, summands_of
+from phigen.lattice.parts import Colouring, SiteFields
 from phigen.lattice.realisation import CellRealisation, realise_cell
 from phigen.lattice.variations import along
 from phigen.scheme.alternation import Schedule
@@ -24,8 +25,8 @@ from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Equation
 from phigen.spec.model import BirealisationChoice, Spec
 from phigen.splitting.ring import TIME
-from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
-from phigen.symbolic.symbols import MOMENTUM, Symbol
+from phigen.symbolic.expression import Expression, number, substitute, symbol, symbols_of
+from phigen.symbolic.symbols import MOMENTUM, Symbol, initial
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,9 @@ class SeriesPlan:
 def plan_series(cell: Cell, host: Host, order: int, composition: str, spec: Spec | None) -> SeriesPlan:
     """The plan for any H. Raises `SpecError` where no bi-realisation is known, and for orders that are not offered."""
     stages = _stages(host, order, composition)
+    if cell.noise and len(stages[-1]) > 1:
+        message = "noise: a step is not composed of others, among which some go back"
+        raise SpecError([Diagnostic(message, host.locations.get(("noise",)), "order: 2")])
     if cell.bond_bracket:
         message = "scheme series: brackets along bonds are not offered"
         raise SpecError([Diagnostic(message, host.locations.get(("poisson",)))])
@@ -78,7 +82,8 @@ def plan_series(cell: Cell, host: Host, order: int, composition: str, spec: Spec
     except SpecError as error:
         place = host.locations.get(("birealisation",)) or host.locations.get(("poisson",))
         raise SpecError([Diagnostic(d.message, d.location or place, d.hint) for d in error.diagnostics]) from None
-    return SeriesPlan(found, *stages, *(_at_covectors(cell, maps) for maps in (found.middle, found.increment)))
+    maps = _pushed(cell, found) if cell.forces.vector else (found.middle, found.increment)
+    return SeriesPlan(found, *stages, *(_at_covectors(cell, m) for m in maps))
 
 
 def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients) -> Equation:
@@ -94,19 +99,25 @@ def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients) -> Equati
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """The maps with p = h∇H(y) at all sites that they mention."""
-    search = PartSearch(cell, Colouring(1, (0,) * len(cell.axes)))
-    every = [(s, 0) for s in summands_of(cell)]
-    summed = sums_by_field(cell)
-    slopes: dict[str, Expression] = {}
+    """The maps with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
+    at = SiteFields(cell, sums_by_field(cell))
+    covectors: dict[str, Expression] = {}
     for name in symbols_of(*maps.values()):
         if isinstance(name, Symbol) and name.kind == MOMENTUM:
             field, offset = cell.place(str(name.key[0]))
-            slope = search.force(every, field, 0, offset)
-            if field in summed:
-                slope = slope + summed[field]
-            slopes[name] = symbol(TIME) * slope
-    return dict(zip(maps, substitute(list(maps.values()), slopes), strict=True))
+            slope = at.slope(field, offset)
+            slope = slope + at.push(field, offset) if cell.forces else slope
+            covectors[name] = symbol(TIME) * slope + at.noise(field, offset)
+    return dict(zip(maps, substitute(list(maps.values()), covectors), strict=True))
+
+
+def _pushed(cell: Cell, found: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """y and the increment of x, where half of the impulse hf is given before and half after the motion."""
+    at, half = SiteFields(cell), number(Fraction(1, 2))
+    impulse = {f: symbol(TIME) * at.impulse(f) for f in cell.fields}
+    moved: dict[str, Expression] = {initial(f): symbol(initial(f)) + half * e for f, e in impulse.items()}
+    middle = dict(zip(found.middle, substitute(list(found.middle.values()), moved), strict=True))
+    return middle, {f: e + impulse[f] for f, e in found.increment.items()}
 
 
 def _stages(host: Host, order: int, composition: str) -> tuple[Order, str, tuple[float, ...]]:

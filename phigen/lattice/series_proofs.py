@@ -45,10 +45,13 @@ def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
     residuals = [(f, w - symbol(f)) for f, w in zip(cell.fields, written, strict=True)]
     yield decide_zero("y, as it is written, solves α(y, p) = x", residuals, positive)
     rates = derivatives(list(plan.increment.values()), TIME)
-    slopes = substitute(rates, {TIME: ZERO})
+    drawn = [n for n, (base, _) in cell.places(*rates).items() if base in cell.increments]
+    slopes = substitute(rates, {TIME: ZERO, **dict.fromkeys(drawn, ZERO)})
     residuals = [(f, a - b) for f, a, b in zip(cell.fields, slopes, field_with_sums(cell), strict=True)]
     order = f"hence the order 2 of {'a step' if plan.order.order == 2 else 'each stage'}, which is symmetric"
-    yield decide_zero("(β − α)(y, h∇H(y)) = hπ∇H(y) + O(h²)", residuals, positive, order)
+    acting = "(β − α)(y, h(∇H + ζ)(y)) + hf(y) = h(π(∇H + ζ) + f)(y) + O(h²)"
+    name = acting if cell.forces else "(β − α)(y, h∇H(y)) = hπ∇H(y) + O(h²)"
+    yield decide_zero(name, residuals, positive, order)
 
 
 def _on_a_box(cell: Cell, found: CellRealisation) -> tuple[System, BiRealisation]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from phigen.errors import Diagnostic, Location, SpecError
+from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
 from phigen.lattice.building import least_sizes
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
@@ -29,13 +30,15 @@ from phigen.lattice.series import SeriesPlan, equation, plan_series
 from phigen.lattice.variations import with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
-from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
+from phigen.scheme.choosing import Choice, Host, is_dated, planned, with_carrier
+from phigen.scheme.forces import forces_said
 from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.lowering import operation_counts
+from phigen.scheme.noise import noise_said, with_noise
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
-from phigen.scheme.program import About, Observables, Program
+from phigen.scheme.program import About, Noise, Observables, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Ends, Gather, Partners, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec
@@ -54,10 +57,11 @@ class _Nowhere:
 
 @dataclass(frozen=True)
 class SplittingPlan:
-    """The parts of H of a lattice, and the method with the flows in the order of its steps."""
+    """The parts of H of a lattice, and the method, with the flows in the order of its steps; and those of ``noise``."""
 
     parts: CellSplitting
     choice: Choice
+    noise: tuple[CellFlow, ...] = ()
 
     @property
     def order(self) -> Order:
@@ -86,8 +90,10 @@ class SplittingPlan:
 
     def schedule(self) -> Schedule:
         """The flows of a step, part by part."""
-        dated = self.choice.carrier is not None
-        return _any_number(self.choice.method, dated=dated) if self.by_colour else self.choice.schedule()
+        if self.by_colour:
+            return _any_number(self.choice.method, dated=self.choice.carrier is not None)
+        found = self.choice.schedule()
+        return with_noise(found, len(self.noise)) if self.noise else found
 
 
 #: How a step of a lattice is made.
@@ -111,9 +117,8 @@ def plan_sweeps(
     _expect_offered(cell, extras, host.locations)
     if scheme == "series" or (scheme == "auto" and spec and spec.birealisation.kind != "auto"):
         return plan_series(cell, host, order, composition, spec)
-    search = GraphSearch if cell.relation == GRAPH else PartSearch
     try:
-        parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
+        return _plan_splitting(cell, host, order, composition)
     except SpecError as unsplit:
         if scheme == "splitting":
             raise
@@ -121,11 +126,21 @@ def plan_sweeps(
             return plan_series(cell, host, order, composition, spec)
         except SpecError as error:
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
-    choice = planned(host, Splitting(parts.flows), order, composition, lambda: _kicks(cell, parts))
+
+
+def _plan_splitting(cell: Cell, host: Host, order: int, composition: str) -> SplittingPlan:
+    search = GraphSearch if cell.relation == GRAPH else PartSearch
+    parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
+    noise = tuple(noise_flows(cell, parts.colouring, search, host))
+    flows = (*parts.flows, *force_flows(cell, parts.colouring, host))
+    choice = planned(host, Splitting(flows), order, composition, lambda: () if cell.forces else _kicks(cell, parts))
+    coloured = any(flow.by_colour for flow in flows)
+    if coloured and noise:
+        message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
+        raise SpecError([Diagnostic(message, host.locations.get(("noise",)), "scheme: series takes it")])
     if cell.time:  # the flows of colours follow each other in the order of the parts
-        coloured = any(flow.by_colour for flow in parts.flows)
-        choice = replace(choice, carrier=len(parts.flows)) if coloured else with_carrier(choice, cell.time)
-    return SplittingPlan(parts, choice)
+        choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
+    return SplittingPlan(parts, choice, noise)
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
@@ -151,8 +166,8 @@ def build_sweeps(
         solved = equation(cell, plan, coefficients)
     else:
         swept = tuple(
-            tuple(_sweep(cell, flow, motion, k, coefficients) for motion in flow.motions)
-            for k, flow in enumerate(plan.flows, 1)
+            tuple(_sweep(cell, flow, motion, k, coefficients, what) for motion in flow.motions)
+            for k, (flow, what) in enumerate(_named(cell, plan), 1)
         )
     if extras.adjoint:
         _expect_transposed(cell, splits=solved is None)
@@ -166,6 +181,7 @@ def build_sweeps(
     )
     observed = _observables(cell)
     kernels = [*(sweep.kernel for part in swept for sweep in part), *((solved.relax, solved.advance) if solved else ())]
+    drawn = Noise(tuple(cell.noise), 1 if solved else 2) if cell.noise else None
     sites = _sites(cell, plan.colouring, [*kernels, observed.energy, observed.casimirs, observed.vector_field])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
     if partners:
@@ -188,7 +204,7 @@ def build_sweeps(
         adjoint=adjoint,
     )
     step = coefficients.settled(settled)
-    facts = [_lattice_fact(cell, plan.colouring.count), *_facts(plan), plan.order.note]
+    facts = [_lattice_fact(cell, plan.colouring.count), *_facts(plan), *_acting_facts(cell, plan), plan.order.note]
     return Program(
         name=cell.name,
         about=About(title, licence, spec_sha256, tuple(f for f in facts if f), _operations(step)),
@@ -199,6 +215,9 @@ def build_sweeps(
         order=plan.order.order,
         step=step,
         observables=observed,
+        forced=bool(cell.forces),
+        pushed=pushed_casimirs(cell),
+        noise=drawn,
         fractions=plan.fractions if isinstance(plan, SeriesPlan) else (1.0,),
         extras=extras,
         lanes=lanes,
@@ -232,15 +251,23 @@ def _expect_transposed(cell: Cell, *, splits: bool) -> None:
     if not splits and cell.relation != GRID:
         message = "adjoint is not offered for the series on graphs and pairs"
         raise SpecError([Diagnostic(message, hint="scheme: splitting has it, where H splits")])
-    if cell.time:
-        raise SpecError([Diagnostic("adjoint is not offered for lattices whose H depends on the time")])
+    if cell.driven:
+        raise SpecError([Diagnostic("adjoint is not offered for lattices with a time, forces or noise")])
 
 
-def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients: Coefficients) -> Sweep:
+def _named(cell: Cell, plan: SplittingPlan) -> Iterator[tuple[CellFlow, str]]:
+    """All flows, those of the noise first, with what each is that of."""
+    for flow, name in zip(plan.noise, cell.noise, strict=True):
+        yield flow, f"the noise {name}"
+    for k, flow in enumerate(plan.flows, 1):
+        yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = sum of {flow.hamiltonian}"
+
+
+def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients: Coefficients, what: str) -> Sweep:
     increments = staged(list(motion.increments.values()), coefficients)
     moved = tuple(cell.fields.index(f) for f in motion.increments)
     suffix = f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
-    named = f"the flow of H_{k} = sum of {flow.hamiltonian}: {motion.manner}".replace(KICK, KICK.kind)
+    named = f"the flow of {what}: {motion.manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
@@ -308,6 +335,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
         tuple(colouring.weights) or (0,),
         tuple(colouring.periods(cell.boundary)) or (1,),
         tuple(least),
+        increments=cell.increments,
     )
 
 
@@ -342,6 +370,14 @@ def _facts(plan: LatticePlan) -> Sequence[str]:
         f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
         "step: explicit",
     ]
+
+
+def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
+    """What the header says of forces and noise."""
+    series = isinstance(plan, SeriesPlan)
+    how = "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(cell.forces.vector)
+    yield from forces_said(bool(cell.forces), pushed_casimirs(cell), how if series else "")
+    yield from noise_said(tuple(cell.noise), weak=1 if series else 2)
 
 
 def _operations(step: Sweeps) -> dict[str, int]:

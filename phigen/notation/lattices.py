@@ -48,6 +48,8 @@ def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple
     found = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
         ("Hamiltonian, the sum of", _densities(cell)),
+        ("Forces at a site: ẋ = π(∇H + ζ) + f, and with damping λ: ζ + λ π∇H for ζ", _forces(cell)),
+        ("Noise at a site: dx = … + Σ σ π∇g ∘ dW", _noise(cell)),
         ("Casimirs", [(KINDS[kind] + name, density) for name, (density, kind) in cell.casimirs.items()]),
         ("Invariants, sums of", list(cell.invariants.items())),
         ("At a site", rates(cell)),
@@ -57,6 +59,17 @@ def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple
         for title, listed in found
         if listed
     ]
+
+
+def _forces(cell: Cell) -> list[tuple[str, Expression]]:
+    acting = cell.forces
+    listed = [(f"ζ_{f}", e) for f, e in acting.covector.items()] + [(f"f_{f}", e) for f, e in acting.vector.items()]
+    return [*listed, *([("λ", acting.damping)] if acting.damping is not None else [])]
+
+
+def _noise(cell: Cell) -> list[tuple[str, Expression]]:
+    found = [((f"σ_{name}", s.amplitude), (f"g_{name}", s.hamiltonian)) for name, s in cell.noise.items()]
+    return [line for pair in found for line in pair]
 
 
 def _densities(cell: Cell) -> list[tuple[str, Expression]]:

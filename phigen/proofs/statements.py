@@ -11,7 +11,7 @@ from phigen.geometry.definedness import undefined_parts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.positivity import positivity
 from phigen.geometry.system import System
-from phigen.lattice import flow_proofs, series_proofs
+from phigen.lattice import acting, flow_proofs, series_proofs
 from phigen.lattice import proofs as of_lattices
 from phigen.lattice.cell import Cell
 from phigen.lattice.series import SeriesPlan
@@ -78,6 +78,8 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
         return groups
     found = {
         CASIMIRS: tuple(of_lattices.casimirs(cell)),
+        FORCES: tuple(acting.force_statements(cell)),
+        NOISE: tuple(acting.noise_statements(cell)),
         INVARIANTS: tuple(of_lattices.invariants(cell)),
         "Hamiltonian": tuple(of_lattices.pair_symmetry(cell)),
     }

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 
 from phigen.runtime import cache
 from phigen.runtime.binding import bound
-from phigen.runtime.interface import BackendError, Floats, LatticeInterface, MissingExtraError, status_name
+from phigen.runtime.interface import (
+    FIRST_DRAWS,
+    BackendError,
+    Draws,
+    Floats,
+    LatticeInterface,
+    MissingExtraError,
+    status_name,
+)
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -33,12 +41,11 @@ _OF_GRAPHS: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "init": (_INT, (_POINTER,) * 6),
 }
 
-#: Those that know the time: of grids and pairs, and of graphs.
-_IN_TIME: dict[str, tuple[Any, tuple[Any, ...]]] = {
-    "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER, _DOUBLE, _POINTER)),
-    "passed": (_INT, (_POINTER, _DOUBLE, _SIZE)),
-}
-_GRAPH_IN_TIME = {**_IN_TIME, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
+#: Those that know the time: of grids and pairs, and of graphs. Those of noise.
+_PASSED: dict[str, tuple[Any, tuple[Any, ...]]] = {"passed": (_INT, (_POINTER, _DOUBLE, _SIZE))}
+_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 4 + (_DOUBLE, _POINTER))}
+_GRAPH_IN_TIME = {**_PASSED, "init_at": (_INT, (_POINTER,) * 5 + (_DOUBLE, _POINTER))}
+_NOISY = {**_PASSED, "set_noise": (_INT, (_POINTER, ctypes.c_uint64, ctypes.c_uint32, ctypes.c_uint64))}
 
 #: What splittings have, and steps by hand where they are offered.
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -51,6 +58,7 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "planes": (_INT, (_POINTER, _SIZE, _SIZE, _SIZE, _POINTER)),
     "put_planes": (_INT, (_POINTER, _SIZE, _SIZE, _SIZE, _POINTER)),
     "holds": (_INT, (_POINTER, _SIZE, _SIZE)),
+    "set_planes": (_INT, (_POINTER, _SIZE, _SIZE)),
 }
 
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
@@ -76,7 +84,13 @@ class CLatticeSession:
     """A lattice on its way, in memory of its own. See `phigen.runtime.lattice.LatticeSession`."""
 
     def __init__(
-        self, functions: Any, interface: LatticeInterface, x0: Floats, parameters: Mapping[str, Any], t0: float
+        self,
+        functions: Any,
+        interface: LatticeInterface,
+        x0: Floats,
+        parameters: Mapping[str, Any],
+        t0: float,
+        draws: Draws,
     ) -> None:
         self._c, self._shape, self._before = functions, x0.shape, 0
         self._real: Any = np.float32 if interface.single else np.float64
@@ -96,6 +110,8 @@ class CLatticeSession:
         del kept
         if status:
             raise BackendError(status_name(status), 0, x0[None])
+        if interface.noise:
+            self._expect_done(functions.set_noise(self._address, draws.seed, draws.member, draws.step))
 
     @property
     def steps(self) -> int:
@@ -151,7 +167,7 @@ class CLatticeSession:
             self._expect_done(self._c.resume(self._address, h, x.ctypes.data, int(kept["far"][0])))
 
     def passed(self, h: float, steps: int) -> None:
-        """Count so many steps of size h as made; of lattices with a time."""
+        """Count so many steps of size h as made; of lattices with a time, or noise."""
         self._expect_done(self._c.passed(self._address, h, steps))
 
     # --- steps by hand: see NAME.h
@@ -200,6 +216,7 @@ class CLattice:
         self._library = cache.load(files, threads=True)
         wanted = _SIGNATURES | (_OF_GRAPHS if interface.graph else {})
         wanted |= (_GRAPH_IN_TIME if interface.graph else _IN_TIME) if interface.time else {}
+        wanted |= _NOISY if interface.noise else {}
         self._c = bound(self._library, interface.name, wanted, _OFFERED, single=interface.single)
 
     def stages(self) -> list[Stage]:
@@ -221,9 +238,11 @@ class CLattice:
         """A hash of all that decides the results."""
         return cache.key_of(self._library)
 
-    def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> CLatticeSession:
+    def start(
+        self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
+    ) -> CLatticeSession:
         """A session at x0 (coordinates, *sizes), at the time t0."""
-        return CLatticeSession(self._c, self.interface, x0, parameters, t0)
+        return CLatticeSession(self._c, self.interface, x0, parameters, t0, draws)
 
     def pullback(
         self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]

@@ -14,7 +14,15 @@ from numpy.typing import ArrayLike, NDArray
 from phigen.errors import ParameterError, StepError
 from phigen.runtime import arguments, lattice_ensemble, lattice_gradients
 from phigen.runtime.gradients import Pullback
-from phigen.runtime.interface import BackendError, Floats, LatticeInterface, Progress, row_steps
+from phigen.runtime.interface import (
+    FIRST_DRAWS,
+    BackendError,
+    Draws,
+    Floats,
+    LatticeInterface,
+    Progress,
+    row_steps,
+)
 from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
 from phigen.runtime.named import Named
 from phigen.writing import replacing
@@ -71,7 +79,9 @@ class LatticeBackend(Protocol):
         """A hash of all that decides the results."""
         ...
 
-    def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> LatticeSession:
+    def start(
+        self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
+    ) -> LatticeSession:
         """A session at x0 (coordinates, *sizes), at the time t0."""
         ...
 
@@ -174,6 +184,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         stride: int = 1,
         *,
         t0: float | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
         progress: Progress | None = None,
@@ -182,19 +195,22 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> LatticeTrajectory:
         """Make ``steps`` steps of size ``h`` from ``x0`` (coordinates, *sizes), framed every ``stride`` and at the end.
 
-        ``t0`` is the time of ``x0``, 0 by default, where H depends on the time.
+        ``t0`` is the time of ``x0``, 0 by default, where H depends on the time. With noise, the random numbers of a
+        site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``, and the site.
         With ``output``, a path that ends in .npy or .npz, frames go to that file one by one. With ``checkpoints``, a
         path, the state is kept there at every frame; a call with the same arguments goes on from it, and removes it at
         the end. ``progress`` is called after each frame with the number of steps done. Raises `StepError`, whose
         ``trajectory`` ends with the state before the failing step.
         """
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
         start, h = self.state(x0, "x0"), arguments.step_size(h)
         steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
         values = self.values(parameters, more, start.shape[1:])
         marks = row_steps(steps, stride)
         frames = Frames(stream_path(output) if output else None, (len(marks), *start.shape))
-        run = LatticeRun(self, start, h, marks, values, frames, Path(checkpoints) if checkpoints else None, begin)
+        kept_at = Path(checkpoints) if checkpoints else None
+        run = LatticeRun(self, start, h, marks, values, frames, kept_at, begin, draws)
         try:
             count = run.made(progress)
         except BackendError as error:
@@ -221,14 +237,17 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         h: float,
         *,
         t0: float | None = None,
+        seed: int | None = None,
+        step0: int | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Floats:
         """The state one step of size ``h`` after ``x`` (coordinates, *sizes), at ``t0``; raises `StepError`."""
         begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
         start, h = self.state(x, "x"), arguments.step_size(h)
         values = self.values(parameters, more, start.shape[1:])
-        session = self.started(start, h, values, begin)
+        session = self.started(start, h, values, begin, draws)
         try:
             session.advance(h, 1)
         except BackendError as error:
@@ -243,6 +262,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         stride: int | None = None,
         *,
         t0: ArrayLike | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
         threads: int | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
@@ -252,8 +274,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         ``h``, ``t0`` and parameters may have a first axis of members, those at sites in front of their sizes: disorder.
         With a ``stride`` the result has a first axis of rows: states at steps 0, stride, 2·stride, … and at the last.
         Small lattices are shared out between ``threads``, by default one on each core; large ones one by one, with
-        threads of their own. Raises `StepError` with the ``members`` that failed and the states as far as each came,
-        with NaN in the rows after that.
+        threads of their own. With noise, each has the random numbers of a member of its own, from ``member`` on. Raises
+        `StepError` with the ``members`` that failed and the states as far as each came, NaN in the rows after that.
         """
         both = sorted(set(parameters or {}) & set(more))
         if both:
@@ -262,7 +284,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         alone: Any = t0 if begin is None else 0.0
         first = arguments.start_time(alone, self.interface, more)
         times = np.asarray(first if begin is None else begin, dtype=np.float64)
-        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, {**(parameters or {}), **more}, times)
+        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
+        given = {**(parameters or {}), **more}
+        return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, given, times, draws)
 
     def pullback(
         self,
@@ -381,10 +405,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             values[name] = array
         return values | bonds
 
-    def started(self, start: Floats, h: float, values: Mapping[str, Any], t0: float = 0.0) -> LatticeSession:
+    def started(
+        self, start: Floats, h: float, values: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
+    ) -> LatticeSession:
         """A session at a state and with values that have been checked."""
         try:
-            return self.backend.start(start, values, t0)
+            return self.backend.start(start, values, t0, draws)
         except BackendError as error:
             raise self.failure(error, h, None, values) from error
 

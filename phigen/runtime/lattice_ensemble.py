@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
 from phigen.runtime import arguments
-from phigen.runtime.interface import BackendError, Floats, LatticeInterface, row_steps
+from phigen.runtime.interface import BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.members import cores, in_threads
 
 if TYPE_CHECKING:
@@ -29,6 +30,7 @@ def ensemble(
     threads: int | None,
     given: Mapping[str, Any],
     t0: Floats,
+    draws: Draws,
 ) -> Floats:
     """See `LatticeSolver.ensemble`."""
     own = {name: np.asarray(value) for name, value in given.items() if has_members(solver.interface, name, value)}
@@ -47,7 +49,7 @@ def ensemble(
 
     def make(m: int) -> None:
         try:
-            session = solver.backend.start(start[m], values[m], begin[m])
+            session = solver.backend.start(start[m], values[m], begin[m], replace(draws, member=draws.member + m))
             for row, ahead in enumerate(np.diff(marks), 1):
                 session.advance(sizes[m], int(ahead))
                 final[m] = frames[row, m] = session.state()

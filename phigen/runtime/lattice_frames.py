@@ -14,7 +14,7 @@ import numpy as np
 
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint
-from phigen.runtime.interface import Floats, Progress
+from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Progress
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
@@ -35,6 +35,7 @@ class LatticeRun:
     frames: Frames
     checkpoints: Path | None
     t0: float = 0.0
+    draws: Draws = FIRST_DRAWS
     energy: list[float] = field(default_factory=list)
     count: int = 0
     session: Any = None
@@ -43,7 +44,7 @@ class LatticeRun:
     def made(self, progress: Progress | None) -> int:
         """All frames that are left."""
         first = self._resumed()
-        self.session = self.solver.started(first, self.h, self.values, self.t0)
+        self.session = self.solver.started(first, self.h, self.values, self.t0, self.draws)
         if self.count:
             self.session.resume(self.h, int(self.marks[self.count - 1]), self.saved)
         else:
@@ -69,6 +70,7 @@ class LatticeRun:
         hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": self.start}.items()}
         marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
         hashes |= {"t0": self.t0.hex()} if self.t0 else {}
+        hashes |= {"draws": repr(self.draws)} if self.draws != FIRST_DRAWS else {}
         about = {"solver": self.solver.backend.identity, "h": self.h, "sizes": list(self.start.shape), "steps": marks}
         return {**about, "parameters": numbers, "arrays": hashes}
 

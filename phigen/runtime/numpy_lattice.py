@@ -8,24 +8,43 @@ from typing import Any
 
 import numpy as np
 
-from phigen.runtime.interface import BackendError, Clock, Floats, LatticeInterface, MissingExtraError
+from phigen.runtime.interface import (
+    FIRST_DRAWS,
+    BackendError,
+    Clock,
+    Draws,
+    Floats,
+    LatticeInterface,
+    MissingExtraError,
+)
 from phigen.runtime.modules import load_module
 
 
 class NumpyLatticeSession:
     """What the loop of the module's ``integrate`` holds."""
 
-    def __init__(self, module: Any, x0: Floats, parameters: Mapping[str, Any], t0: float, *, timed: bool) -> None:
+    def __init__(
+        self,
+        module: Any,
+        x0: Floats,
+        parameters: Mapping[str, Any],
+        t0: float,
+        draws: Draws,
+        *,
+        timed: bool,
+    ) -> None:
         self.steps = 0
         self._module, self._x, self._timed = module, np.array(x0), timed
-        self._clock = Clock(t0)
+        self._clock, self._draws = Clock(t0), draws
         try:
             _, self._sites = module._started(x0, parameters, *([t0] if timed else []))
             module._coefficients(self._sites, 1e-100)
         except ValueError:
             raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None
+        self._sites.seed, self._sites.member = draws.seed, draws.member
         self._h = np.nan
         self._rows: Any = None
+        self._tell_time()
 
     def state(self) -> Floats:
         """A copy of the state (coordinates, *sizes)."""
@@ -52,6 +71,7 @@ class NumpyLatticeSession:
             self._clock.set_step(h, self.steps)
 
     def _tell_time(self) -> None:
+        self._sites.step = self._draws.step + self.steps
         if self._timed:
             self._sites.t = self._clock.after(self.steps)
 
@@ -100,9 +120,11 @@ class NumpyLattice:
         """A hash of all that decides the results."""
         return hashlib.sha256(f"{np.__version__}\n{self._text}".encode()).hexdigest()[:40]
 
-    def start(self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0) -> NumpyLatticeSession:
+    def start(
+        self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
+    ) -> NumpyLatticeSession:
         """A session at x0 (coordinates, *sizes), at the time t0."""
-        return NumpyLatticeSession(self._module, x0, parameters, t0, timed=bool(self.interface.time))
+        return NumpyLatticeSession(self._module, x0, parameters, t0, draws, timed=bool(self.interface.time))
 
     def pullback(
         self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]

@@ -6,7 +6,7 @@ generator of the motion and N = ½ Σ X² that of the noise: of weak order 2, as
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from phigen.errors import Diagnostic, SpecError
@@ -28,9 +28,14 @@ def expect_no_adjoint(system: System, adjoint: bool) -> None:
 
 def noise_facts(system: System, weak: int) -> Iterator[str]:
     """What is said of noise."""
-    if not system.noise:
+    yield from noise_said([s.name for s in system.noise], weak)
+
+
+def noise_said(sources: Sequence[str], weak: int) -> Iterator[str]:
+    """The same of sources by their names."""
+    if not sources:
         return
-    names = ", ".join(s.name for s in system.noise)
+    names = ", ".join(sources)
     yield f"noise: {names}; in the sense of Stratonovich, along Hamiltonian fields, so it keeps all Casimirs"
     yield f"each path of the noise has its step; strong order 1 if sources commute, else 1/2; weak order {weak}"
 

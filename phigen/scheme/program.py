@@ -70,12 +70,12 @@ BOUND = 6.0
 class Noise:
     """Sources of noise by their names; each has ``parts`` increments in a step, independent and equal in law.
 
-    ``fields`` are σπ∇g of each source, one after the other.
+    ``fields`` are σπ∇g of each source, one after the other; of lattices, where each site has sources of its own, None.
     """
 
     sources: tuple[str, ...]
     parts: int
-    fields: Kernel
+    fields: Kernel | None = None
 
     @property
     def draws(self) -> int:
@@ -201,6 +201,6 @@ class Program:
         modified = (self.modified.kernel,) if self.modified else ()
         timed = [k for k in (self.monitor.elapsed, self.monitor.rate, self.monitor.level) if k] if self.monitor else []
         turned = self.attitude.kernels if self.attitude else ()
-        noisy = (self.noise.fields,) if self.noise else ()
+        noisy = (self.noise.fields,) if self.noise and self.noise.fields else ()
         observed = (seen.energy, seen.casimirs, seen.vector_field)
         return (*self.step.kernels, *turned, *timed, *modified, *observed, *noisy, *self.choice)

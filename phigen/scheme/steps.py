@@ -271,6 +271,7 @@ class Sites:
     least: tuple[int, ...] = ()
     ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of bonds, pairs: what is read at a, or at b
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
+    increments: tuple[str, ...] = ()  # of the noise that each site has in a part of a step
 
 
 @dataclass(frozen=True)
@@ -372,8 +373,12 @@ class Sweeps(_Scheduled):
 
     @property
     def is_by_hand(self) -> bool:
-        """Whether the sweeps of a step can be driven one by one over planes: those of a grid that is split."""
-        return self.partners is None and self.equation is None
+        """Whether the sweeps of a step can be driven one by one over planes: those of a grid that is split.
+
+        Noise is drawn with the sweep that reads it, so that must not be that of neighbours.
+        """
+        beside = any(base in self.sites.increments and any(offset) for base, offset in self.sites.places.values())
+        return self.partners is None and self.equation is None and not beside
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
         """Of a part on a grid: how far behind and ahead it reads along the first axis, and as bits of a number the

@@ -70,7 +70,7 @@ def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | 
             if key in raw:
                 _fail(name, key, f"{key} is for specs with lattice:", declared)
         return None
-    for key in ("exact", "section", "direction", "until", "every", "stop"):
+    for key in ("exact", "section", "direction", "until", "every", "stop", "members"):
         if key in raw:
             _fail(name, key, f"{key} is not available for lattices", declared)
     return LatticeRun(

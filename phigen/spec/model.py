@@ -297,6 +297,9 @@ class SpecForces:
         return bool(self.covector or self.vector or self.damping is not None)
 
 
+NO_FORCES = SpecForces()
+
+
 @dataclass(frozen=True)
 class SpecNoise:
     """A source of noise, one of those of ``noise:``: + σ π∇g ∘ dW, with the Hamiltonian g and the amplitude σ."""

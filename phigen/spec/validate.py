@@ -118,7 +118,7 @@ SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": (
 
 #: Keys that lattices do not take yet, and the values that do no harm.
 NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
-    "monitor": (), "reconstruct": (), "forces": (), "damping": (), "noise": (), "terms": (),
+    "monitor": (), "reconstruct": (), "terms": (),
     "gauge": ("auto", "none"), "tangent": (False,), "modified_hamiltonian": (0,),
 }  # fmt: skip
 
@@ -149,7 +149,7 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
 
 def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
     noisy = "noise" in raw
-    if noisy and raw.get("lattice") is None:
+    if noisy:
         for key, harmless in NOT_WITH_NOISE.items():
             harmless = COMPOSITIONS if key == "composition" and raw.get("scheme") == "splitting" else harmless
             if raw.get(key) is not None and raw[key] not in harmless:
@@ -188,8 +188,6 @@ def _formulas(
 def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
     """``forces`` and ``damping``; by coordinates."""
     given, damping = raw.get("forces") or {}, raw.get("damping")
-    if declared.lattice:
-        return SpecForces()
     found: dict[str, dict[str, Expression]] = {}
     for kind in ("covector", "vector"):
         entries = given.get(kind) or {}
@@ -203,8 +201,6 @@ def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
 
 def _noise(given: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dict[str, SpecNoise]:
     """The sources of ``noise``; amplitudes are the same everywhere, for σ∇g to be the gradient of a function."""
-    if declared.lattice:
-        return {}
     scope, found = declared.dated_constants("an amplitude"), {}
     if len(given) > limits.SOURCES:
         message = f"noise: {len(given)} sources, the limit is {limits.SOURCES}"

@@ -52,6 +52,9 @@ MEANINGS = (
         "Casimir: spread over the sites",
         "of the changes of a Casimir that every site has, from the first frame to the last: their standard deviation",
     ),
+    Meaning(
+        "Casimir: largest change", "how far a Casimir of a lattice went that a vector force changes; it is no error"
+    ),
     Meaning("invariant: largest error", "how far a sum over the sites went, relative to the magnitudes of its terms"),
     Meaning(
         "energy: largest error",

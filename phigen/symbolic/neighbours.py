@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
+from phigen.symbolic.symbols import Symbol
 
 #: Where a site is, from another: steps along the axes of a grid; an end, ``("a",)`` or ``("b",)``, of a bond or a pair;
 #: ``()`` for the site itself where there are no axes.
@@ -42,7 +43,11 @@ class Neighbours:
             index = [f"{a}{o:+d}" for a, o in zip(self.axes, steps(offset), strict=True) if o]
         else:
             index = [str(o) for o in offset]
-        return f"{name}[{','.join(index)}]" if index else name
+        if not index:
+            return name
+        if isinstance(name, Symbol):
+            return Symbol(name.kind, *name.key[:-1], f"{name.key[-1]}[{','.join(index)}]")
+        return f"{name}[{','.join(index)}]"
 
     def place(self, symbol_name: str) -> Place:
         """The name of a symbol, and its offset. `KeyError` for a symbol that has no value at sites."""
@@ -50,6 +55,7 @@ class Neighbours:
         base = match["name"] if match else symbol_name
         if base not in self.names:
             raise KeyError(f"{symbol_name!r} has no value at sites")
+        base = self.names[self.names.index(base)]
         if match is None:
             return base, self.origin
         if not self.axes:

@@ -257,7 +257,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     body += [function(program, kernel) for kernel in own if kernel]
     body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
     body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]
-    if program.noise:
+    if program.noise and program.noise.fields:
         body.append(function(program, program.noise.fields, exported=True))
     if program.monitor:
         body.append(function(program, program.monitor.rate, exported=True, returning=True))

@@ -216,7 +216,7 @@ def _kernels(program: Program) -> list[Kernel]:
     modified = [program.modified.kernel] if program.modified else []
     refresh = [step.refresh] if step.refresh else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
-    noisy = [program.noise.fields] if program.noise else []
+    noisy = [program.noise.fields] if program.noise and program.noise.fields else []
     others = [*program.choice, *timed, *noisy, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
         return [replace(step.prepare, name="prepare_row"), *refresh, *step.flows, *step.tangents, *others]

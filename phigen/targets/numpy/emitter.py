@@ -95,11 +95,11 @@ def _body(program: Program) -> str:
     pieces += _monitor(program)
     coefficients = ["coefficients_in_time.py" if program.time else "coefficients.py"]
     if program.noise:
-        coefficients = ["noise.py", "philox.py", "drawing.py", "renewed.py"]
+        coefficients = ["noise.py", "philox.py", "normals.py", "drawing.py", "renewed.py"]
     parts = (*coefficients, "single.py", "checked.py", "integrate.py")
     pieces += [render("numpy", part, _values(program)) for part in parts]
     pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
-    pieces += [_function(program, program.noise.fields)] if program.noise else []
+    pieces += [_function(program, program.noise.fields)] if program.noise and program.noise.fields else []
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:
         pieces += _tangent(program)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.program import Program
+from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Gather, Sweep, Sweeps
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, VARIATION, Symbol
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
@@ -48,12 +48,20 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "schedule": repr(tuple(schedule.flows)),
         "time": program.time,
         "renewed": step.refresh is not None,
+        "noise": program.noise is not None,
+        "sources": _tuple(map(repr, program.noise.sources)) if program.noise else "",
+        "noise_parts": program.noise.parts if program.noise else 0,
+        "bound": BOUND,
         "moments": _tuple(map(repr, program.midpoints if step.equation else schedule.moments)),
         "kicks": bool(schedule.multiples),
         "at_bonds": _tuple(map(repr, sites.at_bonds)),
         "by_colour": repr(step.by_colour),
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
+    arguments = {"t0": "0.0"} if program.time else {}
+    arguments |= {"seed": "0", "member": "0", "step0": "0"} if program.noise else {}
+    values["arguments"] = "".join(f", {name}={value}" for name, value in arguments.items())
+    values["passed"] = "".join(f", {name}={name}" for name in arguments)
     graph = step.partners is not None and step.partners.graph
     values |= {"equation": step.equation is not None, "coloured": bool(step.by_colour)}
     values["adjoint"] = step.adjoint is not None
@@ -61,9 +69,11 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["kept"] = "2 * len(SCHEDULE)" if step.equation else f"sum(len(PARTS[part]) for {flows})"
     values["pairs"] = step.partners is not None and not graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
-    values["flow"] = "(part, sites.colour), row in sites.schedule" if step.by_colour else "part, row in SCHEDULE"
+    values["flow"] = "(part, sites.colour), row" if step.by_colour else "part, row"
+    values["flows"] = "sites.schedule" if step.by_colour else "SCHEDULE"
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
-    parts = ["lattice", "lattice_sites", *graphs, *(_SERIES if step.equation else ("lattice_splitting",))]
+    drawing = ["lattice_noise", "philox"] if program.noise else []
+    parts = ["lattice", "lattice_sites", *graphs, *drawing, *(_SERIES if step.equation else ("lattice_splitting",))]
     parts.append("lattice_steps")
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     pieces += [render("numpy", "lattice_adjoint.py", values)] if step.adjoint else []
@@ -193,6 +203,8 @@ def _body(
                 scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
             elif isinstance(s, Symbol) and s.kind == VARIATION:
                 lines.append(f"    {scope[s]} = {_read(program, step, str(s.key[0]), 'v')}")
+            elif isinstance(s, Symbol) and s.kind == INCREMENT:
+                lines.append(f"    {scope[s]} = {_read(program, step, s)}")
             elif isinstance(s, Symbol) and s.kind.endswith("_bar"):
                 scope.bind(s, f"{s.kind}[{s.key[0]}]")
             elif isinstance(s, Symbol):
@@ -219,6 +231,8 @@ def _read(program: Program, step: Sweeps, name: str, array: str = "x") -> str:
             return f"{text}[{'here' if end == 'a' else 'there'}]"
         return f"{text}[:, None]" if end == "a" else text
     base, offset = step.sites.places[name]
+    if base in step.sites.increments:
+        return _shifted(f"sites.dw[{step.sites.increments.index(base)}]", offset)
     text = f"{array}[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
     return _shifted(text, offset)
 

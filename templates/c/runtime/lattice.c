@@ -10,6 +10,9 @@
 #include "lane_functions.c"
 #include "sweeps.h"
 #include "graph.c"
+#if PHI_NOISE
+#include "lattice_noise.c"
+#endif
 
 /* ---- The lattice ---- */
 #ifdef _OPENMP
@@ -303,7 +306,7 @@ static phi_status phi_set_step(phi_solver *s, double h)
     s->prepared = 1;
     return PHI_OK;
 }
-#if PHI_TIMED
+#if PHI_TIMED || PHI_NOISE
 
 /* The time after so many steps. */
 static double phi_time_after(const phi_solver *s, size_t steps)
@@ -316,7 +319,10 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps)
     const phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || steps < s->steps_before_h) return PHI_BAD_ARGUMENT;
     s->steps = steps;
-    s->t = s->now = phi_time_after(s, steps);
+    s->t = phi_time_after(s, steps);
+#if PHI_TIMED
+    s->now = s->t;
+#endif
     return PHI_OK;
 }
 #endif

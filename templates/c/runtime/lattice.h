@@ -68,6 +68,13 @@ typedef struct {
     double t;                 /* time since phi_init */
 #endif
     double h;                 /* the last step size */
+#if PHI_NOISE
+    uint64_t seed, first_step; /* of the noise: its seed, and the number of the step after phi_init */
+    uint32_t member;
+#if PHI_BY_HAND
+    uint64_t first_plane, planes; /* of the whole lattice: the plane that is here the first, and how many there are; or 0 */
+#endif
+#endif
     phi_params params;
     double coef[PHI_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared;             /* whether coef has been computed */
@@ -112,7 +119,19 @@ phi_status phi_init_at(
     phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const double *x0, double t0, void *work);
 #endif
 #endif
-#if PHI_TIMED
+#if PHI_NOISE
+
+/* Which random numbers the next step takes, which all sites have of their own: those of a seed, of a member of an ensemble,
+   and of the number of a step, below 2^48; all are 0 before. */
+phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step);
+#if PHI_BY_HAND
+
+/* That this is a part of a lattice of so many planes along the first axis, where the plane that is the first here has the number
+   first: so its sites have the random numbers that they have there. */
+phi_status phi_set_planes(phi_solver *s, size_t first, size_t planes);
+#endif
+#endif
+#if PHI_TIMED || PHI_NOISE
 
 /* Say that so many steps of size h have led to the state since phi_init: to go on elsewhere with the same bits, and before each
    step that is made by hand. */

@@ -33,14 +33,23 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #endif
     const size_t units = phi_rows_of_plane(s) * phi_pieces(s);
     s->open = 0;
+#if PHI_NOISE
+    const int drawing = number == 0 || number == PHI_FLOWS - PHI_SOURCES;
+#endif
 #if PHI_ONE_ROW
     s->from = (ptrdiff_t)from;
     s->to = (ptrdiff_t)to;
+#if PHI_NOISE
+    if (drawing) phi_draw_rows(s, s->steps, number > 0, 0, units);
+#endif
     phi_sweep_rows(s, part, coef, far, 0, units);
     s->from = 0;
     s->to = s->length;
     for (size_t k = 0; k < PHI_DIM; ++k) phi_ends(s->x[k], s->length, 0, s->length);
 #else
+#if PHI_NOISE
+    if (drawing) phi_draw_rows(s, s->steps, number > 0, from * units, to * units);
+#endif
     phi_sweep_rows(s, part, coef, far, from * units, to * units);
 #endif
     return PHI_OK;

@@ -63,7 +63,27 @@ static void phi_flow(const phi_solver *s, int flow)
 }
 #endif
 
+#if PHI_NOISE
+/* The increments of a part of a step after so many, at all sites. */
+static void phi_draw(const phi_solver *s, size_t steps, int part)
+{
+    const size_t units = s->rows * phi_pieces(s);
+#ifdef _OPENMP
+    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
+    phi_draw_rows(s, steps, part, units / threads * own + (own < units % threads ? own : units % threads),
+        units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads));
+    if (threads > 1) {
+#pragma omp barrier
+    }
+#else
+    phi_draw_rows(s, steps, part, 0, units);
+#endif
+}
+
+/* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
+#else
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
+#endif
 static void phi_steps(const phi_solver *s, int steps)
 {
 #ifdef _OPENMP
@@ -74,7 +94,18 @@ static void phi_steps(const phi_solver *s, int steps)
 #endif
 #endif
     {
+#if PHI_NOISE
+        for (size_t step = s->steps; step < s->steps + (size_t)steps; ++step) {
+            for (int flow = 0; flow < PHI_FLOWS; ++flow) {
+                if (flow == 0 || flow == PHI_FLOWS - PHI_SOURCES) phi_draw(s, step, flow > 0);
 #if PHI_RENEWED
+                phi_flow(s, step, flow);
+#else
+                phi_flow(s, flow);
+#endif
+            }
+        }
+#elif PHI_RENEWED
         if (steps == 0) phi_flow(s, s->steps - 1, PHI_FLOWS - 1);
         for (size_t step = s->steps; step < s->steps + (size_t)steps; ++step) {
             phi_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
@@ -126,7 +157,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         if (phi_try(s, (int)now)) {
             phi_copy(s->before, s->x, s);
             s->steps += now;
+#if !PHI_NOISE
             s->open = PHI_FLOWS > 1;
+#endif
 #if PHI_NEAR
             s->far -= s->far > 0 ? now : 0;
 #endif
@@ -150,10 +183,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         s->open = 0;
         --s->steps;
     }
-#if PHI_TIMED
-    s->t = s->now = phi_time_after(s, s->steps);
-#else
     s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#if PHI_TIMED
+    s->now = s->t;
 #endif
     return status;
 }

@@ -205,6 +205,13 @@ static phi_status phi_stages(phi_solver *s, int far)
 /* One step; if it cannot be made, none. */
 static phi_status phi_try(phi_solver *s)
 {
+#if PHI_NOISE
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+        phi_draw_rows(s, s->steps, 0, first, end);
+    }
+#endif
     phi_copy(s->before, s->x, s);
 #if PHI_NEAR
     if (phi_stages(s, 0) == PHI_OK) return PHI_OK;
@@ -226,12 +233,10 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     for (; steps > 0 && status == PHI_OK; --steps) {
         status = phi_try(s);
         s->steps += status == PHI_OK;
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    }
 #if PHI_TIMED
-        s->t = s->now = phi_time_after(s, s->steps);
-    }
-#else
-    }
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+    s->now = s->t;
 #endif
     return status;
 }

@@ -5,37 +5,18 @@
 #include <string.h>
 
 #include "solver.h"
+#include "philox.c"
 
 /* ---- Noise ---- */
-/* Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3 (2011): the
-   counter becomes four random words. */
-static void phi_philox(uint32_t counter[4], uint32_t key0, uint32_t key1)
-{
-    for (int round = 0; round < 10; ++round) {
-        const uint64_t even = (uint64_t)0xD2511F53u * counter[0], odd = (uint64_t)0xCD9E8D57u * counter[2];
-        const uint32_t low = counter[1], high = counter[3];
-        counter[0] = (uint32_t)(odd >> 32) ^ low ^ key0;
-        counter[1] = (uint32_t)odd;
-        counter[2] = (uint32_t)(even >> 32) ^ high ^ key1;
-        counter[3] = (uint32_t)even;
-        key0 += 0x9E3779B9u;
-        key1 += 0xBB67AE85u;
-    }
-}
-
-/* 53 of the bits of two words, as a number from 0 up to, but not including, 2^53. */
-static double phi_bits(uint32_t high, uint32_t low) { return (double)(high >> 5) * 67108864.0 + (double)(low >> 6); }
-
-/* Independent normal variates of variance 1, in pairs by Box and Muller, cut off at PHI_BOUND. */
+/* Independent normal variates of variance 1. */
 static void phi_normals(uint64_t seed, uint32_t member, uint64_t step, double normals[PHI_DRAWS])
 {
     for (int k = 0; k < PHI_DRAWS; k += 2) {
-        uint32_t c[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
-        phi_philox(c, (uint32_t)seed, (uint32_t)(seed >> 32));
-        const double radius = fmin(sqrt(-2.0 * log((phi_bits(c[0], c[1]) + 0.5) * 0x1p-53)), PHI_BOUND);
-        const double angle = 6.283185307179586 * (phi_bits(c[2], c[3]) * 0x1p-53);
-        normals[k] = radius * cos(angle);
-        if (k + 1 < PHI_DRAWS) normals[k + 1] = radius * sin(angle);
+        uint32_t counter[4] = { (uint32_t)step, (uint32_t)(step >> 32), member, (uint32_t)(k / 2) };
+        double pair[2];
+        phi_two_normals(seed, counter, pair);
+        normals[k] = pair[0];
+        if (k + 1 < PHI_DRAWS) normals[k + 1] = pair[1];
     }
 }
 

@@ -79,7 +79,9 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     used = (w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
     weights = dict.fromkeys(w for w in used if kind_of(w) == PRESENT)
     halo = max((abs(o[-1]) for o in offsets), default=0)
-    return Layout(step, tuple(lines), halo, tuple(weights), (*program.coordinates, *sites.parameters))
+    return Layout(
+        step, tuple(lines), halo, tuple(weights), (*program.coordinates, *sites.parameters, *sites.increments)
+    )
 
 
 def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from phigen.scheme.program import Program
+from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c.kernels import function, members
@@ -19,7 +19,7 @@ def declarations(program: Program, step: Sweeps) -> str:
     listed = [_declared(p, member[p.name]) for p in program.parameters]
     arrays = len(layout.arrays)
     sizes = [
-        ("ARRAYS", arrays, "arrays over the sites: fields, then parameters"),
+        ("ARRAYS", arrays, f"arrays over the sites: fields, then parameters{', then noise' * bool(program.noise)}"),
         ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that depend on params and h only"),
     ]
     if step.equation:
@@ -47,6 +47,7 @@ def declarations(program: Program, step: Sweeps) -> str:
         "sha256": program.about.spec_sha256,
         "coordinates": ", ".join(program.coordinates),
         "casimirs": ", ".join(program.casimirs) or "none",
+        "noise": program.noise is not None,
         "members": listed or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
     }
@@ -80,6 +81,13 @@ def model(program: Program, step: Sweeps) -> str:
         ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
     ]
     constants += [("PREPARED", step.prepared, "of a row, before those that depend on the time")] * bool(step.refresh)
+    if program.noise:
+        drawn = program.dimension + len(sites.parameters)
+        constants += [
+            ("SOURCES", len(program.noise.sources), f"of noise at a site: {', '.join(program.noise.sources)}")
+        ]
+        constants += [("DRAWN", drawn, "the first of the arrays of increments")]
+        constants += [("PARTS", program.noise.parts, "increments of one source in a step, each of a part of it")]
     if step.equation:
         constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
         if switches(program, step, layout)["BANDED"]:
@@ -115,6 +123,7 @@ def model(program: Program, step: Sweeps) -> str:
         "moments": ", ".join(map(repr, _moments(step))) if step.refresh and not step.equation else "",
         "middles": ", ".join(map(repr, program.midpoints)),
         "fractions": len(program.fractions) > 1,
+        "bound": repr(BOUND) if program.noise else "",
         "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
         "part_count": len(step.by_colour),

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, VARIATION, Symbol
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets.c.kernels import members, printer
 from phigen.targets.c.lattice.layout import Layout, bounds
 from phigen.targets.code import Code
@@ -60,6 +60,8 @@ class SiteNames:
                 pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
                 self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
                 self.scope.bind(s, f"{pointer}[i]")
+            elif isinstance(s, Symbol) and s.kind == INCREMENT:
+                self._bind_site(s)
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
             elif s == program.time:

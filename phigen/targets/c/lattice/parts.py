@@ -29,7 +29,10 @@ from phigen.targets.rendering import render
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
     layout, name, member = layout_of(program, step), program.name, members(program)
-    found = [*functions.called(program), *functions.phi_lanes(program, set(rows.near))]
+    found = [
+        *functions.called(program),
+        *functions.phi_lanes(program, set(rows.near)),
+    ]
     found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
     if step.parts:
         found += _parts(program, layout, rows)

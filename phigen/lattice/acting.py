@@ -1,0 +1,165 @@
+"""Forces and noise at sites as parts of a splitting: the flow of πζ + f, or of pieces of it, and those of the sources.
+
+Each source of noise has the flow of Σ ΔW_s σ g(s), the sum over all sites with the increments of a part of a step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from fractions import Fraction
+
+from phigen.errors import Diagnostic, SpecError
+from phigen.geometry import checks
+from phigen.geometry.system import build_system, system_from_spec
+from phigen.lattice.cell import GRAPH, PERIODIC, Cell
+from phigen.lattice.expansion import expand
+from phigen.lattice.parts import CellFlow, Colouring, NoPartError, PartSearch, SiteFields, SiteMotion, own_ring
+from phigen.scheme.choosing import Host
+from phigen.spec.model import NO_FORCES, MatrixForm, Parameter
+from phigen.splitting.flow import solved
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, substitute, symbol, symbols_of, total
+from phigen.symbolic.readable import shortened
+from phigen.symbolic.symbols import GATHERED, Symbol, kind_of
+from phigen.symbolic.verdict import PROVED, Statement, decide_zero
+
+Rates = Mapping[str, Expression]
+
+
+def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
+    """The flows of the forces; none without any. `SpecError` that names the piece that has none in closed form."""
+    if not cell.forces:
+        return ()
+    at = SiteFields(cell)
+    tangent = {f: at.tangent(f, at.push) for f in cell.fields}
+    impulse = {f: at.impulse(f) for f in cell.fields}
+    whole = _flow(cell, colouring, {f: tangent[f] + impulse[f] for f in cell.fields})
+    if isinstance(whole, CellFlow):
+        return (whole,)
+    covectors = [(f"ζ_{f}", _alone(cell, at, f)) for f in cell.fields]
+    components = [(f"f = {shortened(e)}", {f: e}) for f, e in impulse.items()]
+    place = next((host.locations[(key,)] for key in ("damping", "forces") if (key,) in host.locations), None)
+    found: list[CellFlow] = []
+    for field, pieces in ((tangent, covectors), (impulse, components)):
+        together = _flow(cell, colouring, field)
+        named = [("", field)] if isinstance(together, CellFlow) else pieces
+        for name, piece in named:
+            flow = _flow(cell, colouring, piece)
+            if isinstance(flow, str):
+                message = f"scheme splitting: the force {name} has no elementary flow on the lattice: {flow}"
+                raise SpecError([Diagnostic(message, place, "scheme: series takes every force")])
+            found.append(flow)
+    return tuple(flow for flow in found if flow.motions)
+
+
+def _alone(cell: Cell, at: SiteFields, field: str) -> dict[str, Expression]:
+    """The field of one covector ζ_field."""
+    return {f: at.tangent(f, lambda g, d: at.push(g, d) if g == field else ZERO) for f in cell.fields}
+
+
+def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
+    """The flow of a vector field that moves each site by itself, or why there is none."""
+    moved = {f: e for f, e in rates.items() if not e.is_zero}
+    names = symbols_of(*moved.values())
+    if any(kind_of(n) == GATHERED for n in names):
+        return "it depends on what bonds or pairs add up"
+    beside = {base for base, offset in cell.places(*moved.values()).values() if any(offset)}
+    if beside & set(moved):
+        return f"it depends on {min(beside & set(moved))} of neighbours, which moves"
+    ring = own_ring(cell.fields, moved.values())
+    found = solved(ring, ring.tower.convert_all([moved.get(f, ZERO) for f in cell.fields]))
+    if isinstance(found, str):
+        return found
+    increments = {f: e for f, e in zip(cell.fields, found.increments, strict=True) if not e.is_zero}
+    motions = (
+        tuple(SiteMotion(c, increments, (), moved, increments, found.manner) for c in range(colouring.count))
+        if moved
+        else ()
+    )
+    return CellFlow(ZERO, tuple(found.increments), found.manner, motions, force=tuple(moved.values()))
+
+
+def noise_flows(
+    cell: Cell, colouring: Colouring, search: Callable[[Cell, Colouring], PartSearch], host: Host
+) -> Iterator[CellFlow]:
+    """The flow of each source. `SpecError` for one whose flow is not elementary."""
+    for dw, (name, source) in zip(cell.increments, cell.noise.items(), strict=True):
+        energy = symbol(dw) * source.amplitude * source.hamiltonian
+        alone = replace(cell, hamiltonian=energy, bond_hamiltonian=ZERO, pair_hamiltonian=ZERO, forces=NO_FORCES)
+        try:
+            flows = search(alone, colouring).splitting().flows
+        except NoPartError:
+            flows = ()
+        if len(flows) != 1 or flows[0].by_colour:
+            reason = f"scheme: splitting needs the flow of the noise {name} in closed form, which phigen does not find"
+            raise SpecError([Diagnostic(reason, host.locations.get(("noise", name)), "scheme: series takes it")])
+        yield _of_unit_time(flows[0])
+
+
+def _of_unit_time(flow: CellFlow) -> CellFlow:
+    def at_one(listed: Rates) -> dict[str, Expression]:
+        return dict(zip(listed, substitute(list(listed.values()), {TIME: ONE}), strict=True))
+
+    motions = tuple(replace(m, increments=at_one(m.increments)) for m in flow.motions)
+    return replace(flow, increment=tuple(substitute(flow.increment, {TIME: ONE})), motions=motions)
+
+
+def casimir_rate(cell: Cell, name: str) -> Expression:
+    """A density of what the vector force adds to the rate of a Casimir, which πζ does not change."""
+    density, kind = cell.casimirs[name]
+    vector, found = cell.forces.vector, []
+    named = {n: p for n, p in cell.places(density).items() if p[0] in vector}
+    for (base, offset), slope in zip(named.values(), gradient(density, list(named)), strict=True):
+        there = cell.shifted(vector[base], offset) if cell.axes else vector[base]
+        found.append(slope / density * there if kind == "product" else slope * there)
+    return total(found)
+
+
+def pushed_casimirs(cell: Cell) -> tuple[str, ...]:
+    """The names of the Casimirs that forces change."""
+    return tuple(name for name in cell.casimirs if not casimir_rate(cell, name).is_zero)
+
+
+def force_statements(cell: Cell) -> Iterator[Statement]:
+    """How forces change Casimirs, and that damping takes energy as it should; π is known to be skew."""
+    if not cell.forces:
+        return
+    positive = tuple(p.name for p in cell.parameters if p.positive)
+    for name in cell.casimirs:
+        rate = casimir_rate(cell, name)
+        kept = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], positive, "for all sizes")
+        said = f"the vector force changes {name}, a site adds {shortened(rate)} to its rate"
+        yield kept if kept.holds else Statement(said, PROVED)
+    if cell.forces.damping is not None:
+        yield Statement("the damping changes H at the rate −Σ λ |π∇H|²", PROVED, "since π is skew, for all sizes")
+
+
+def noise_statements(cell: Cell) -> Iterator[Statement]:
+    """Whether the sources commute, and what density is stationary: at one site, with any slope of H there."""
+    if not cell.noise:
+        return
+    local = cell.is_local and not any(any(offset) for _, offset in cell.places(*_acting(cell)).values())
+    if not local or cell.forces.covector or cell.forces.vector:
+        periodic = replace(cell, boundary=(PERIODIC,) * len(cell.axes))
+        sizes = [1 + 2 * r for r in cell.poisson_reach] if cell.axes else [2]
+        box = expand(periodic, [max(n, 2) for n in sizes], [(0, 1)] * (cell.relation == GRAPH))
+        where = f"on {len(box.sites)} sites"
+        system = system_from_spec(box.spec())
+    else:
+        slopes = {f: Symbol("slope", f) for f in cell.fields}
+        rows = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in cell.fields) for f in cell.fields)
+        energy = total(symbol(slopes[f]) * symbol(f) for f in cell.fields)
+        free = tuple(Parameter(s, Fraction(1)) for s in slopes.values())
+        system = build_system(
+            cell.name, cell.fields, (*cell.parameters, *free), MatrixForm(rows), energy,
+            time=cell.time, forces=cell.forces, noise=cell.noise,
+        )  # fmt: skip
+        where = "at every site, whatever H is"
+    for statement in checks.noise_statements(system):
+        yield replace(statement, detail="; ".join(filter(None, [statement.detail, where])))
+
+
+def _acting(cell: Cell) -> list[Expression]:
+    damping = [cell.forces.damping] if cell.forces.damping is not None else []
+    return [*damping, *(e for s in cell.noise.values() for e in (s.hamiltonian, s.amplitude))]
