@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
+from support import javascript
 from systems import slow_but
 
 import phigen
 from phigen import spec as specs
 from phigen.api import interface_of, solver_of
-from phigen.compiler import compile_spec, emit, examine
+from phigen.compiler import compile_spec, examine
 from phigen.errors import SpecError
 from phigen.proofs import attitude as proofs
 from phigen.proofs.statements import ATTITUDE
@@ -465,6 +466,25 @@ def test_long_runs_give_the_attitude_of_each_row(section):
     assert np.array_equal(np.concatenate([p.turned for p in pieces]), found.attitude)
 
 
-def test_javascript_refuses_what_it_would_leave_out():
-    with pytest.raises(SpecError, match="not offered in JavaScript"):
-        emit(made("body").program, "js", "phigen build t")
+JAVASCRIPT = """(() => {
+  s.integrate(-0.03, 30);
+  const found = [[...s.attitude], [...(s.position ?? [])]];
+  s.kick(s.x.map((x) => 0.1 * x)).step(0.05);
+  return [...found, [...s.attitude], [...(s.position ?? [])]];
+})()"""
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_javascript_has_the_attitude_of_numpy_after_kicks_too(case):
+    x0, expected = np.linspace(0.4, 1.0, made(case).system.dimension), interface_of(made(case).program)
+    first = {"attitude0": np.random.default_rng(3).normal(size=expected.attitude)}
+    if expected.position:
+        first["position0"] = np.array([0.1, 0.2, 0.3])
+    options = ", ".join(f"{name}: {given.ravel().tolist()}" for name, given in first.items())
+    *found, turned, moved = javascript(made(case), f"x0: {x0.tolist()}, {options}", "s", JAVASCRIPT)
+    session = solver(case).session(x0, **first).step(-0.03, 30)
+    assert found[0] == pytest.approx(session.attitude.ravel(), abs=3e-15)
+    assert not expected.position or found[1] == pytest.approx(session.position, abs=3e-15)
+    session.kick(0.1 * session.x).step(0.05)
+    assert turned == pytest.approx(session.attitude.ravel(), abs=3e-15)
+    assert not expected.position or moved == pytest.approx(session.position, abs=3e-15)

@@ -10,8 +10,7 @@ from shutil import copy
 
 import numpy as np
 import pytest
-from support import BODY, COMMAND, RATTLEBACK, compile_text, compiled, setting, solver, spec_of, tool
-from support import NAMES as CORPUS
+from support import BODY, COMMAND, NAMES, RATTLEBACK, compile_text, compiled, setting, solver, spec_of, tool
 
 import phigen
 from phigen import resources, spec
@@ -25,9 +24,6 @@ pytestmark = pytest.mark.corpus
 
 RUNTIME = sorted((resources.templates() / "js" / "runtime").glob("*.mjs"))
 STEPS = 20
-
-#: Attitudes are not offered in JavaScript; tests/attitude has the refusal.
-NAMES = [name for name in CORPUS if not spec_of(name).reconstruct]
 
 PENDULUM = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - cos(q)\n"
 EULER = f"{PENDULUM}birealisation: canonical-euler\nruns: {{r: {{initial: [1, 0.5], step: 0.1, steps: 20}}}}\n"
@@ -364,7 +360,9 @@ def test_modules_that_meet_declare_no_name_twice():
     }
     lattices = [["errors", "lattice", "sites", *step] for step in (["flows"], ["sweeps", "krylov"])]
     others = ["tangent", "errors", "solver", "gauge", "guess", "algebra", "taylor"]
-    for met in [*lattices, *([s, f"tangent_{s}", *others] for s in ("newton", "path", "explicit", "splitting"))]:
+    steps = [[s, f"tangent_{s}", *others] for s in ("newton", "path", "explicit", "splitting")]
+    turned = [[*met, "attitude", f"attitude_{kind}"] for met in steps for kind in ("matrices", "quaternions")]
+    for met in [*lattices, *turned]:
         every = [name for module in met for name in declared[module]]
         assert len(every) == len(set(every)), sorted(n for n in set(every) if every.count(n) > 1)
 

@@ -10,7 +10,7 @@ from dataclasses import replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
-from phigen.scheme.program import BOUND, Program
+from phigen.scheme.program import BOUND, Attitude, Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import special
 from phigen.targets.header import CHECKSUM, checksum, header_lines
@@ -20,6 +20,10 @@ from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties
 from phigen.targets.js.runtime import assembled
 from phigen.targets.path import Syntax, kinds, recurrences, statements, tangent_program
 from phigen.targets.rendering import render
+
+#: Switches of the runtime that are about attitudes.
+_ATTITUDES = ("ATTITUDE", "MATRICES", "QUATERNIONS", "NORMALISE", "POSITION", "SPATIAL", "UNIFORM", "EXPONENTIAL",
+              "TURNED_IN_STAGES", "TURNED_BY_COVECTOR")  # fmt: skip
 
 #: Most terms of the expansion of a path, as in the C target.
 TERMS = 30
@@ -37,13 +41,10 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for attitudes, adjoints, lattices that are driven."""
+    """The file name and its contents. Raises `SpecError` for adjoints, and lattices that are driven."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
-    if program.attitude:
-        message = f"{program.name} reconstructs attitudes, which are not offered in JavaScript"
-        raise SpecError([Diagnostic(message, hint="the targets c and numpy have them")])
     if isinstance(program.step, Sweeps) and (program.time or program.noise):
         what = "depends on the time" if program.time else "has noise"
         message = f"{program.name} is a lattice that {what}, which is not offered in JavaScript"
@@ -71,6 +72,9 @@ def _system_of_coordinates(program: Program) -> str:
     modules += ["guess"] if features["IMPLICIT"] else []
     modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
     modules += ["level"] if program.monitor else []
+    modules += ["attitude", "attitude_matrices" if features["MATRICES"] else "attitude_quaternions"] * features[
+        "ATTITUDE"
+    ]
     modules += ["tangent", f"tangent_{chosen}"] if program.extras.tangent else []
     algebra = not isinstance(step, Splitting) or program.searches_gauge or program.extras.tangent
     modules += ["algebra"] if algebra else []
@@ -101,16 +105,33 @@ def _features(program: Program) -> dict[str, bool]:
         "MODIFIED": program.modified is not None,
         "TANGENT": program.extras.tangent,
         "KICKED": program.offers("kicks"),
+        **_of_attitude(program.attitude),
         "ENSEMBLE": program.offers("ensemble"),
         **{f"TAYLOR_{kind.upper()}": kind in sums for kind in ("product", "chain", "power")},
     }
+
+
+def _of_attitude(attitude: Attitude | None) -> dict[str, bool]:
+    """What the runtime is asked for of attitudes."""
+    asked: dict[str, object] = {"ATTITUDE": attitude}
+    if attitude:
+        group, turn = attitude.group, attitude.turn
+        asked |= {
+            "MATRICES": group.matrices,
+            "QUATERNIONS": not group.matrices,
+            "NORMALISE": group.orthogonal,
+            "POSITION": group.translation,
+        }
+        asked |= {"SPATIAL": group.spatial, "UNIFORM": attitude.rate, "EXPONENTIAL": attitude.exponential}
+        asked |= {"TURNED_IN_STAGES": turn, "TURNED_BY_COVECTOR": turn and group.matrices and not attitude.cayley}
+    return dict.fromkeys(_ATTITUDES, False) | {name: bool(found) for name, found in asked.items()}
 
 
 def _model(program: Program) -> str:
     """What is printed of the system: constants and kernels."""
     step = program.step
     pieces = [render("js", "system.mjs", _system(program))]
-    pieces += [render("js", "schedule.mjs", _schedule(step))] if isinstance(step, Splitting) else []
+    pieces += [render("js", "schedule.mjs", _schedule(step, program.attitude))] if isinstance(step, Splitting) else []
     pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
     pieces += _functions(program)
     pieces += [_function(kernel) for kernel in _kernels(program)]
@@ -140,19 +161,34 @@ def _system(program: Program) -> Mapping[str, object]:
         "parts": program.noise.parts if program.noise else 0,
         "draws": program.noise.draws if program.noise else 0,
         "bound": json.dumps(BOUND),
+        "attitude": _sizes(program.attitude) if program.attitude else "",
         "fractions": json.dumps(program.fractions),
         "table": render("js", "table.mjs", _table(program)).strip("\n"),
     }
 
 
-def _schedule(step: Splitting) -> Mapping[str, object]:
+def _sizes(attitude: Attitude) -> Mapping[str, int]:
+    """The numbers of arrays."""
+    group, rate = attitude.group, attitude.rate
+    rows = len(group.matrices[0]) if group.matrices else 0
+    covector = len(group.matrices) + 1 if attitude.exponential else 0
+    return {
+        "attitude": rows**2 or 4,
+        "element": group.size,
+        "rows": rows,
+        "covector": covector,
+        "turning": len(rate.roots) if rate else 0,
+    }
+
+
+def _schedule(step: Splitting, attitude: Attitude | None) -> Mapping[str, object]:
     """The flows of a step, and their times."""
     schedule = step.schedule
     return {
         "times": json.dumps(schedule.times),
         "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
         "schedule": json.dumps(schedule.flows),
-        "flows": _numbered("flow", step.flows),
+        "flows": _numbered("turn", attitude.turns) if attitude else _numbered("flow", step.flows),
         "tangents": _numbered("tangent", step.tangents),
     }
 
@@ -217,9 +253,12 @@ def _kernels(program: Program) -> list[Kernel]:
     refresh = [step.refresh] if step.refresh else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
     noisy = [program.noise.fields] if program.noise and program.noise.fields else []
-    others = [*program.choice, *timed, *noisy, *modified, seen.energy, seen.casimirs, seen.vector_field]
+    turned = program.attitude
+    turning = [k for k in (turned.exponential, turned.turn, turned.rate) if k] if turned else []
+    others = [*turning, *program.choice, *timed, *noisy, *modified, seen.energy, seen.casimirs, seen.vector_field]
     if isinstance(step, Splitting):
-        return [replace(step.prepare, name="prepare_row"), *refresh, *step.flows, *step.tangents, *others]
+        flows = turned.turns if turned else step.flows
+        return [replace(step.prepare, name="prepare_row"), *refresh, *flows, *step.tangents, *others]
     assert not isinstance(step, Sweeps)
     varied = [step.tangent] if isinstance(step, Explicit) and step.tangent else []
     varied += [step.tangent.curvature] if isinstance(step, Path) and step.tangent else []

@@ -4,7 +4,7 @@ import { sizeOf, solved, usual } from "./sweeps.mjs";
 
 // ---- Newton's method for a stage that sweeps do not solve, its linear equations in Krylov spaces ----
 
-/** Newton's corrections; directions of the Krylov space that each is taken from; how well it solves, and has to. */
+/** Newton's corrections; directions of the space that each is taken from; how well it solves, and has to. */
 const MOST_CORRECTIONS = 200;
 const DIRECTIONS = 24;
 const SOLVED = 1e-6;
@@ -21,7 +21,7 @@ function add(a, factor, b) {
   for (let k = 0; k < a.length; k++) a[k] += factor * b[k];
 }
 
-/** A solution of matrix(v) = side, as well as it can be by GMRES without a restart; null where that is of no use. */
+/** A solution of matrix(v) = side, as well as GMRES can without a restart; null where that is of no use. */
 function krylov(matrix, side) {
   const length = norm(side);
   const solution = new Float64Array(side.length);

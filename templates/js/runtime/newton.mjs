@@ -3,6 +3,9 @@ import { plausible, retried } from "./guess.mjs";
 // #if MONITOR
 import { pass, timeOf } from "./level.mjs";
 // #endif
+// #if ATTITUDE
+import { turnStage } from "./attitude.mjs";
+// #endif
 import { DIM, FLOOR, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 
 // ---- The implicit step, by Newton's method ----
@@ -76,6 +79,9 @@ function attempt(solver, stage) {
     if (!advance(solver, increment, small)) return "NOT_FINITE";
     // #if MONITOR
     pass(solver, time);
+    // #endif
+    // #if ATTITUDE
+    turnStage(solver, stage, y);
     // #endif
     history.remember(y);
     return "OK";

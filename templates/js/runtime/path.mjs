@@ -3,6 +3,9 @@ import { plausible, retried } from "./guess.mjs";
 // #if MONITOR
 import { pass, timeOf } from "./level.mjs";
 // #endif
+// #if ATTITUDE
+import { turnStage } from "./attitude.mjs";
+// #endif
 import { DIM, FIXED, LONGEST_PATH, MAX_ITERATIONS, MOST_PIECES, SERIES, TERMS } from "./model.mjs";
 import { generate, pathBegin, pathField, pathOrder } from "./model.mjs";
 
@@ -174,6 +177,9 @@ function attempt(solver, stage) {
       if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
       // #if MONITOR
       pass(solver, time);
+      // #endif
+      // #if ATTITUDE
+      turnStage(solver, stage, y);
       // #endif
       history.remember(y);
       return "OK";

@@ -24,6 +24,10 @@ import { draw } from "./noise.mjs";
 // #if MODIFIED
 import { modified } from "./model.mjs";
 // #endif
+// #if ATTITUDE
+import { ATTITUDE } from "./model.mjs";
+import { beginAttitude, currentElement, elementOf } from "./attitude.mjs";
+// #endif
 // #if TANGENT
 import { tangentOf } from "./tangent.mjs";
 // #endif
@@ -125,6 +129,17 @@ export class Solver {
   /** For starting guesses, for each stage. */
   history = FRACTIONS.map(() => new History());
   // #endif
+  // #if ATTITUDE
+  /** Where the attitude began; the product of what steps turned it by since; what rounding took of that. */
+  firstElement;
+  turned;
+  turnedCarry;
+  // #if UNIFORM
+  /** The gradient of the Casimirs that are taken from H, by which the body turns too, and since when. */
+  turningRate;
+  attitudeFrom;
+  // #endif
+  // #endif
   // #if EQUAL_IN_T
   /** Steps and time when h was set: time is counted from there, so that no error adds up. */
   #stepsBefore = 0;
@@ -152,6 +167,13 @@ export class Solver {
    * #if MONITOR
    * @param {ArrayLike<number>} [options.gauge] an e of one's own: the step is an exact Poisson map for each
    * #endif
+   * #if ATTITUDE
+   * @param {ArrayLike<number>} [options.attitude0] the attitude at x0, a quaternion (w, x, y, z) of any
+   *   length, or a matrix row by row; the identity by default
+   * #endif
+   * #if POSITION
+   * @param {ArrayLike<number>} [options.position0] the position, the origin by default
+   * #endif
    */
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
@@ -178,7 +200,38 @@ export class Solver {
       throw new StepError("BAD_ARGUMENT", 0, `the monitor is ${rate} at x0`);
     }
     // #endif
+    // #if ATTITUDE
+    beginAttitude(this, elementOf(0, options.attitude0, options.position0));
+    // #endif
   }
+
+  // #if ATTITUDE
+  /** A quaternion (w, x, y, z) that turns body into space, or a matrix, row by row; see setAttitude. */
+  get attitude() {
+    return currentElement(this).slice(0, ATTITUDE);
+  }
+
+  // #if POSITION
+  /** Where the body is, in space. */
+  get position() {
+    return currentElement(this).slice(ATTITUDE);
+  }
+
+  // #endif
+  /**
+   * The attitude from now on. Throws StepError for what is not allowed; then all is as before.
+   *
+   * @param {ArrayLike<number>} attitude
+   * #if POSITION
+   * @param {ArrayLike<number>} [position] the origin by default
+   * #endif
+   * @returns {this}
+   */
+  setAttitude(attitude, position) {
+    beginAttitude(this, elementOf(this.steps, finite(attitude, ATTITUDE, "the attitude"), position));
+    return this;
+  }
+  // #endif
 
   /** What depends on the step size; nothing where that is as before. */
   #setStep(h) {
@@ -262,6 +315,10 @@ export class Solver {
     // #if MONITOR
     const { t, tCarry } = this;
     // #endif
+    // #if ATTITUDE
+    const turned = Float64Array.from(this.turned);
+    const turnedCarry = Float64Array.from(this.turnedCarry);
+    // #endif
     // #endif
     for (let stage = 0; stage < FRACTIONS.length; stage++) {
       const status = makeStage(this, stage);
@@ -271,6 +328,9 @@ export class Solver {
       this.carry.set(carry);
       // #if MONITOR
       Object.assign(this, { t, tCarry });
+      // #endif
+      // #if ATTITUDE
+      Object.assign(this, { turned, turnedCarry });
       // #endif
       // #endif
       throw new StepError(status, this.steps);
@@ -346,8 +406,14 @@ export class Solver {
     // #if IMPLICIT
     for (const history of this.history) history.move(this.x, x);
     // #endif
+    // #if UNIFORM
+    const element = currentElement(this);
+    // #endif
     this.x.set(x);
     this.carry.set(carry);
+    // #if UNIFORM
+    beginAttitude(this, elementOf(this.steps, element.subarray(0, ATTITUDE), element.subarray(ATTITUDE)));
+    // #endif
     return this;
   }
 
@@ -367,11 +433,18 @@ export class Solver {
     // #endif
     const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
     const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
+    // #if ATTITUDE
+    const turned = Float64Array.from(this.turned);
+    const turnedCarry = Float64Array.from(this.turnedCarry);
+    // #endif
     this.step(h);
     const { status, tangent } = tangentOf(this, at);
     if (status === "OK") return tangent;
     this.x.set(before.x);
     this.carry.set(before.carry);
+    // #if ATTITUDE
+    Object.assign(this, { turned, turnedCarry });
+    // #endif
     // #if MONITOR
     this.tCarry = tCarry;
     // #endif

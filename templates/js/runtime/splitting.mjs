@@ -1,6 +1,10 @@
 // #if MONITOR
 import { pass } from "./level.mjs";
 // #endif
+// #if ATTITUDE
+import { ELEMENT } from "./model.mjs";
+import { turnBy } from "./attitude.mjs";
+// #endif
 import { DIM, FLOWS, MULTIPLES, SCHEDULE, TIMES, prepareRow } from "./model.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
@@ -22,6 +26,11 @@ const at = new Float64Array(DIM);
 const moved = new Float64Array(DIM);
 /** Increments; for a monitor the time that a flow takes, and what is no number where a logarithm has none. */
 const change = new Float64Array(DIM + 2);
+// #if ATTITUDE
+/** The elements of the flows of a step so far, multiplied, less 1. */
+let elementOfStep = new Float64Array(ELEMENT);
+let elementAfter = new Float64Array(ELEMENT);
+// #endif
 
 /** One step: a status. If it fails, the state is as before. */
 export function makeStage(solver) {
@@ -32,8 +41,16 @@ export function makeStage(solver) {
   // #if MONITOR
   let time = 0;
   // #endif
+  // #if ATTITUDE
+  elementOfStep.fill(0);
+  // #endif
   for (const [part, row] of SCHEDULE) {
+    // #if ATTITUDE
+    FLOWS[part](rows[row], at, elementOfStep, change, elementAfter);
+    [elementOfStep, elementAfter] = [elementAfter, elementOfStep];
+    // #else
     FLOWS[part](rows[row], at, change);
+    // #endif
     // #if MONITOR
     time += change[DIM] + 0 * change[DIM + 1];
     // #endif
@@ -54,5 +71,8 @@ export function makeStage(solver) {
     carry[i] = (x[i] - (sum - added)) + (moved[i] - added);
     x[i] = sum;
   }
+  // #if ATTITUDE
+  turnBy(solver, elementOfStep);
+  // #endif
   return "OK";
 }

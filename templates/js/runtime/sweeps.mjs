@@ -25,7 +25,8 @@ function most(values, from, to) {
 export function usual(y) {
   const count = y.length / DIM;
   const whole = most(y, 0, y.length);
-  return Float64Array.from({ length: DIM }, (_, k) => most(y, k * count, (k + 1) * count) + 1e-3 * whole + 1e-300);
+  const largest = (k) => most(y, k * count, (k + 1) * count);
+  return Float64Array.from({ length: DIM }, (_, k) => largest(k) + 1e-3 * whole + 1e-300);
 }
 
 /** How large a change of y is, field by field. */
