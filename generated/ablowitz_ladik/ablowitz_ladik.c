@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: f2a8968647fdcc03a9724a75b4ea424349c8018f11134c4d12e9a89d133db4fb
+ * body-sha256: e6df7a8cb8470a49401ff7ba7c20c284756bed07fcff8ac0293248a636ea81cb
  */
 #include "ablowitz_ladik.h"
 
@@ -509,14 +509,16 @@ static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, 
     const size_t units = s->rows * ablowitz_ladik_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    ablowitz_ladik_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    ablowitz_ladik_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    ablowitz_ladik_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 1589519fd70d0aa52315c64ef36c2c99e6035e9f002aa6a8edf08d79518b8d44
+ * body-sha256: 42a647d65dbd8239b9bef23e5e20d91812d11adeba9f0e61193e5e55f3f9ad3a
  */
 #include "chiral_magnet.h"
 
@@ -971,14 +971,16 @@ static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, 
     const size_t units = s->rows * chiral_magnet_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    chiral_magnet_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    chiral_magnet_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    chiral_magnet_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

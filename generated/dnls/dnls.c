@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: fe34dea364a5ba363e881d328b719209ff3d758b5f77f389ae77cf7e5dc456ee
+ * body-sha256: 09fa12c71169efe5843113c3d5eb14f4a088ab6366a21a2d10aecf4f9cafcdf0
  */
 #include "dnls.h"
 
@@ -455,14 +455,16 @@ static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef, 
     const size_t units = s->rows * dnls_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    dnls_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    dnls_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    dnls_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 5136102054927e3be7b0accee43f4318de1a968e918116e6640c5fddbd2ac6b3
+ * body-sha256: a173801cc4fd87c23117081f0a6876ce6a8bed4806359e3ab879e954860e3413
  */
 #include "dnls_disorder.h"
 
@@ -525,14 +525,16 @@ static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, co
     const size_t units = s->rows * dnls_disorder_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    dnls_disorder_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    dnls_disorder_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    dnls_disorder_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 713fff0edeb55ef74c7ebeb9610e2621b210ec8a1a4381f46e8365ef85033546
+ * body-sha256: aecaa5f36ee78128fbd485df30db034d850d20014cede052047d5f83a41913bd
  */
 #include "food_web.h"
 
@@ -659,14 +659,16 @@ static void food_web_sweep_colour(const food_web_solver *s, int part, const doub
     const size_t units = s->rows * food_web_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    food_web_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    food_web_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    food_web_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

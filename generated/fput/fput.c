@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 04b2b3ae87dea36308f3ce9697665800e3d6c855df3510e37e3832f58421159d
+ * body-sha256: b733b11037c39d01b35c8f3fce588697905a551c72dd576bfd96d03a8ce1e710
  */
 #include "fput.h"
 
@@ -416,14 +416,16 @@ static void fput_sweep_part(const fput_solver *s, int part, const double *coef, 
     const size_t units = s->rows * fput_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    fput_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    fput_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    fput_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 9236e9befe259827e52590c22c185a0e2124f01f7ee76f357d897916e7166b74
+ * body-sha256: fee55aeee3fa59cc02c5b59b2893e4bf392ff99bcc9d2526b8f7d5970edbb1e0
  */
 #include "heisenberg.h"
 
@@ -654,14 +654,16 @@ static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const do
     const size_t units = s->rows * heisenberg_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    heisenberg_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    heisenberg_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    heisenberg_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: bec6e28ef58abea85b5fa21b7f274ddb108fa19d337445ab31765c43a18c7f7e
+ * body-sha256: b9e3048d7ee513ba7766acfce9b878f4bffa72a34b737662a3f8a4a1d06da22c
  */
 #include "heisenberg_plane.h"
 
@@ -554,14 +554,16 @@ static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int pa
     const size_t units = s->rows * heisenberg_plane_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    heisenberg_plane_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    heisenberg_plane_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    heisenberg_plane_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

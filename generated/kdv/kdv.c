@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 2fd3eb838f9a1cc81a9cbbf1ce9a4fe14f6d60bf5f67ce24795e4154ddb79c1c
+ * body-sha256: 180d8b1607078c6d0abba779235217c4e6a2e98064fc1f654e3cdf9647a6db9d
  */
 #include "kdv.h"
 
@@ -84,7 +84,7 @@ typedef struct {
     ptrdiff_t length;    /* sites of a row */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
-    double *const *varied; /* a variation of y */
+    double *const *varied; /* a variation of x */
 } kdv_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -284,7 +284,7 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
 {
     double *restrict out_u = row->out[0] + row->at[0];
     const double c4 = coef[4], c5 = coef[5], c6 = coef[6];
-    const double *restrict varied_u_0 = row->varied[0] + row->at[0];
+    const double *varied_u_0 = row->varied[0] + row->at[0];
     const double *restrict u_row = row->x[0] + row->at[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
@@ -295,16 +295,16 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
     }
 }
 
-/* How a sweep follows s->y[now] along v, to the other, for the pieces of rows from first on, before end. */
+/* How a sweep follows s->y[now] along v, for the pieces of rows from first on, before end. */
 static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, int now, double *const *v,
-    size_t first, size_t end)
+    double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         kdv_piece at = kdv_piece_of(s, unit);
         at.row.x = s->y[now];
         at.row.varied = v;
-        at.row.out = s->y[1 - now];
+        at.row.out = to;
         kdv_slope(coef, &at.row, at.from, at.to);
     }
 }
@@ -756,7 +756,7 @@ static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         kdv_ends(s->v[k], sites, 0, sites);
     }
-    kdv_slope_rows(s, coef, 1, now, s->v, 0, kdv_pieces(s));
+    kdv_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, kdv_pieces(s));
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 535cd2c84f2d242ced7533285d3a020f3a4b9c3d5e56c4e5dad9ce039740d323
+ * body-sha256: 429cf475882e4052e176212a62113918936c2705f8f4cf770b6ae9d59b34d245
  */
 #include "klein_gordon.h"
 
@@ -409,14 +409,16 @@ static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, cons
     const size_t units = s->rows * klein_gordon_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    klein_gordon_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    klein_gordon_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    klein_gordon_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

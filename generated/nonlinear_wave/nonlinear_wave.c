@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 54e325eff1351ae1279afbafaf8f7133d99510eb5dbe304339f520bcb5408b58
+ * body-sha256: 7350a7c768da4129341401be9af522168622bb755d1366b541f0359d07524036
  */
 #include "nonlinear_wave.h"
 
@@ -418,14 +418,16 @@ static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, 
     const size_t units = s->rows * nonlinear_wave_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    nonlinear_wave_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    nonlinear_wave_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    nonlinear_wave_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3bb50bd377d3e60fc4b274c084c97bac3387811fe975a65c85090dc9923497d1
+# body-sha256: 4520c6041cf713c0c7e3d79345e62174d6ba00d7b45eec2d93bfc59e6da7f607
 import numpy as np
 
 VERSION = "0.1.0"
@@ -221,10 +221,10 @@ def _sweep1(coef, x, sites):
 
 
 def _sweep2(coef, x, sites):
-    v = x[1]
+    v_ = x[1]
     v_i_1_ = sites.shifted(x[1], 1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (coef[3] * (v_i_1_ - v)), x[0])
+    moved[0] = sites.coloured(0, x[0] + (coef[3] * (v_i_1_ - v_)), x[0])
     return moved
 
 

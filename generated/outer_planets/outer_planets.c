@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 221cb59a82d1cae178661b40a3dc4ed35053525d14f88b0646a87cf8d98de09e
+ * body-sha256: 485df6806fa1fecd9b0987859820ab7ef7df7f563571e072250e107c0674fc3b
  */
 #include "outer_planets.h"
 
@@ -541,14 +541,16 @@ static void outer_planets_sweep_part(const outer_planets_solver *s, int part, co
     const size_t units = s->rows * outer_planets_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    outer_planets_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    outer_planets_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    outer_planets_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 9400eb25aa2ccd527a16e5c706abfc0274cb9205de83673e56cc121838c10f57
+ * body-sha256: af967c812f7b26b387b63fd21fab84baa9b23dab6e2af65a83f3b1a0eedfff09
  */
 #include "point_vortices.h"
 
@@ -78,7 +78,7 @@ typedef struct {
     ptrdiff_t length;    /* sites of a row */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
-    double *const *varied;   /* a variation of y */
+    double *const *varied;   /* a variation of x */
     double *const *gathered; /* see point_vortices_solver */
 } point_vortices_row;
 
@@ -261,8 +261,8 @@ static inline void point_vortices_pair_energy(const point_vortices_params *param
 static inline void point_vortices_pair_slopes(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    const double *restrict varied_x_0 = row->varied[0] + row->at[0];
-    const double *restrict varied_y_0 = row->varied[1] + row->at[0];
+    const double *varied_x_0 = row->varied[0] + row->at[0];
+    const double *varied_y_0 = row->varied[1] + row->at[0];
     const double *restrict G_row = row->x[2] + row->at[0];
     const double *restrict x_row = row->x[0] + row->at[0];
     const double *restrict y_row = row->x[1] + row->at[0];
@@ -383,16 +383,16 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
     }
 }
 
-/* How a sweep follows s->y[now] along v, to the other, for the pieces of rows from first on, before end. */
+/* How a sweep follows s->y[now] along v, for the pieces of rows from first on, before end. */
 static void point_vortices_slope_rows(const point_vortices_solver *s, const double *coef, int far, int now,
-    double *const *v, size_t first, size_t end)
+    double *const *v, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         point_vortices_piece at = point_vortices_piece_of(s, unit);
         at.row.x = s->y[now];
         at.row.varied = v;
-        at.row.out = s->y[1 - now];
+        at.row.out = to;
         point_vortices_pair_slopes(&s->params, &at.row, at.from, at.to);
         point_vortices_slope(coef, &at.row, at.from, at.to);
     }
@@ -868,19 +868,20 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* to = a - s->y[1 - now]; with coefficients that is first made what a sweep does to a. */
+/* to = a - b; with coefficients b is first made what a sweep does to a. */
 static void point_vortices_subtract(point_vortices_solver *s, const double *coef, int now, double *const *a,
-    double *const *to)
+    double *const *b, double *const *to)
 {
     point_vortices_PARALLEL
     {
         size_t first, end = point_vortices_share(s->rows * point_vortices_pieces(s), &first);
-        if (coef != NULL) point_vortices_slope_rows(s, coef, 1, now, a, first, end);
+        if (coef != NULL) point_vortices_slope_rows(s, coef, 1, now, a, b, first, end);
         for (size_t unit = first; unit < end; ++unit) {
             const point_vortices_piece at = point_vortices_piece_of(s, unit);
             for (int k = 0; k < point_vortices_DIM; ++k) {
-                const double *one = a[k] + at.row.at[0], *other = s->y[1 - now][k] + at.row.at[0];
-                double *restrict left = to[k] + at.row.at[0];
+                const double *one = a[k] + at.row.at[0], *other = b[k] + at.row.at[0];
+                double *left = to[k] + at.row.at[0];
+                point_vortices_EACH_SITE
                 for (ptrdiff_t i = at.from; i < at.to; ++i) left[i] = one[i] - other[i];
             }
         }
@@ -889,9 +890,10 @@ static void point_vortices_subtract(point_vortices_solver *s, const double *coef
 
 /* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES,
    after Y. Saad and M. H. Schultz, without a restart. The matrix is 1 - (what a sweep does to a variation of
-   s->y[now]). s->y[1 - now] is used, and may be where it goes. 0 if it is of no use. */
-static int point_vortices_krylov(point_vortices_solver *s, const double *coef, int now, double *const *from,
-    double *const *to)
+   s->y[now]). s->y[1 - now] is used, and may be where it goes. The length of s->space[0]; not finite if this
+   is of no use. */
+static double point_vortices_krylov(point_vortices_solver *s, const double *coef, int now,
+    double *const *from, double *const *to)
 {
     double matrix[point_vortices_DIRECTIONS][point_vortices_DIRECTIONS], again[point_vortices_DIRECTIONS],
         cosine[point_vortices_DIRECTIONS], sine[point_vortices_DIRECTIONS];
@@ -902,7 +904,7 @@ static int point_vortices_krylov(point_vortices_solver *s, const double *coef, i
     if (length > 0.0) point_vortices_combine(s, s->space[0], 1.0 / length, s->space[0], 0, side);
     while (count < point_vortices_DIRECTIONS && fabs(side[count]) > point_vortices_SOLVED * length) {
         double *column = matrix[count], *const *next = s->space[count + 1], left;
-        point_vortices_subtract(s, coef, now, s->space[count], next);
+        point_vortices_subtract(s, coef, now, s->space[count], s->y[1 - now], next);
         point_vortices_products(s, 0, count + 1, next, column);
         for (int k = 0; k <= count; ++k) again[k] = -column[k];
         point_vortices_combine(s, next, 1.0, next, count + 1, again);
@@ -929,14 +931,14 @@ static int point_vortices_krylov(point_vortices_solver *s, const double *coef, i
         ++count;
     }
     if (!isfinite(length) || (length > 0.0 && !(fabs(side[count]) <= point_vortices_USEFUL * length)))
-        return 0;
+        return HUGE_VAL;
     for (int k = count - 1; k >= 0; --k) {
         for (int j = k + 1; j < count; ++j) side[k] -= matrix[j][k] * side[j];
         side[k] /= matrix[k][k];
     }
     for (int k = 0; k < count; ++k) side[k] = -side[k];
     point_vortices_combine(s, to, 1.0, from, count, side);
-    return 1;
+    return length;
 }
 
 /* ---- Newton's method where sweeps fail ---- */
@@ -960,8 +962,8 @@ static double point_vortices_distance(const point_vortices_solver *s, int side, 
 static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
 {
     if (!isfinite(point_vortices_relaxed(s, coef, 1, now))) return HUGE_VAL;
-    point_vortices_subtract(s, NULL, now, s->y[now], s->space[0]);
-    if (!point_vortices_krylov(s, coef, now, s->y[now], s->y[1 - now])) return HUGE_VAL;
+    point_vortices_subtract(s, NULL, now, s->y[now], s->y[1 - now], s->space[0]);
+    if (!isfinite(point_vortices_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
     ++s->sweeps;
     return point_vortices_relaxed(s, NULL, 1, now);
 }

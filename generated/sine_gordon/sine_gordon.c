@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 77425deb72829c0640cf6c0da48f17caa3adc961820cfa034bc86b2f4f4bff9f
+ * body-sha256: 560c67c0cd24fc42bcbe03ed70911a597d6e421485e8b82093028ed47fcdf0e5
  */
 #include "sine_gordon.h"
 
@@ -444,14 +444,16 @@ static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const 
     const size_t units = s->rows * sine_gordon_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    sine_gordon_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    sine_gordon_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    sine_gordon_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

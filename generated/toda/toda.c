@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a0aa3a452d2c86b2b8efe91040a698405bea437402b367fb740798776f43e616
+ * body-sha256: 530e8633c3ba578019ddc20afea001e022e0f52d1ee8a6f76c352332170f6b39
  */
 #include "toda.h"
 
@@ -429,14 +429,16 @@ static void toda_sweep_part(const toda_solver *s, int part, const double *coef, 
     const size_t units = s->rows * toda_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    toda_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    toda_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    toda_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 8342549be2a5afd54269f5a2afd8e541c3d1fe13291282518669d35ecc0d7c4f
+ * body-sha256: 11cba1a1971ad337cdc9ccfa70b587ffcf88d8091feace65ab7399ae783c01af
  */
 #include "volterra.h"
 
@@ -444,14 +444,16 @@ static void volterra_sweep_part(const volterra_solver *s, int part, const double
     const size_t units = s->rows * volterra_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    volterra_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    volterra_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    volterra_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

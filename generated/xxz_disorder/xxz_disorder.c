@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: fc44296ed90ccf5ab54d23a32b73c35f0ac6852b026addd4df6168c7aaffb700
+ * body-sha256: d622f80d9810242d79410b020c33bac0411933371671ead775bab983f9e531b5
  */
 #include "xxz_disorder.h"
 
@@ -521,14 +521,16 @@ static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, cons
     const size_t units = s->rows * xxz_disorder_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    xxz_disorder_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own
-        : units % threads), units / threads * (own + 1) + (own + 1 < units % threads ? own + 1
-        : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+    xxz_disorder_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    xxz_disorder_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

@@ -16,7 +16,7 @@ from phigen.lattice.graphs import sums_by_field
 from phigen.lattice.kernels import site_kernel
 from phigen.lattice.parts import Colouring, SiteFields
 from phigen.lattice.realisation import CellRealisation, realise_cell
-from phigen.lattice.variations import along
+from phigen.lattice.variations import along, along_start
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.choosing import Host
 from phigen.scheme.composition import find, orders
@@ -86,8 +86,8 @@ def plan_series(cell: Cell, host: Host, order: int, composition: str, spec: Spec
     return SeriesPlan(found, *stages, *(_at_covectors(cell, m) for m in maps))
 
 
-def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients) -> Equation:
-    """The kernels of a stage."""
+def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients, *, tangent: bool = False) -> Equation:
+    """The kernels of a stage, and those of its derivative if they are asked for."""
     size = len(plan.middle)
     values = coefficients.hoist([*plan.middle.values(), *plan.increment.values()])
     relax = site_kernel(cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients)
@@ -95,7 +95,12 @@ def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients) -> Equati
     advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients)
     slopes = coefficients.hoist(along(cell, values[:size]))
     slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients)
-    return Equation(relax, advance, slope)
+    if not tangent:
+        return Equation(relax, advance, slope)
+    starts, ends = (coefficients.hoist(e) for e in (along_start(values[:size]), along(cell, values[size:])))
+    side = site_kernel(cell, "side", "how y at a site follows x there", starts, "v", coefficients)
+    purpose = "how what a stage adds to x at a site follows y around it"
+    return Equation(relax, advance, slope, (side, site_kernel(cell, "follow", purpose, ends, "v", coefficients)))
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:

@@ -27,7 +27,7 @@ from phigen.lattice.parts import (
     summands_of,
 )
 from phigen.lattice.series import SeriesPlan, equation, plan_series
-from phigen.lattice.variations import with_variations
+from phigen.lattice.variations import along, with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, Host, is_dated, planned, with_carrier
@@ -163,10 +163,10 @@ def build_sweeps(
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
     schedule, swept, solved = plan.schedule(), tuple[tuple[Sweep, ...], ...](), None
     if isinstance(plan, SeriesPlan):
-        solved = equation(cell, plan, coefficients)
+        solved = equation(cell, plan, coefficients, tangent=extras.tangent)
     else:
         swept = tuple(
-            tuple(_sweep(cell, flow, motion, k, coefficients, what) for motion in flow.motions)
+            tuple(_sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent) for motion in flow.motions)
             for k, (flow, what) in enumerate(_named(cell, plan), 1)
         )
     if extras.adjoint:
@@ -186,7 +186,8 @@ def build_sweeps(
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
     if partners:
         own = (partners.energy, partners.field, partners.varied)
-        gathers = [*(sweep.gather for part in swept for sweep in part if sweep.gather), *own]
+        every = [s for part in swept for sweep in part for s in (sweep, sweep.tangent) if s]
+        gathers = [*(sweep.gather for sweep in every if sweep.gather), *own]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
     adjoint = transposed(swept, solved, prepare, coefficients) if extras.adjoint else None
@@ -240,7 +241,7 @@ def _expect_offered(cell: Cell, extras: Extras, locations: Mapping[tuple[Any, ..
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
-    asked = [name for name in ("modified_hamiltonian", "tangent") if getattr(extras, name)]
+    asked = ["modified_hamiltonian"] if extras.modified_hamiltonian else []
     asked += ["reconstruct"] if ("reconstruct",) in locations else []
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:
@@ -263,7 +264,16 @@ def _named(cell: Cell, plan: SplittingPlan) -> Iterator[tuple[CellFlow, str]]:
         yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = sum of {flow.hamiltonian}"
 
 
-def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients: Coefficients, what: str) -> Sweep:
+def _sweep(
+    cell: Cell,
+    flow: CellFlow,
+    motion: SiteMotion,
+    k: int,
+    coefficients: Coefficients,
+    what: str,
+    *,
+    tangent: bool,
+) -> Sweep:
     increments = staged(list(motion.increments.values()), coefficients)
     moved = tuple(cell.fields.index(f) for f in motion.increments)
     suffix = f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
@@ -271,7 +281,20 @@ def _sweep(cell: Cell, flow: CellFlow, motion: SiteMotion, k: int, coefficients:
     kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
-    return Sweep(kernel, moved, motion.colour, gather)
+    return Sweep(
+        kernel, moved, motion.colour, gather, _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
+    )
+
+
+def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients) -> Sweep:
+    """The derivative of a sweep."""
+    slopes = staged(along(cell, list(motion.increments.values())), coefficients)
+    moved = tuple(cell.fields.index(f) for f in motion.increments)
+    purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
+    kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients)
+    sums = [replace(s, values=with_variations(cell, s.values)) for s in motion.gathered]
+    purpose = "what all other sites b add to forces at a site a, and to their variations"
+    return Sweep(kernel, moved, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))
 
 
 def _gather(
@@ -323,6 +346,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
     places = {
         n: (f, steps(offset) or (0,)) for kernel in kernels for n, (f, offset) in cell.places(*kernel.roots).items()
     }
+    places |= {f: (f, (0,) * max(1, len(cell.axes))) for f in cell.fields if f not in places}
     axes, boundary = cell.axes or ("i",), cell.boundary or (PERIODIC,)
     reach = [max((abs(o[a]) for _, o in places.values()), default=0) for a in range(len(axes))]
     least = [max(a, b) for a, b in zip(reach, least_sizes(cell) or (1,), strict=True)]

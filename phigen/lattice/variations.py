@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from phigen.lattice.cell import Cell
 from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of, total
-from phigen.symbolic.symbols import GATHERED, VARIATION, Symbol, kind_of, variation
+from phigen.symbolic.symbols import GATHERED, INITIAL, VARIATION, Symbol, kind_of, variation
 
 
 def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
@@ -15,6 +15,13 @@ def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
     slots: dict[str, Symbol] = {n: variation(n) for n, (f, _) in cell.places(*values).items() if f in cell.fields}
     slots |= {n: varied_sum(n) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == GATHERED}
     slopes = (zip(slots.values(), gradient(e, list(slots)), strict=True) for e in values)
+    return [total(d * symbol(v) for v, d in listed if not d.is_zero) for listed in slopes]
+
+
+def along_start(values: Sequence[Expression]) -> list[Expression]:
+    """The derivatives of values along the variation of each field that they read at the start of a stage."""
+    starts = {n: variation(str(n.key[0])) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == INITIAL}
+    slopes = (zip(starts.values(), gradient(e, list(starts)), strict=True) for e in values)
     return [total(d * symbol(v) for v, d in listed if not d.is_zero) for listed in slopes]
 
 

@@ -49,6 +49,8 @@ _NOISY = {**_PASSED, "set_noise": (_INT, (_POINTER, ctypes.c_uint64, ctypes.c_ui
 
 #: What splittings have, and steps by hand where they are offered.
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
+    "tangent_size": (_SIZE, (_POINTER, _SIZE)),
+    "step_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER, _POINTER)),
     "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
     "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE)),
     "stages": (_SIZE, ()),
@@ -100,6 +102,7 @@ class CLatticeSession:
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
         given = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct of bonds
         needed = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
+        self._beside = np.zeros(0, dtype=np.uint8)  # for tangent vectors
         self._work = np.zeros(max(needed, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
         first = np.ascontiguousarray(x0, dtype=self._real)
@@ -131,6 +134,19 @@ class CLatticeSession:
             if status:
                 raise BackendError(status_name(status), self.steps, self.state()[None])
             steps -= now
+
+    def advance_tangent(self, h: float, vectors: Floats) -> Floats:
+        """Make one step, which carries vectors along."""
+        if not hasattr(self._c, "step_tangent"):
+            raise MissingExtraError("step_tangent")
+        carried = np.array(vectors, dtype=self._real, order="C")
+        needed = self._c.tangent_size(self._address, len(carried))
+        if len(self._beside) < needed:
+            self._beside = np.zeros(needed, dtype=np.uint8)
+        status = self._c.step_tangent(self._address, h, len(carried), carried.ctypes.data, self._beside.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self.state()[None])
+        return np.asarray(carried, dtype=np.float64)
 
     def hamiltonian(self) -> float:
         """H of the state."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -20,6 +20,7 @@ from phigen.runtime.interface import (
     Draws,
     Floats,
     LatticeInterface,
+    MissingExtraError,
     Progress,
     row_steps,
 )
@@ -42,6 +43,13 @@ class LatticeSession(Protocol):
 
     def advance(self, h: float, steps: int) -> None:
         """Make so many steps."""
+        ...
+
+    def advance_tangent(self, h: float, vectors: Floats) -> Floats:
+        """Make one step; where its derivative carries ``vectors`` (count, coordinates, *sizes).
+
+        Raises `MissingExtraError` without the extra ``tangent``.
+        """
         ...
 
     def saved(self) -> dict[str, Any]:
@@ -253,6 +261,65 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         except BackendError as error:
             raise self.failure(error, h, None, values) from error
         return session.state()
+
+    def step_tangent(
+        self,
+        x: ArrayLike,
+        h: float,
+        vectors: ArrayLike,
+        *,
+        t0: float | None = None,
+        seed: int | None = None,
+        step0: int | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> tuple[Floats, Floats]:
+        """The state one step after ``x``, and where its derivative carries ``vectors`` (count, coordinates, *sizes).
+
+        The derivative is exact to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without
+        ``tangent=True``.
+        """
+        for found in self.tangents(x, h, 1, vectors, t0=t0, seed=seed, step0=step0, parameters=parameters, **more):
+            return found
+        raise AssertionError("one step")
+
+    def tangents(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        vectors: ArrayLike,
+        *,
+        t0: float | None = None,
+        seed: int | None = None,
+        step0: int | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> Generator[tuple[Floats, Floats], Floats | None, None]:
+        """After each step of a trajectory, its state and where its derivative carries ``vectors``.
+
+        These have the shape (count, coordinates, *sizes). They go on as they are, unless others are sent in their
+        place. Raises what `step_tangent` does.
+        """
+        begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
+        start, h, steps = self.state(x0, "x0"), arguments.step_size(h), arguments.count(steps, "steps", 0)
+        values = self.values(parameters, more, start.shape[1:])
+        carried = np.array(vectors, dtype=np.float64)
+        if carried.ndim != start.ndim + 1 or carried.shape[1:] != start.shape or not np.isfinite(carried).all():
+            shape = ", ".join(map(str, start.shape))
+            raise ValueError(f"tangent vectors must be finite and have shape (count, {shape}), not {carried.shape}")
+        session = self.started(start, h, values, begin, draws)
+        for _ in range(steps):
+            try:
+                carried = session.advance_tangent(h, carried)
+            except MissingExtraError:
+                hint = "compile it with tangent=True, or say tangent: true in the spec"
+                raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
+            except BackendError as error:
+                raise self.failure(error, h, None, values) from error
+            sent = yield session.state(), carried
+            carried = carried if sent is None else sent
 
     def ensemble(
         self,

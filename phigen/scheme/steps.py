@@ -320,12 +320,24 @@ class Sweep:
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
     beyond no open end, or where a site has the colour of the sweep, else 0, and ``gathered``, what ``gather`` adds up.
+    ``tangent`` is there if derivatives of a step were asked for: how the variations of the moved fields change, from
+    what this sweep reads and from variations, ``varied``, of it.
     """
 
     kernel: Kernel
     moved: tuple[int, ...]
     colour: int = 0
     gather: Gather | None = None
+    tangent: Sweep | None = None
+
+    @property
+    def is_tangent(self) -> bool:
+        """Whether it changes variations."""
+        return self.kernel.name.startswith("tangent")
+
+
+#: The kernels of an equation that read variations.
+VARIED = frozenset({"slope", "side", "follow"})
 
 
 @dataclass(frozen=True)
@@ -334,18 +346,20 @@ class Equation:
 
     The inputs of the kernels are those of sweeps, where ``site`` are values of y, and of ``relax``, the right-hand
     side at a site, also ``start``: x there. ``advance`` is what x moves by. ``slope`` is the derivative of ``relax``
-    along a variation of y, for Newton's method.
+    along a variation of y, for Newton's method. ``tangents`` are there if derivatives of a step were asked for: that
+    of ``relax`` along a variation of x, and that of ``advance`` along one of y.
     """
 
     relax: Kernel
     advance: Kernel
     slope: Kernel
+    tangents: tuple[Kernel, ...] = ()
     most_sweeps: int = 200
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        return self.relax, self.advance, self.slope
+        return self.relax, self.advance, self.slope, *self.tangents
 
 
 @dataclass(frozen=True)
@@ -395,6 +409,7 @@ class Sweeps(_Scheduled):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         swept = [sweep for part in self.parts for sweep in part]
+        swept += [sweep.tangent for sweep in swept if sweep.tangent]
         swept_kernels = [sweep.kernel for sweep in swept]
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]

@@ -119,7 +119,7 @@ SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": (
 #: Keys that lattices do not take yet, and the values that do no harm.
 NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
     "monitor": (), "reconstruct": (), "terms": (),
-    "gauge": ("auto", "none"), "tangent": (False,), "modified_hamiltonian": (0,),
+    "gauge": ("auto", "none"), "modified_hamiltonian": (0,),
 }  # fmt: skip
 
 

@@ -116,7 +116,7 @@ def kernels(program: Program, step: Sweeps) -> Iterator[str]:
         for gather in (step.partners.energy, step.partners.field, step.partners.varied):
             yield from (printed.gathering(ends, "params") for ends in gather.ends)
     if step.equation:
-        for kernel in step.equation.kernels:
+        for kernel in (step.equation.relax, step.equation.advance, step.equation.slope):
             yield printed.of_equation(kernel)
     seen = program.observables
     yield from (printed.seen(kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field))

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import BOUND, Program
-from phigen.scheme.steps import Gather, Sweep, Sweeps
+from phigen.scheme.steps import VARIED, Gather, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
@@ -56,6 +56,8 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "kicks": bool(schedule.multiples),
         "at_bonds": _tuple(map(repr, sites.at_bonds)),
         "by_colour": repr(step.by_colour),
+        "tangent": program.extras.tangent,
+        "split": step.equation is None,
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
     arguments = {"t0": "0.0"} if program.time else {}
@@ -74,7 +76,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     graphs = ["lattice_graph", *(["lattice_colours"] if step.by_colour else [])] if graph else []
     drawing = ["lattice_noise", "philox"] if program.noise else []
     parts = ["lattice", "lattice_sites", *graphs, *drawing, *(_SERIES if step.equation else ("lattice_splitting",))]
-    parts.append("lattice_steps")
+    parts += ["lattice_steps", *(["lattice_tangent"] if program.extras.tangent else [])]
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
     pieces += [render("numpy", "lattice_adjoint.py", values)] if step.adjoint else []
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
@@ -83,12 +85,15 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
     ]
     pieces += _gathers(program, step)
-    pieces += [_sweep(program, step, sweep) for part in step.parts for sweep in part]
+    every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
+    pieces += [_sweep(program, step, sweep) for sweep in every]
     if step.equation:
         pieces += [_at_middle(program, step, kernel) for kernel in step.equation.kernels]
     else:
-        listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in step.parts]
-        pieces.append("\n".join(["# The sweeps of each part of H.", "PARTS = (", *listed, ")\n"]))
+        pieces.append(_table("PARTS", "The sweeps of each part of H.", step.parts))
+        if program.extras.tangent:
+            tangents = [[sweep.tangent for sweep in part if sweep.tangent] for part in step.parts]
+            pieces.append(_table("TANGENTS", "Their derivatives.", tangents))
     pieces += lattice_adjoint.functions(program, step, _body) if step.adjoint else []
     seen = program.observables
     pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
@@ -99,27 +104,39 @@ def _tuple(items: Iterable[str]) -> str:
     return "(" + "".join(f"{i}, " for i in items).rstrip() + ")"
 
 
+def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]]) -> str:
+    listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in parts]
+    return "\n".join([f"# {comment}", f"{name} = (", *listed, ")\n"])
+
+
 def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
-    """One sweep as a function from a state to the next."""
+    """One sweep as a function from a state to the next, or from a variation of the state to the next."""
     kernel, code = sweep.kernel, lower(sweep.kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"moved", "gathered"})
-    lines = [f"def _{kernel.name}(coef, x, sites):"]
-    lines += [f"    gathered = _{sweep.kernel.name.replace('sweep', 'gather')}(coef, x, sites)"] if sweep.gather else []
+    scope = Scope(PYTHON_RESERVED | _OWN | {"v", "moved", "gathered"})
+    own, given = ("v", "x, v") if sweep.is_tangent else ("x", "x")
+    lines = [f"def _{kernel.name}(coef, {given}, sites):"]
+    lines += [f"    gathered = _{_sums_of(sweep)}(coef, {given}, sites)"] if sweep.gather else []
     names = sweep.gather.names if sweep.gather else ()
-    lines += [*_body(program, step, kernel, code, scope, names), "    moved = x.copy()"]
+    lines += [*_body(program, step, kernel, code, scope, names), f"    moved = {own}.copy()"]
     show = LANGUAGE.printer(scope)
     for store in code.stores:
         place = f"[{sweep.moved[store.index]}]"
-        new = f"x{place} + ({show(store.value)})"
-        lines.append(f"    moved{place} = sites.coloured({sweep.colour}, {new}, x{place})")
+        new = f"{own}{place} + ({show(store.value)})"
+        lines.append(f"    moved{place} = sites.coloured({sweep.colour}, {new}, {own}{place})")
     return "\n".join([*lines, "    return moved\n"])
+
+
+def _sums_of(sweep: Sweep) -> str:
+    """The function that adds up what bonds or pairs do in a sweep."""
+    name = sweep.kernel.name
+    return f"gather_{name}" if sweep.is_tangent else name.replace("sweep", "gather")
 
 
 def _at_middle(program: Program, step: Sweeps, kernel: Kernel) -> str:
     """A kernel of the equation of a stage as a function of y, which is its x, and of x, where the stage starts."""
     code = lower(kernel)
     scope = Scope(PYTHON_RESERVED | _OWN | {"start", "gathered", "v"})
-    varied = ", v" if kernel.name == "slope" else ""
+    varied = ", v" if kernel.name in VARIED else ""
     lines, gathers = [f"def _{kernel.name}(coef, start, x{varied}, sites):"], kernel.inputs["gathered"]
     names: Sequence[str] = ()
     if gathers and step.partners:
@@ -155,11 +172,10 @@ def _gathers(program: Program, step: Sweeps) -> Iterator[str]:
     if step.partners:
         if not step.partners.graph:
             yield render("numpy", "pairs.py", {})
-        swept = [sweep for part in step.parts for sweep in part]
-        for sweep in swept:
+        every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
+        for sweep in every:
             if sweep.gather:
-                name = sweep.kernel.name.replace("sweep", "gather")
-                yield _gather(program, step, sweep.gather, name, "coef")
+                yield _gather(program, step, sweep.gather, _sums_of(sweep), "coef")
         partners = {"energies": step.partners.energy, "forces": step.partners.field, "slopes": step.partners.varied}
         for name, gather in partners.items():
             if gather.names:
@@ -168,7 +184,7 @@ def _gathers(program: Program, step: Sweeps) -> Iterator[str]:
 
 def _gather(program: Program, step: Sweeps, gather: Gather, name: str, first: str) -> str:
     """Kernels of bonds or pairs, summed up at each site."""
-    varied = ", v" if name == "slopes" else ""
+    varied = ", v" if name == "slopes" or "tangent" in name else ""
     lines = [f"def _{name}({first}, x{varied}, sites):", "    sums = 0.0"]
     lines += ['    with np.errstate(all="ignore"):']
     for ends in gather.ends:

@@ -350,6 +350,15 @@ static void phi_copy(double *const to[PHI_DIM], double *const from[PHI_DIM], con
     for (size_t k = 0; k < PHI_DIM; ++k) memcpy(to[k] - PHI_LEAD, from[k] - PHI_LEAD, block);
 }
 
+#if PHI_TANGENT
+/* The fields of a tangent vector. */
+static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
+{
+    const size_t block = s->rows * (size_t)s->width;
+    for (size_t k = 0; k < PHI_DIM; ++k) v[k] = s->tangents + (number * PHI_DIM + k) * block;
+}
+
+#endif
 #if PHI_SERIES
 #include "lattice_stages.c"
 #else
@@ -368,6 +377,10 @@ static void phi_take(const phi_solver *s, double *const fields[PHI_DIM], double 
 }
 
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
+
+#if PHI_TANGENT
+#include "lattice_tangent.c"
+#endif
 
 #if !PHI_SERIES
 int phi_saved(const phi_solver *s, double *x, size_t *far)

@@ -75,6 +75,10 @@ typedef struct {
     uint64_t first_plane, planes; /* of the whole lattice: the plane that is here the first, and how many there are; or 0 */
 #endif
 #endif
+#if PHI_TANGENT
+    size_t vectors;           /* tangent vectors that flows carry along, while they do */
+    double *tangents;         /* the fields of the first, in rows, then those of the others */
+#endif
     phi_params params;
     double coef[PHI_COEFFICIENTS]; /* all that depends on params and h only */
     int prepared;             /* whether coef has been computed */
@@ -148,6 +152,13 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps);
 phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
+#if PHI_TANGENT
+/* One step, and where its derivative carries so many tangent vectors v[vector][field][site], which are overwritten: exact to
+   round-off. It needs phi_tangent_size(s, count) bytes of memory besides. If it fails, v is as before. */
+size_t phi_tangent_size(const phi_solver *s, size_t count);
+phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work);
+
+#endif
 /* The state x[field][site]. */
 void phi_state(const phi_solver *s, double *x);
 #if !PHI_SERIES

@@ -17,13 +17,23 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
     const size_t units = s->rows * phi_pieces(s);
 #ifdef _OPENMP
     const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    phi_sweep_rows(s, part, coef, far, units / threads * own + (own < units % threads ? own : units % threads),
-        units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads));
+    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
+    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
+#else
+    const size_t first = 0, end = units;
+#endif
+#if PHI_TANGENT
+    for (size_t k = 0; k < s->vectors; ++k) { /* of what a part moves only the site itself is read: no thread need wait */
+        double *v[PHI_DIM];
+        phi_vector(s, k, v);
+        phi_tangent_rows(s, part, coef, v, first, end);
+    }
+#endif
+    phi_sweep_rows(s, part, coef, far, first, end);
+#ifdef _OPENMP
     if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
 #pragma omp barrier
     }
-#else
-    phi_sweep_rows(s, part, coef, far, 0, units);
 #endif
 }
 

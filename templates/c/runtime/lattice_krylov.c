@@ -71,18 +71,19 @@ static void phi_combine(const phi_solver *s, double *const *to, double own, doub
     }
 }
 
-/* to = a - s->y[1 - now]; with coefficients that is first made what a sweep does to a. */
-static void phi_subtract(phi_solver *s, const double *coef, int now, double *const *a, double *const *to)
+/* to = a - b; with coefficients b is first made what a sweep does to a. */
+static void phi_subtract(phi_solver *s, const double *coef, int now, double *const *a, double *const *b, double *const *to)
 {
     PHI_PARALLEL
     {
         size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
-        if (coef != NULL) phi_slope_rows(s, coef, 1, now, a, first, end);
+        if (coef != NULL) phi_slope_rows(s, coef, 1, now, a, b, first, end);
         for (size_t unit = first; unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);
             for (int k = 0; k < PHI_DIM; ++k) {
-                const double *one = a[k] + at.row.at[0], *other = s->y[1 - now][k] + at.row.at[0];
-                double *restrict left = to[k] + at.row.at[0];
+                const double *one = a[k] + at.row.at[0], *other = b[k] + at.row.at[0];
+                double *left = to[k] + at.row.at[0];
+                PHI_EACH_SITE
                 for (ptrdiff_t i = at.from; i < at.to; ++i) left[i] = one[i] - other[i];
             }
         }
@@ -91,8 +92,8 @@ static void phi_subtract(phi_solver *s, const double *coef, int now, double *con
 
 /* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES, after Y. Saad
    and M. H. Schultz, without a restart. The matrix is 1 - (what a sweep does to a variation of s->y[now]). s->y[1 - now]
-   is used, and may be where it goes. 0 if it is of no use. */
-static int phi_krylov(phi_solver *s, const double *coef, int now, double *const *from, double *const *to)
+   is used, and may be where it goes. The length of s->space[0]; not finite if this is of no use. */
+static double phi_krylov(phi_solver *s, const double *coef, int now, double *const *from, double *const *to)
 {
     double matrix[PHI_DIRECTIONS][PHI_DIRECTIONS], again[PHI_DIRECTIONS], cosine[PHI_DIRECTIONS], sine[PHI_DIRECTIONS];
     double side[PHI_DIRECTIONS + 1], length;
@@ -102,7 +103,7 @@ static int phi_krylov(phi_solver *s, const double *coef, int now, double *const 
     if (length > 0.0) phi_combine(s, s->space[0], 1.0 / length, s->space[0], 0, side);
     while (count < PHI_DIRECTIONS && fabs(side[count]) > PHI_SOLVED * length) {
         double *column = matrix[count], *const *next = s->space[count + 1], left;
-        phi_subtract(s, coef, now, s->space[count], next);
+        phi_subtract(s, coef, now, s->space[count], s->y[1 - now], next);
         phi_products(s, 0, count + 1, next, column);
         for (int k = 0; k <= count; ++k) again[k] = -column[k];
         phi_combine(s, next, 1.0, next, count + 1, again);
@@ -128,13 +129,13 @@ static int phi_krylov(phi_solver *s, const double *coef, int now, double *const 
         side[count] *= cosine[count];
         ++count;
     }
-    if (!isfinite(length) || (length > 0.0 && !(fabs(side[count]) <= PHI_USEFUL * length))) return 0;
+    if (!isfinite(length) || (length > 0.0 && !(fabs(side[count]) <= PHI_USEFUL * length))) return HUGE_VAL;
     for (int k = count - 1; k >= 0; --k) {
         for (int j = k + 1; j < count; ++j) side[k] -= matrix[j][k] * side[j];
         side[k] /= matrix[k][k];
     }
     for (int k = 0; k < count; ++k) side[k] = -side[k];
     phi_combine(s, to, 1.0, from, count, side);
-    return 1;
+    return length;
 }
 #endif

@@ -9,7 +9,8 @@
 
 #if PHI_BANDED
 #include "lattice_band.c"
-#else
+#endif
+#if PHI_KRYLOV
 #include "lattice_krylov.c"
 #endif
 
@@ -40,8 +41,8 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
     phi_eliminate(s, now);
 #else
     if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
-    phi_subtract(s, NULL, now, s->y[now], s->space[0]);
-    if (!phi_krylov(s, coef, now, s->y[now], s->y[1 - now])) return HUGE_VAL;
+    phi_subtract(s, NULL, now, s->y[now], s->y[1 - now], s->space[0]);
+    if (!isfinite(phi_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
 #endif
     ++s->sweeps;
     return phi_relaxed(s, NULL, 1, now);
@@ -72,4 +73,43 @@ static phi_status phi_newton(phi_solver *s, const double *coef, double range, in
     }
     return PHI_NO_CONVERGENCE;
 }
+#if PHI_TANGENT
+
+#define PHI_CARRIED 1e-11 /* what may be left of the equation of a tangent vector where corrections shrink it no more */
+
+/* A tangent vector after a stage whose y is s->y[now]: dy = (what a sweep does to dy) + side is solved, and moves it. */
+static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
+{
+    double *v[PHI_DIM], *side[PHI_DIM], *dy[PHI_DIM], *rest[PHI_DIM], size, before = HUGE_VAL;
+    phi_vector(s, number, v);
+    phi_vector(s, s->vectors, side);
+    phi_vector(s, s->vectors + 1, dy);
+    memcpy(rest, s->y[1 - now], sizeof rest);
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+        phi_side_rows(s, coef, 1, now, v, side, first, end);
+    }
+    phi_combine(s, dy, 1.0, side, 0, NULL);
+    phi_combine(s, s->space[0], 1.0, side, 0, NULL);
+    phi_products(s, 0, 1, s->space[0], &size);
+    size = sqrt(size);
+    for (int correction = 0; correction < PHI_MOST_ITERATIONS; ++correction) {
+        phi_subtract(s, coef, now, dy, rest, s->space[0]);
+        phi_subtract(s, NULL, now, s->space[0], side, s->space[0]);
+        const double left = phi_krylov(s, coef, now, dy, dy);
+        if (!isfinite(left)) return PHI_NO_CONVERGENCE;
+        if (left <= 0x1p-54 * size || (left > 0.5 * before && left <= PHI_CARRIED * size)) {
+            PHI_PARALLEL
+            {
+                size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+                phi_follow_rows(s, coef, 1, now, dy, v, first, end);
+            }
+            return PHI_OK;
+        }
+        before = left;
+    }
+    return PHI_NO_CONVERGENCE;
+}
+#endif
 #endif

@@ -189,6 +189,9 @@ static phi_status phi_stages(phi_solver *s, int far)
             phi_predict(s, stage);
             status = phi_newton(s, coef, range, &now);
         }
+#if PHI_TANGENT
+        for (size_t k = 0; k < s->vectors && status == PHI_OK; ++k) status = phi_vary(s, coef, now, k);
+#endif
         if (status != PHI_OK) return status;
 #if PHI_GUESSES
         phi_remember(s, stage, now);

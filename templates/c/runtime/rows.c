@@ -16,7 +16,9 @@ typedef struct {
 #endif
 #if PHI_SERIES
     double *const *start, *const *out; /* where a stage starts, and where what is computed goes; x is y there */
-    double *const *varied;        /* a variation of y */
+#endif
+#if PHI_SERIES || PHI_TANGENT
+    double *const *varied;        /* a variation of x */
 #endif
 #if PHI_GATHER
     double *const *gathered;      /* see phi_solver */

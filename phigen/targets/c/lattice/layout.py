@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Gather, Partners, Sweeps
+from phigen.scheme.steps import VARIED, Gather, Partners, Sweeps
 from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
@@ -63,7 +63,7 @@ class Layout:
 
     def gathered(self, kernel: Kernel) -> Gather:
         """What a kernel of the equation of a stage reads of bonds or pairs."""
-        return self.partners.varied if kernel.name == "slope" else self.partners.field
+        return self.partners.varied if kernel.name in VARIED else self.partners.field
 
     @property
     def graph(self) -> bool:
@@ -86,7 +86,7 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
 
 def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
     seen = program.observables
-    own = [sweep.kernel for part in step.parts for sweep in part]
+    own = [s.kernel for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
     own += step.equation.kernels if step.equation else ()
     return [*own, seen.energy, seen.casimirs, seen.vector_field]
 
@@ -107,7 +107,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "BANDED": banded,
-        "KRYLOV": step.equation is not None and not banded,
+        "KRYLOV": step.equation is not None and (not banded or program.extras.tangent),
         "BY_HAND": step.is_by_hand and program.offers("by-hand"),
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),

@@ -82,7 +82,7 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     kernel, name = sweep.kernel, program.name
     code = lower(kernel)
     moved, sums = {program.coordinates[i] for i in sweep.moved}, sweep.gather.names if sweep.gather else ()
-    names = SiteNames(program, layout, kernel, code, moved, calls, sums)
+    names = SiteNames(program, layout, kernel, code, set() if sweep.is_tangent else moved, calls, sums)
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     stores = [(program.coordinates[sweep.moved[s.index]], names.show(s.value)) for s in code.stores]
@@ -90,12 +90,21 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     if len(stores) > 1:
         body += changes
         stores = [(f, f"change{k}") for k, (f, _) in enumerate(stores)]
-    body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
+    head = _unused(code)
+    if sweep.is_tangent:
+        pointers = {f: names.scope[Symbol("out", f)] for f in sorted(moved)}
+        arrays = {f: f"row->varied[{program.coordinates.index(f)}]" for f in pointers}
+        head += [f"    double *{pointer} = {arrays[f]} + row->at[0];" for f, pointer in pointers.items()]
+        body += [f"{pointers[f]}[i] += {value};" for f, value in stores]
+    else:
+        body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
     colours = layout.step.sites.colours
     start = f"{name}_first(row, {sweep.colour}, from)" if colours > 1 else "from"
     onward = f"i += {layout.colour_step}" if colours > 1 else "++i"
-    text = _looped(_unused(code), names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
-    shared = "_".join(["sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
+    text = _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+    shared = (
+        "_".join(["tangent" if sweep.is_tangent else "sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
+    )
     return Loop(kernel.name + form, _purpose(kernel, form), _arguments(program), text, shared)
 
 

@@ -30,7 +30,8 @@ def declarations(program: Program, step: Sweeps) -> str:
         guesses = switches(program, step, layout)["GUESSES"]
         sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if guesses else []
     if step.partners:
-        swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+        every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
+        swept = [sweep.gather for sweep in every if sweep.gather]
         own = (step.partners.energy, step.partners.field, step.partners.varied)
         most = max(len(g.names) for g in (*swept, *own))
         sizes.append(("GATHERED", most, "sums over other sites that are held for each site"))

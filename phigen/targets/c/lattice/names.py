@@ -89,7 +89,7 @@ class SiteNames:
         line = self.layout.line(offset)
         pointer = self.scope[Symbol("varied", field, line)]
         array = f"row->varied[{self._fields.index(field)}]"
-        self._starts.append(f"const double *restrict {pointer} = {array} + row->at[{line}];")
+        self._starts.append(f"const double *{pointer} = {array} + row->at[{line}];")
         if end:
             (self._at_a if end == "a" else self._at_b).append(f"{self.scope[s]} = {pointer}[{_INDEX[end]}]")
         else:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from phigen.lanes.lowering import Rows
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Sweep, Sweeps
+from phigen.scheme.steps import VARIED, Sweep, Sweeps
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
@@ -35,13 +35,15 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     ]
     found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
     if step.parts:
-        found += _parts(program, layout, rows)
+        found += _parts(program, layout, rows, step.parts)
+        tangents = [[sweep.tangent for sweep in part if sweep.tangent] for part in step.parts]
+        found += _parts(program, layout, None, tangents) if program.extras.tangent else []
     seen = program.observables
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
         found += _of_equation(program, layout, kernel, _forms(program, rows, [kernel]))
-    if step.equation:
-        found += _of_equation(program, layout, step.equation.slope, {"": in_loops(program)})
+    for kernel in (step.equation.slope, *step.equation.tangents) if step.equation else ():
+        found += _of_equation(program, layout, kernel, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
     sites = [p for p in program.parameters if p.at == "sites"]
     values = {
@@ -56,19 +58,22 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     return "\n".join([*found, render("c", "lattice_parameters.c", values)])
 
 
-def _forms(program: Program, rows: Rows, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
-    """The forms in which kernels are needed, each with what its functions are called."""
+def _forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
+    """The forms in which kernels are needed, each with what its functions are called; without rows one for all."""
     calls = in_loops(program)
-    if not any(rows.calls_near(kernel) for kernel in kernels):
+    if rows is None or not any(rows.calls_near(kernel) for kernel in kernels):
         return {"": calls}
     lanes = {f: f"{program.name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.near}
     return {"_near": {**calls, **lanes}, "_far": calls}
 
 
-def _parts(program: Program, layout: Layout, rows: Rows) -> Iterator[str]:
-    """The loops of all parts of H, and which of them make which. Those of equal code are one, whoever needs it."""
+def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[Sequence[Sweep]]) -> Iterator[str]:
+    """The loops of all parts of H, and which of them make which. Those of equal code are one, whoever needs it.
+
+    Without ``rows`` these are derivatives.
+    """
     step = layout.step
-    made = [_forms_of_part(program, layout, rows, part) for part in step.parts]
+    made = [_forms_of_part(program, layout, rows, part) for part in parts]
     alike: dict[str, list[Loop]] = {}
     for call in (call for forms in made for called in forms.values() for call in called):
         known = alike.setdefault(call.loop.code, [])
@@ -78,38 +83,47 @@ def _parts(program: Program, layout: Layout, rows: Rows) -> Iterator[str]:
         shared = same[0].shared if len(same) > 1 and same[0].shared not in names.values() else ""
         names[code] = shared or same[0].name
         yield replace(same[0], name=names[code]).text(program, [loop.purpose for loop in same])
-    cases = [_case(program, layout, k, forms, names) for k, forms in enumerate(made)]
+    cases = [_case(program, layout, k, parts[k], forms, names) for k, forms in enumerate(made)]
     coloured, unused = bool(step.by_colour), ["far"] * all(len(forms) == 1 for forms in made)
+    flow, what = ("flow", "A flow") if coloured else ("part", "The flow of a part of H")
+    varied = rows is None
     yield _rows(
         program,
         layout,
         cases,
-        title="A flow" if coloured else "The flow of a part of H",
-        head="sweep_rows",
-        arguments=f"int {'flow' if coloured else 'part'}, const double *coef, int far",
+        title=f"How {what[0].lower()}{what[1:]} carries a tangent vector" if varied else what,
+        head="tangent_rows" if varied else "sweep_rows",
+        arguments=f"int {flow}, const double *coef, {'double *const *v' if varied else 'int far'}",
         coloured=coloured,
-        unused=["part"] * (len(cases) == 1 and not coloured) + unused,
+        unused=["part"] * (len(cases) == 1 and not coloured) + ([] if varied else unused),
     )
 
 
-def _forms_of_part(program: Program, layout: Layout, rows: Rows, part: Sequence[Sweep]) -> dict[str, list[_Call]]:
+def _forms_of_part(
+    program: Program, layout: Layout, rows: Rows | None, part: Sequence[Sweep]
+) -> dict[str, list[_Call]]:
     """What is called for a piece of a row to make a part of H, in each form."""
     forms = _forms(program, rows, [sweep.kernel for sweep in part])
     return {f: [c for sweep in part for c in _calls(program, layout, sweep, f, calls)] for f, calls in forms.items()}
 
 
 def _case(
-    program: Program, layout: Layout, k: int, forms: Mapping[str, Sequence[_Call]], names: Mapping[str, str]
+    program: Program,
+    layout: Layout,
+    k: int,
+    part: Sequence[Sweep],
+    forms: Mapping[str, Sequence[_Call]],
+    names: Mapping[str, str],
 ) -> _Case:
     """The statements of a part of H, where the loops have ``names`` by their code."""
-    part, coloured = layout.step.parts[k], layout.step.by_colour
+    coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
     lines = {
         form: [f"{program.name}_{names[call.loop.code]}(coef, &at.row, {call.sites});" for call in called]
         for form, called in forms.items()
     }
     moved = sorted({f for sweep in part for f in sweep.moved})
-    statements = [*_either(lines), *_copied_ends(program, layout, moved, "s->x")]
-    setup = ["at.row.chosen = colour;"] if coloured and coloured[k] else []
+    statements = [*_either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
+    setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
     return _Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]))
 
 
@@ -171,32 +185,39 @@ def _of_equation(
 ) -> Iterator[str]:
     """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
     name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
-    varied = kernel.name == "slope"
+    varied = kernel.name in VARIED
     gathers = layout.gathered(kernel).kernels if kernel.inputs["gathered"] else ()
     gathered = [f"{name}_{own.name}(&s->params, &at.row, at.from, at.to);" for own in gathers]
     lines = {}
     for form, calls in forms.items():
         loops = [
-            middle_loop(program, layout, one, form + more, calls, "+=" if moves else "=")
+            middle_loop(program, layout, one, form + more, calls, "+=" if moves or kernel.name == "follow" else "=")
             for one, more in forms_of(program, kernel)
         ]
         yield from (loop.text(program) for loop in loops)
         lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in _over_sites(loops)]
-    out = "s->x" if moves else "s->y[1 - now]"
+    out = "s->x" if moves else "to" if varied else "s->y[1 - now]"
     reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = v;"] * varied
-    titles = {"relax": "A sweep, from s->y[now] to the other", "increment": "The end of a stage"}
-    ends = _copied_ends(program, layout, range(program.dimension), out) if relaxing or moves else []
+    titles = {
+        "relax": "A sweep, from s->y[now] to the other",
+        "increment": "The end of a stage",
+        "slope": "How a sweep follows s->y[now] along v",
+        "side": "How a sweep follows x along v",
+        "follow": "How the end of a stage follows s->y[now] along v, added",
+    }
+    changed = relaxing or moves or kernel.name == "follow"
+    ends = _copied_ends(program, layout, range(program.dimension), out) if changed else []
     measured = [f"{name}_measure(s->y[now], s->y[1 - now], &at, extent);"] if relaxing else []
     setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
     yield _rows(
         program,
         layout,
         [_Case([*gathered, *_either(lines), *ends, *measured], setup, has_ends(program, [kernel]))],
-        title=titles.get(kernel.name, "How a sweep follows s->y[now] along v, to the other"),
+        title=titles[kernel.name],
         head=f"{kernel.name}_rows",
         arguments="const double *coef, int far, int now"
         + f", {name}_extent *extent" * relaxing
-        + ", double *const *v" * varied,
+        + ", double *const *v, double *const *to" * varied,
         unused=["far"] * (len(forms) == 1),
     )
 

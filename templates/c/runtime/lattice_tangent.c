@@ -1,0 +1,71 @@
+#ifndef PHI_FILE_LATTICE_TANGENT
+#define PHI_FILE_LATTICE_TANGENT
+#include <stdint.h>
+
+#include "lattice.h"
+#include "model.h"
+
+/* ---- Tangent vectors ---- */
+size_t phi_tangent_size(const phi_solver *s, size_t count)
+{
+    const size_t block = PHI_DIM * s->rows * (size_t)s->width;
+    return count > SIZE_MAX / 16 / block - 2 ? 0 : (count + 2) * block * sizeof(double) + 64;
+}
+
+#if PHI_SERIES
+/* A step that carries tangent vectors along. */
+static phi_status phi_carry(phi_solver *s) { return phi_stages(s, 1); }
+#else
+/* A step that carries tangent vectors along, by functions for arguments of any size. */
+static phi_status phi_carry(phi_solver *s)
+{
+    const size_t far = s->far;
+    s->far = 1;
+    s->open = 0;
+    phi_steps(s, 1);
+    ++s->steps;
+    if (PHI_FLOWS > 1) phi_steps(s, 0);
+    --s->steps;
+    s->far = far;
+    return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
+}
+#endif
+
+phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work)
+{
+    phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK || v == NULL || work == NULL || !phi_finite(v, count * PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
+    s->tangents = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
+    double *fields[PHI_DIM];
+    for (size_t k = 0; k < count; ++k) {
+        phi_vector(s, k, fields);
+        for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, fields[f], v + (k * PHI_DIM + f) * s->sites);
+    }
+    phi_copy(s->before, s->x, s);
+    s->vectors = count;
+    status = phi_carry(s);
+    s->vectors = 0;
+    for (size_t k = 0; k < count && status == PHI_OK; ++k) {
+        phi_vector(s, k, fields);
+        if (!phi_all_hold(s, fields)) status = PHI_NOT_FINITE;
+    }
+    if (status != PHI_OK) {
+        phi_copy(s->x, s->before, s);
+#if PHI_SERIES
+        phi_forget(s);
+#endif
+        return status;
+    }
+    for (size_t k = 0; k < count; ++k) {
+        phi_vector(s, k, fields);
+        phi_take(s, fields, v + k * PHI_DIM * s->sites);
+    }
+    ++s->steps;
+#if PHI_TIMED
+    s->t = s->now = phi_time_after(s, s->steps);
+#else
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#endif
+    return PHI_OK;
+}
+#endif

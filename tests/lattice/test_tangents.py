@@ -1,0 +1,114 @@
+"""Tangent vectors of lattices: the derivative of a step, exact to round-off, in every target."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+from lattice.lattices import with_threads
+from lattice.test_sweeps import (
+    FEW,
+    REAL_ONLY,
+    SERIES,
+    TEXTS,
+    compiled,
+    disorder,
+    expansion,
+    jacobian,
+    module_of,
+    poisson_at,
+    start,
+)
+
+from phigen.api import lattice_solver_of, solver_of
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec
+from phigen.errors import StepError
+from phigen.runtime.lattice import LatticeSolver
+from phigen.spec.model import Extras
+
+H = 0.2
+
+
+@cache
+def with_tangents(name: str) -> Compilation:
+    return compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+
+
+@cache
+def solver(name: str, target: str) -> LatticeSolver:
+    return lattice_solver_of(with_tangents(name), target)
+
+
+def derivative(name: str, target: str, x: np.ndarray, parameters: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """A step, and its matrix: the columns are where it carries the unit vectors."""
+    units = np.eye(x.size).reshape(-1, *x.shape)
+    after, carried = solver(name, target).step_tangent(x, H, units, parameters=parameters)
+    return after, carried.reshape(x.size, x.size).T
+
+
+#: Where C is looked at: open ends, colours, a graph of colours, pairs, the series on all of these.
+IN_C = ("xxz_open", "sheet", "charges", "magnet", "volterra", "dragged", "tangle", "vortices")
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_tangent_vectors_are_carried_by_the_derivative_of_a_step(name: str) -> None:
+    x = start(name, FEW.get(name))
+    parameters = disorder(name, x)
+    after, expected = jacobian(module_of(name), x, H, parameters)
+    few, near = np.eye(x.size)[::5].reshape(-1, *x.shape), 1e-11 if name in REAL_ONLY else 1e-13
+    found, carried = solver(name, "numpy").step_tangent(x, H, few, parameters=parameters)
+    np.testing.assert_allclose(found, after, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(carried.reshape(-1, x.size), expected.T[::5], rtol=0, atol=near)
+    if name in IN_C:
+        found, matrix = derivative(name, "c", x, parameters)
+        np.testing.assert_allclose(found, after, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(matrix, expected, rtol=0, atol=near)
+        whole = expansion(name, x.shape[1:])
+        moved = matrix @ poisson_at(whole, x, parameters) @ matrix.T
+        np.testing.assert_allclose(moved, poisson_at(whole, after, parameters), rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["fput", "vortices"])
+def test_the_derivative_is_that_of_the_ordinary_system(name: str) -> None:
+    x = start(name, (4,))
+    spec = replace(compiled(name).spec, composition="suzuki")
+    lattice = lattice_solver_of(compile_spec(spec, extras=Extras(tangent=True)), "numpy")
+    scheme = "series" if name in SERIES else "splitting"
+    whole = replace(expansion(name, (4,)).spec(), order=4, scheme=scheme, composition="suzuki", gauge="none")
+    ordinary = solver_of(compile_spec(whole, extras=Extras(tangent=True)), "numpy")
+    after, carried = lattice.step_tangent(x, H, np.eye(x.size).reshape(-1, *x.shape))
+    expected, matrix = ordinary.step_tangent(x.reshape(-1), H)
+    np.testing.assert_allclose(after.reshape(-1), expected, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(carried.reshape(x.size, x.size).T, matrix, rtol=0, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ["sheet", "dragged"])
+def test_steps_with_tangent_vectors_are_those_without_on_any_number_of_threads(name: str) -> None:
+    x, found = start(name, (70, 90)), solver(name, "c")
+    vectors = np.random.default_rng(4).normal(size=(2, *x.shape))
+
+    def made() -> np.ndarray:
+        states = [state for state, _ in found.tangents(x, 0.05, 3, vectors)]
+        return np.concatenate([states[-1][None], found.step_tangent(x, 0.05, vectors)[1]])
+
+    first, *others = with_threads(made)
+    assert all(np.array_equal(first, other) for other in others)
+    np.testing.assert_allclose(first[0], found.integrate(x, 0.05, 3).x[-1], rtol=0, atol=2e-14)
+
+
+def test_wrong_vectors_and_solvers_without_tangents_are_told() -> None:
+    x = start("fput")
+    with pytest.raises(ValueError, match=r"shape \(count, 2, 7\), not \(2, 7\)"):
+        solver("fput", "numpy").step_tangent(x, H, x)
+    with pytest.raises(TypeError, match="compile it with tangent=True"):
+        lattice_solver_of(compiled("fput"), "numpy").step_tangent(x, H, x[None])
+
+
+def test_a_step_that_cannot_be_made_is_told() -> None:
+    x, found = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2), solver("charges", "c")
+    with pytest.raises(StepError):
+        found.step_tangent(np.concatenate([x, 1e200 * x]), 1e300, np.ones((1, 4, 5)))
