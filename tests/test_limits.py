@@ -185,6 +185,17 @@ def test_products_of_matrices_are_counted_as_they_would_be_made():
     assert OperationCount(true, lambda name: name == "fixed").matrix(left, right) == true
     with pytest.raises(TooManyError):
         OperationCount(true - 1, lambda name: name == "fixed").matrix(left, right)
+    repeated = [{**row, **{j + 3: e for j, e in row.items()}} for row in right]  # equal columns make equal nodes
+    assert OperationCount(true, lambda name: name == "fixed").matrix(left, repeated) == true
+
+
+def test_equal_columns_of_matrices_are_looked_at_once(monkeypatch):
+    work = []
+    monkeypatch.setattr(OperationCount, "_total", lambda self, terms: work.append(terms))
+    a, b = symbol("a"), symbol("b")
+    count = OperationCount(10**6, lambda name: False)
+    count.matrix([{0: a, 1: b}] * 8, [dict.fromkeys(range(100), a), dict.fromkeys(range(100), b)])
+    assert len(work) == 8
 
 
 def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_are_made(monkeypatch):

@@ -83,11 +83,11 @@ def _candidates(
             return
         case LiePoisson(algebra):
             # Degree 3 finds the sparse ones of low degree; the traces are dense but reach every degree.
-            yield from polynomial_casimirs(coordinates, poisson, 3, [])
+            yield from polynomial_casimirs(coordinates, poisson, shape, 3, [])
             representation = known_representation(algebra)
             if representation is not None:
                 yield from trace_casimirs(coordinates, representation)
-    yield from polynomial_casimirs(coordinates, poisson, DEGREE, notes)
+    yield from polynomial_casimirs(coordinates, poisson, shape, DEGREE, notes)
 
 
 def _linear(coordinates: Sequence[str], matrix: Matrix) -> Iterator[Expression]:

@@ -7,8 +7,9 @@ from itertools import combinations_with_replacement
 from math import comb
 
 from phigen.geometry.field import Field, Scalar
+from phigen.geometry.lie_algebra import LieAlgebra
 from phigen.geometry.linear import coprime_integers, kernel
-from phigen.geometry.shapes import Matrix, Terms, coordinate_terms
+from phigen.geometry.shapes import LiePoisson, Matrix, Shape, Terms, coordinate_terms
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.horner import horner
 
@@ -19,7 +20,7 @@ Exponents = tuple[int, ...]
 
 
 def polynomial_casimirs(
-    coordinates: Sequence[str], poisson: Matrix, degree: int, notes: list[str]
+    coordinates: Sequence[str], poisson: Matrix, shape: Shape, degree: int, notes: list[str]
 ) -> Iterator[Expression]:
     """A basis of the polynomial Casimirs of degree 1, then 2, … up to ``degree``, constants left out.
 
@@ -27,7 +28,11 @@ def polynomial_casimirs(
     ones of lower degree. Degrees whose linear system is too large are skipped, and ``notes`` says so.
     """
     n = len(coordinates)
-    listed = coordinate_terms(coordinates, [e for row in poisson for e in row])
+    listed = (
+        _linear_terms(shape.algebra)
+        if isinstance(shape, LiePoisson)
+        else coordinate_terms(coordinates, [e for row in poisson for e in row])
+    )
     if listed is None:
         notes.append("polynomial Casimirs were not searched for: π is not polynomial in the coordinates")
         return
@@ -49,6 +54,13 @@ def polynomial_casimirs(
             else:
                 terms = {monomials[i]: field.expression(c) for i, c in vector.items()}
             yield horner(terms, variables)
+
+
+def _linear_terms(algebra: LieAlgebra) -> list[Terms]:
+    """`coordinate_terms` of a Lie–Poisson tensor, as its structure constants say."""
+    n = range(algebra.dimension)
+    units = [tuple(int(k == m) for m in n) for k in n]
+    return [{units[k]: c for k, c in sorted(algebra.bracket(i, j).items(), reverse=True)} for i in n for j in n]
 
 
 def _converted(field: Field, terms: Terms) -> dict[Exponents, Scalar]:

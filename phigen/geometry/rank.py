@@ -1,12 +1,13 @@
-"""Generic rank: the rank of a matrix of expressions at exact rational points."""
+"""Generic rank: the rank of a matrix of expressions at exact rational points, modulo primes."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
+from contextlib import suppress
 from fractions import Fraction
 from typing import Any
 
-from flint import fmpq, fmpq_mat
+from flint import nmod_mat
 
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.numeric import DomainError, evaluate_exactly, evaluate_with_scale, is_rational
@@ -15,6 +16,8 @@ from phigen.symbolic.verdict import DIGITS, ZERO_DIGITS, sample_point
 #: Points at which a rank is computed; the largest found counts.
 POINTS = 3
 ATTEMPTS = 64
+#: Ranks modulo a prime never exceed those over Q, and equal them except for unlucky primes: the larger of two counts.
+PRIMES = (2**61 - 1, 2**63 - 25)
 
 Rows = Sequence[Sequence[Expression]]
 
@@ -27,17 +30,17 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
     """
     roots = [e for m in matrices for row in m for e in row]
     names, exact = symbols_of(*roots), is_rational(*roots)
+    rank: Callable[[Any], int] = _exact_rank if exact else _numerical_rank
     found: list[list[int]] = []
     for k in range(ATTEMPTS):
         point = sample_point(names, positive, k)
         values: list[Any]
         try:
             values = evaluate_exactly(roots, point) if exact else evaluate_with_scale(roots, point, DIGITS)
+            in_turn = iter(values)
+            found.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         except DomainError:
             continue
-        rank: Callable[[Any], int] = _exact_rank if exact else _numerical_rank
-        in_turn = iter(values)
-        found.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         if len(found) == POINTS:
             break
     return [max(ranks) for ranks in zip(*found, strict=True)] if found else None
@@ -46,7 +49,17 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
 def _exact_rank(rows: Sequence[Sequence[Fraction]]) -> int:
     if not rows or not rows[0]:
         return 0
-    return int(fmpq_mat([[fmpq(v.numerator, v.denominator) for v in row] for row in rows]).rank())
+    ranks = []
+    for prime in PRIMES:
+        with suppress(ValueError):  # a denominator without inverse
+            ranks.append(int(nmod_mat(len(rows), len(rows[0]), _residues(rows, prime), prime).rank()))
+    if not ranks:
+        raise DomainError("denominators that the primes divide")
+    return max(ranks)
+
+
+def _residues(rows: Sequence[Sequence[Fraction]], prime: int) -> list[int]:
+    return [v.numerator * (1 if v.denominator == 1 else pow(v.denominator, -1, prime)) % prime for r in rows for v in r]
 
 
 def _numerical_rank(rows: Sequence[Sequence[tuple[Any, Any]]]) -> int:

@@ -120,6 +120,8 @@ def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expressio
 
 
 def _split(tower: Tower, element: Poly, coordinates: Sequence[str]) -> Terms | None:
+    if element == 0:  # nearly all entries of large structures
+        return {}
     size = len(coordinates)
     used = element.degrees()
     for position, g in enumerate(tower.generators, len(tower.symbols)):

@@ -23,10 +23,10 @@ from phigen.geometry.matrix_algebras import failing_jacobi
 from phigen.geometry.representations import candidates, indecomposable_parts, restricted
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.extension import dual_of
-from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, is_symmetric, refuse, reversed_covector
+from phigen.realisations.protocol import PAPER, BiRealisation, covector_symbols, refuse, reversed_covector
 from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.expression import ONE, Expression, number, symbol
-from phigen.symbolic.horner import horner
+from phigen.symbolic.horner import Powers, sparse_horner
 from phigen.symbolic.readable import shortened
 
 KIND = "cayley"
@@ -60,9 +60,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         raise refuse(f"birealisation {KIND} does not restrict to this affine π", "try exponential")
     x = [symbol(c) for c in system.coordinates]
     increment = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
-    quadratic: list[dict[tuple[int, ...], Expression]] = [{} for _ in range(size)]
+    quadratic: list[dict[Powers, Expression]] = [{} for _ in range(size)]
     for (i, a, b, k), c in terms.items():
-        quadratic[i][tuple((m == a) + (m == b) for m in range(size)) + tuple(int(m == k) for m in range(size))] = c
+        quadratic[i][(*(((a, 2),) if a == b else ((a, 1), (b, 1))), (size + k, 1))] = c
     displacement = []
     for i in range(n):
         curvature = _factored(quadratic[i], [*dual.p, *dual.x])
@@ -76,7 +76,7 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
         beta,
         tuple(displacement),
         increment,
-        is_symmetric(alpha, beta, system.coordinates),
+        True,  # β is α with −p
         explanation=f"π is {'linear' if size == n else 'affine'}: Cayley transform, {explanation}; symmetric",
         reference=f"{PAPER}, the proposition on Lie–Poisson structures and its example so(n), with 2 for 4",
     )
@@ -96,15 +96,15 @@ def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear 
     return None if isinstance(found, _Escape) else found
 
 
-def _factored(terms: dict[tuple[int, ...], Expression], variables: Sequence[Expression]) -> Expression:
+def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) -> Expression:
     """Horner form, with a coefficient that all terms have up to sign in front.
 
     For so(3) this leaves p_i (p·x), and the p·x of all components is one node.
     """
     common = next(iter(terms.values()), ONE)
     if any(c is not common and c is not -common for c in terms.values()):
-        return horner(terms, variables)
-    return common * horner({m: ONE if c is common else -ONE for m, c in terms.items()}, variables)
+        return sparse_horner(terms, variables)
+    return common * sparse_horner({m: ONE if c is common else -ONE for m, c in terms.items()}, variables)
 
 
 def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:

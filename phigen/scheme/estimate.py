@@ -30,7 +30,9 @@ def newton_operations(
     if realisation.path or 4 * len(names) ** 3 <= most:
         return 0
     both = [*realisation.displacement, *realisation.increment]
-    rows = sparse_derivatives(substitute(both, {momentum(c): ZERO for c in absent}), momenta)
+    if absent:
+        both = substitute(both, {momentum(c): ZERO for c in absent})
+    rows = sparse_derivatives(both, momenta)
     index = {name: k for k, name in enumerate(momenta)}
     left = [{index[p]: e for p, e in row.items()} for row in rows]
     state = {*names, *momenta}
@@ -63,7 +65,7 @@ class OperationCount:
         """The operations of left · right beyond those that were counted before."""
         before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
-        columns = [{j: self._leaves[id(e)] for j, e in row.items()} for row in right]
+        columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
         for row in left:
             sums: dict[int, dict[int, int]] = {}
             for k, e in row.items():
@@ -73,6 +75,16 @@ class OperationCount:
             for terms in sums.values():
                 self._total(terms)
         return self.operations - before
+
+    @staticmethod
+    def _different(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:
+        """The rows without columns that are there before: equal ones make equal nodes."""
+        columns: dict[int, list[tuple[int, int]]] = {}
+        for k, row in enumerate(rows):
+            for j, leaf in row.items():
+                columns.setdefault(j, []).append((k, leaf))
+        kept = set({tuple(column): j for j, column in columns.items()}.values())
+        return [{j: leaf for j, leaf in row.items() if j in kept} for row in rows]
 
     def _know(self, leaves: Sequence[Expression]) -> None:
         def visit(node: Expression, args: list[bool]) -> bool:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 
 from phigen.geometry.blocks import blocks
 from phigen.geometry.polynomial_casimirs import polynomial_casimirs
+from phigen.geometry.shapes import General
 from phigen.geometry.system import System
 from phigen.splitting.conflicts import Conflicts
 from phigen.splitting.flow import Term
@@ -78,7 +79,7 @@ def _closure(ring: Ring, coordinates: set[int]) -> tuple[int, ...]:
 def _casimirs_within(system: System, inside: Sequence[int]) -> list[Expression]:
     names = [system.coordinates[i] for i in inside]
     matrix = tuple(tuple(system.poisson[i][j] for j in inside) for i in inside)
-    return list(polynomial_casimirs(names, matrix, 2, []))
+    return list(polynomial_casimirs(names, matrix, General(), 2, []))
 
 
 def by_blocks(system: System, ring: Ring, terms: Sequence[Term]) -> list[Term] | None:

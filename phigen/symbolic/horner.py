@@ -19,7 +19,12 @@ def horner(terms: Mapping[Monomial, Expression], variables: Sequence[Expression]
     polynomials in the squares of the variables, since the least exponent of the terms that share a
     variable is factored, and squares are shared nodes. Deterministic in the terms.
     """
-    left = {_powers(m): c for m, c in terms.items() if not c.is_zero}
+    return sparse_horner({_powers(m): c for m, c in terms.items()}, variables)
+
+
+def sparse_horner(terms: Mapping[Powers, Expression], variables: Sequence[Expression]) -> Expression:
+    """`horner` of monomials that list the variables that they contain only, in the order of the index."""
+    left = {m: c for m, c in terms.items() if not c.is_zero}
     return _nested(left, variables) if left else ZERO
 
 

@@ -1,6 +1,8 @@
 """Generic rank."""
 
-from phigen.geometry.rank import generic_ranks
+from fractions import Fraction
+
+from phigen.geometry.rank import PRIMES, generic_ranks
 from phigen.symbolic.expression import ONE, ZERO, call, number, sqrt, symbol
 from phigen.symbolic.verdict import sample_point
 
@@ -25,3 +27,9 @@ def test_points_outside_the_domain_are_skipped():
 
 def test_empty_matrices_have_rank_zero():
     assert generic_ranks([[], [[x]]]) == [0, 1]
+
+
+def test_neither_multiples_of_a_prime_nor_denominators_with_it_lower_the_rank():
+    for prime in PRIMES:
+        assert generic_ranks([[[number(prime), ZERO], [ZERO, x / prime]]]) == [2]
+    assert generic_ranks([[[number(Fraction(1, PRIMES[0] * PRIMES[1]))]]]) is None
