@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import expect_system
 from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, scheme_option
 from phigen.registry import LOADABLE
 
@@ -64,7 +63,6 @@ def command(
 
         require_matplotlib()
     spec = load_one(spec_file)
-    expect_system(spec)
     sweep = _sweep_of(spec, name)
     setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:

@@ -27,7 +27,9 @@ def draw(store: Path, path: Path, shown: str | None = None) -> None:
     import xarray
 
     with xarray.open_zarr(str(store), decode_cf=False) as data:
-        known = [name for name in _FIRST if name in data]
+        known = [
+            name for name in _FIRST if name in data and not (name == "final" and data[name].dims[-1] != "coordinate")
+        ]
         chosen = shown or next(iter(known), "")
         if chosen not in known:
             raise PhigenError(f"there is no {chosen!r} to draw; there are {', '.join(known) or 'none'}")

@@ -399,7 +399,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         about = self.interface
         found = self._seen(x, parameters, more, 0.0 if self.interface.time else None).casimirs()
         kinds = zip(about.casimirs, about.casimir_kinds, found, strict=True)
-        return {name: _reduced(kind, values) for name, kind, values in kinds}
+        return {name: reduced(kind, values) for name, kind, values in kinds}
 
     def vector_field(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
@@ -517,7 +517,7 @@ def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:
     return whole
 
 
-def _reduced(kind: str, densities: Floats) -> Any:
+def reduced(kind: str, densities: Floats) -> Any:
     """A Casimir from its densities at the sites."""
     if kind == "sites":
         return densities

@@ -21,8 +21,6 @@ _WORDS = ("random", "seed", "file")
 def sweep(name: str, raw: Mapping[str, Any], runs: Mapping[str, Run], declared: Declarations) -> Sweep:
     """The sweep of that name. After errors, which are reported, some of its values are stand-ins."""
     place = ("sweeps", name)
-    if declared.lattice:
-        _fail(place, "sweeps: not for lattices in this version", declared)
     run = raw["run"].text if raw.get("run") else next(iter(runs), "")
     if run not in runs:
         hint = did_you_mean(run, runs) or "runs: holds the experiments of a spec"
@@ -73,7 +71,7 @@ def _integer(place: tuple[Any, ...], words: Mapping[str, str], most: int, declar
 def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     """The values of one name: a list, or a range; none where there are errors."""
     name, numbers = key.text, declared.numbers()
-    known = [*declared.parameters, *declared.coordinates, *SWEEP_NAMES]
+    known = [*declared.parameters, *(() if declared.lattice else declared.coordinates), *SWEEP_NAMES]
     if name not in known and not declared.incomplete:
         declared.reader.error(key, f"over: {shown(name)} is not a parameter or a coordinate", did_you_mean(name, known))
         return []
@@ -121,5 +119,7 @@ def _expect_sense(
         _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, limit=True)
     if "crossings" in found.keep and run is not None and run.section is None:
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared)
+    if "lyapunov" in found.keep and declared.lattice:
+        _fail((*place, "keep"), "lyapunov: not for lattices", declared)
     if "energy_error" in found.keep and declared.time:
         _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared)

@@ -15,7 +15,7 @@ import numpy as np
 
 from phigen import resources
 from phigen import spec as specs
-from phigen.api import _spec_of, load
+from phigen.api import _spec_of
 from phigen.geometry.system import System
 from phigen.spec.model import Axis, Run, Spec, Sweep
 from phigen.spec.names import KEPT, SWEEP_NAMES
@@ -81,8 +81,6 @@ def _spec(source: str | PathLike[str] | Spec | System) -> Spec:
     if isinstance(source, System):
         return source.spec or _spec_of(source)
     spec = source if isinstance(source, Spec) else specs.load(resources.file_of(fspath(source)))
-    if spec.lattice:
-        load(spec.file)  # raises what there is to say of lattices
     return spec
 
 
@@ -101,6 +99,8 @@ def _run_of(
     if run is not None and run not in spec.runs:
         raise ValueError(f"there is no run {run!r}; the spec has {', '.join(spec.runs) or 'none'}")
     found = spec.runs[run] if run else None
+    if spec.lattice and (found is None or initial is not None):
+        raise ValueError("of lattices a run of the spec is needed, with its initial values")
     if found is None and (initial is None or h is None or steps is None):
         raise TypeError("the spec has no runs: initial, h and steps are needed")
     found = found or Run("run", (), Fraction(1), 1)
@@ -110,7 +110,7 @@ def _run_of(
     if parameters:
         given["parameters"] = {**found.parameters, **{n: Fraction(float(v)) for n, v in parameters.items()}}
     found = replace(found, **given)
-    if len(found.initial) != len(spec.coordinates):
+    if len(found.initial) != len(spec.coordinates) and not spec.lattice:
         raise ValueError(f"initial has {len(found.initial)} values for {len(spec.coordinates)} coordinates")
     return found
 
@@ -144,6 +144,8 @@ def _sweep_of(
         raise ValueError(f"crossings: the run {run.name} has no section")
     if "energy_error" in found.keep and spec.time:
         raise ValueError("energy_error: H depends on the time, so energy is not conserved")
+    if "lyapunov" in found.keep and spec.lattice:
+        raise ValueError("lyapunov: not for lattices")
     drawn = [axis.name for axis in found.over if not axis.size]
     if drawn and not found.random and not any(axis.name == "seed" for axis in found.over):
         raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")
@@ -155,7 +157,7 @@ def _sweep_of(
 
 
 def _axis(name: str, value: Any, spec: Spec) -> Axis:
-    known = [*(p.name for p in spec.parameters), *spec.coordinates, *SWEEP_NAMES]
+    known = [*(p.name for p in spec.parameters), *(() if spec.lattice else spec.coordinates), *SWEEP_NAMES]
     if name not in known:
         raise ValueError(f"over: {name!r} is not a parameter or a coordinate; there are {', '.join(known)}")
     if isinstance(value, Mapping):

@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 
 from phigen.runtime import cache
-from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats
+from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, LatticeInterface
+from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.members import Members
 from phigen.runtime.solver import Solver
+from phigen.sweeping import lattices
 from phigen.sweeping.store import Job, open_job
 
 #: Bytes of states that are held to count crossings.
@@ -35,7 +37,10 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     region = plan.region(number)
     varied = plan.varied(region, {name: job.root[name][region] for name in plan.listed})
     count = prod(part.stop - part.start for part in region)
-    found = _measured(job, solver, varied, plan.first(region) + np.arange(count))
+    if isinstance(solver, LatticeSolver):
+        found = lattices.measured(job, solver, varied, count)
+    else:
+        found = _measured(job, solver, varied, plan.first(region) + np.arange(count))
     found |= {axis.name: varied[axis.name] for axis in plan.drawn}
     sizes = tuple(part.stop - part.start for part in region)
     for name, values in found.items():
@@ -46,10 +51,12 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=4)
-def _ready(store: str, digest: str) -> tuple[Job, Solver]:
+def _ready(store: str, digest: str) -> tuple[Job, Solver | LatticeSolver]:
     """The job and its solver, once for each process; one process of a machine compiles, and the others wait for it."""
     job = open_job(store)
     with _alone(job.interface.name):
+        if isinstance(job.interface, LatticeInterface):
+            return job, LatticeSolver(job.backend(), job.interface)
         return job, Solver(job.backend(), job.interface)
 
 

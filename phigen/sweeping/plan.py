@@ -28,7 +28,8 @@ class Plan:
     """A sweep in numbers: ``initial``, ``h``, ``t0`` and ``parameters`` are those of what is not varied.
 
     ``axes`` are varied, those without a size drawn from ``seed``. ``members`` is the number of those in a file or of
-    random ones, whose only dimension is ``member``; ``listed`` names the columns of the file.
+    random ones, whose only dimension is ``member``; ``listed`` names the columns of the file. Of a
+    lattice of these ``sizes`` there is no ``initial``: workers find it by the spec.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Plan:
     keep: tuple[str, ...] = ("final",)
     frames: int = 0
     chunk: tuple[int, ...] = ()
+    sizes: tuple[int, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)  # target, version: what else decides the result
 
     @property
@@ -103,7 +105,8 @@ class Plan:
             found[axis.name] = np.broadcast_to(values_of(axis)[region[k]].reshape(along), sizes).reshape(-1)
         for k, axis in enumerate(self.drawn):
             found[axis.name] = _spaced(axis, _uniform(self.seed, k, first, prod(sizes)))
-        return {name: values for name, values in found.items() if name != "seed" or "seed" in self.parameters}
+        seeded = "seed" in self.parameters or self.sizes
+        return {name: values for name, values in found.items() if name != "seed" or seeded}
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -115,7 +118,7 @@ class Plan:
         axes = tuple(
             Axis(**{**axis, "values": tuple(axis["values"]), "ends": tuple(axis["ends"])}) for axis in data["axes"]
         )
-        lists = ("coordinates", "initial", "listed", "keep", "chunk")
+        lists = ("coordinates", "initial", "listed", "keep", "chunk", "sizes")
         return cls(**{**data, **{key: tuple(data[key]) for key in lists}, "axes": axes})
 
 
@@ -148,7 +151,7 @@ def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
 
 def chunk_of(plan: Plan, members: int) -> tuple[int, ...]:
     """The sizes of a chunk of so many members at most, and of no more than memory has room for."""
-    bytes_of_one = 8 * len(plan.coordinates) * (len(plan.rows) + 4)
+    bytes_of_one = 8 * len(plan.coordinates) * prod(plan.sizes) * (len(plan.rows) + 4)
     left = max(1, min(members, _MOST_BYTES // bytes_of_one))
     found: list[int] = []
     for size in reversed(plan.shape):

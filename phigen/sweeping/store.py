@@ -19,7 +19,7 @@ import numpy as np
 
 from phigen.errors import FileError, MissingPackageError
 from phigen.runtime.crossings import SIGNS
-from phigen.runtime.interface import STATUSES, Floats, Interface
+from phigen.runtime.interface import STATUSES, Floats, Interface, LatticeInterface
 from phigen.sweeping.plan import Plan, values_of
 
 #: The status of a member that was not made yet.
@@ -105,26 +105,28 @@ def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[st
         )  # fmt: skip
 
     def along(name: str, values: Any) -> None:
-        root.create_array(name, data=np.asarray(values), attributes={"_ARRAY_DIMENSIONS": [name]})
+        about = {"_ARRAY_DIMENSIONS": [name]}
+        root.create_array(name, data=np.asarray(values), fill_value=None, attributes=about)  # 0 is a value like others
 
     for axis in plan.grid if not plan.members else ():
         values = values_of(axis)
         along(axis.name, values.astype(np.int64) if axis.name == "seed" else values)
     for name, values in listed.items():
-        root.create_array(name, data=values, chunks=plan.chunk, attributes={"_ARRAY_DIMENSIONS": ["member"]})
+        about = {"_ARRAY_DIMENSIONS": ["member"]}
+        root.create_array(name, data=values, chunks=plan.chunk, fill_value=None, attributes=about)
     for axis in plan.drawn:
         array(axis.name, (), "<f8", np.nan)
     for name in plan.keep:
         if name != "final":
             array(name, (), "<f8", np.nan)
-    n = len(plan.coordinates)
+    n, axes = len(plan.coordinates), tuple(beside["interface"].get("axes", ()))
     if "final" in plan.keep or plan.frames:
         along("coordinate", plan.coordinates)
     if "final" in plan.keep:
-        array("final", ("coordinate",), "<f8", np.nan, (n,))
+        array("final", ("coordinate", *axes), "<f8", np.nan, (n, *plan.sizes))
     if plan.frames:
         along("frame", np.array(plan.rows))
-        array("frames", ("frame", "coordinate"), "<f8", np.nan, (len(plan.rows), n))
+        array("frames", ("frame", "coordinate", *axes), "<f8", np.nan, (len(plan.rows), n, *plan.sizes))
     meanings = " ".join([*STATUSES, "WAITING"])
     flags = [*range(len(STATUSES)), WAITING]
     array("status", (), "u1", WAITING, flag_values=flags, flag_meanings=meanings)
@@ -146,9 +148,10 @@ def open_job(path: str) -> Job:
 
 def interface_of(about: Mapping[str, Any]) -> Interface:
     """An interface from plain data."""
-    kinds = {f.name: str(f.type) for f in fields(Interface)}
+    made = LatticeInterface if "axes" in about else Interface
+    kinds = {f.name: str(f.type) for f in fields(made)}
     makers: dict[str, Callable[[Any], Any]] = {"tuple": tuple, "frozenset": frozenset}
-    return Interface(**{k: makers.get(kinds[k].partition("[")[0], lambda v: v)(value) for k, value in about.items()})
+    return made(**{k: makers.get(kinds[k].partition("[")[0], lambda v: v)(value) for k, value in about.items()})
 
 
 def waiting(job: Job) -> list[int]:

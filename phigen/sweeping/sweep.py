@@ -20,7 +20,7 @@ from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.spec.model import Extras, Run, Spec, Sweep
 from phigen.spec.names import SWEEP_NAMES
-from phigen.sweeping import cluster, store
+from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
 
 #: Seconds that a chunk should take: long beside what scheduling and storing cost, short beside a coffee.
@@ -112,8 +112,18 @@ def _plan(spec: Spec, sweep: Sweep, run: Run, columns: Mapping[str, int], target
         listed=tuple(columns),
         keep=sweep.keep,
         frames=sweep.frames,
-        about={"sweep": sweep.name, "run": run.name, "target": target, "phigen": __version__},
+        sizes=lattices.begun(spec, run, 0).sizes if spec.lattice else (),
+        about={"sweep": sweep.name, "run": run.name, "target": target, "phigen": __version__, **_files(spec, run)},
     )
+
+
+def _files(spec: Spec, run: Run) -> dict[str, str]:
+    """Where the spec lies, if a run of a lattice reads files from beside it."""
+    if run.lattice is None:
+        return {}
+    values = [*run.lattice.state.values(), *run.lattice.arrays.values(), *(p.values for p in spec.parameters)]
+    reads = isinstance(run.lattice.bonds, str) and run.lattice.bonds
+    return {"file": str(Path(spec.file).resolve())} if reads or any(v and v.file for v in values) else {}
 
 
 def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]:
@@ -141,13 +151,16 @@ def _created(
         None, plan, store.interface_of(beside["interface"]), beside["files"], beside["functions"], beside["spec"]
     )
     seconds = _seconds_of_a_member(job)
-    members = int(min(max(_SECONDS / seconds, _LEAST), _MOST, max(_LEAST, plan.size // (4 * slots))))
+    least = 1 if plan.sizes else _LEAST
+    members = int(min(max(_SECONDS / seconds, least), _MOST, max(least, plan.size // (4 * slots))))
     store.create(output, replace(plan, chunk=chunk_of(plan, members)), beside, listed)
     return store.open_job(str(output))
 
 
 def _seconds_of_a_member(job: store.Job) -> float:
     """By a trial of a few members and steps; the first call compiles the solver, for all processes of this machine."""
+    if job.plan.sizes:
+        return lattices.seconds_of_a_member(job)
     plan, steps = job.plan, min(job.plan.steps, 2000)
     values = {name: np.asarray(value) for name, value in plan.parameters.items()}
     x0 = np.array([plan.initial] * 64)
@@ -173,7 +186,7 @@ def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:
     except (OSError, ValueError) as error:
         raise FileError(f"{path}: expected a line of names, and lines of numbers: {error}") from None
     names = [name.strip() for name in names]
-    known = {*spec.coordinates, *(p.name for p in spec.parameters), *SWEEP_NAMES[:2]}
+    known = {*(spec.coordinates if not spec.lattice else ()), *(p.name for p in spec.parameters), *SWEEP_NAMES[:2]}
     strange = [name for name in names if name not in known]
     if strange or len(set(names)) < len(names) or not len(rows):
         why = f"{strange[0]!r} is not a parameter or a coordinate" if strange else "no members, or a name twice"

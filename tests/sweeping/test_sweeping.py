@@ -242,3 +242,64 @@ def test_members_of_a_file_are_made_in_its_order(cluster, tmp_path):
     start = [[x1, 1, 0.01] for x1 in (0.1, 0.2, 0.3)]
     np.testing.assert_allclose(data.final, solver.ensemble(start, 0.1, 60, I3=[3, 4, 5]), rtol=0, atol=1e-13)
     assert data.I3.values.tolist() == [3, 4, 5]
+
+
+CHAIN = """\
+phigen: 1
+name: swept_chain
+lattice: {axes: [i], boundary: periodic}
+coordinates: [x, y, z]
+parameters: {J: {value: 1, positive: true}, W: 0.5, B: {at: sites, value: 1}}
+poisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}
+hamiltonian: -J*(x*x[i+1] + y*y[i+1] + z*z[i+1]) - W*B*z
+casimirs: {length: x**2 + y**2 + z**2}
+order: 2
+runs:
+  hot:
+    {sizes: [8], initial: {random: sphere, seed: 3}, parameters: {B: {random: uniform, seed: 7}}, step: 0.05, steps: 40}
+sweeps:
+  disorder: {over: {W: [0.0, 2.0], seed: {count: 2}}, keep: [final, energy_error, casimir_error], frames: 15}
+"""
+
+
+def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path):
+    """A draw moves the seeds of the run: of the state and of the parameter at sites."""
+    from phigen.lattice.states import start_of
+
+    spec = specs.loads(CHAIN)
+    data = phigen.sweep(spec, output=tmp_path / "s.zarr", scheduler=cluster.scheduler_address, target="numpy")
+    assert data.sizes == {"W": 2, "seed": 2, "coordinate": 3, "i": 8, "frame": 3}
+    solver = phigen.compile(spec, target="numpy")
+    for draw in (0, 1):
+        moved = specs.loads(CHAIN.replace("seed: 3", f"seed: {3 + draw}").replace("seed: 7", f"seed: {7 + draw}"))
+        start = start_of(moved, moved.runs["hot"])
+        for k, W in enumerate((0.0, 2.0)):
+            alone = solver.integrate(start.state, 0.05, 40, 15, B=start.parameters["B"], W=W)
+            member = data.isel(W=k, seed=draw)
+            np.testing.assert_allclose(member.final, alone.x[-1], rtol=0, atol=1e-13)
+            np.testing.assert_allclose(member.frames, alone.x[:3], rtol=0, atol=1e-13)
+            np.testing.assert_allclose(member.energy_error, np.abs(alone.energy - alone.energy[0]).max(), atol=1e-13)
+            assert 0 < member.casimir_error < 1e-14
+    assert data.W.values.tolist() == [0.0, 2.0]
+    assert np.ptp(data.final.values, axis=1).min() > 0
+
+
+def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path):
+    from phigen.cli import group
+
+    changed = CHAIN.replace("W: [0.0, 2.0], seed: {count: 2}", "J: [1, 2], step: [0.05, 0]").replace("final, ", "")
+    (tmp_path / "s.yaml").write_text(changed)
+    arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "--plot", str(tmp_path / "s.svg")]
+    done = CliRunner().invoke(group, [*arguments, "-t", "numpy", "--scheduler", cluster.scheduler_address])
+    assert done.exit_code == 0, done.output
+    assert "4 members (J 2 × step 2), 4 made now, of which 2 failed" in done.output
+    data = xarray.open_zarr(tmp_path / "s.zarr").load()
+    assert (np.isnan(data.energy_error) == [[False, True]] * 2).all()
+    with pytest.raises(ValueError, match="'x' is not a parameter"):
+        phigen.sweep(specs.loads(CHAIN), over={"x": [1.0]})
+    with pytest.raises(ValueError, match="lyapunov: not for lattices"):
+        phigen.sweep(specs.loads(CHAIN), keep=["lyapunov"])
+    with pytest.raises(ValueError, match="a run of the spec is needed"):
+        phigen.sweep(specs.loads(CHAIN), initial=[1, 0, 0])
+    with pytest.raises(phigen.SpecError, match="lyapunov: not for lattices"):
+        specs.loads(CHAIN.replace("keep: [final", "keep: [lyapunov"))
