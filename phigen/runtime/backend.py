@@ -51,17 +51,8 @@ class Backend(Protocol):
         """Final states (members, DIM), or frames (rows, members, DIM); in so many threads, None for all cores."""
         ...
 
-    def pullback(
-        self,
-        x0: Floats,
-        h: float,
-        steps: int,
-        stride: int,
-        bars: Floats,
-        parameters: Mapping[str, float],
-        t0: float = 0.0,
-    ) -> tuple[Floats, Floats, Floats]:
-        """Rows of states (rows, members, DIM) from x0 (members, DIM), and what their cotangents ``bars`` come back to.
+    def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
+        """Rows of states (rows, members, DIM), those of the stride, and what their cotangents ``bars`` come back to.
 
         These are (members, DIM) and (parameters, members). Raises `MissingExtraError` without the extra ``adjoint``.
         """

@@ -72,6 +72,7 @@ _EXTRAS = {
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER, _POINTER, _POINTER, _POINTER)),
     "trail_size": (_SIZE, ()),
+    "pullback_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, *(_POINTER,) * 6)),
     "level_bar": (None, (_POINTER, _POINTER, _DOUBLE, _POINTER, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
@@ -206,6 +207,9 @@ class CSolver:
         if interface.time or "init_gauge" in offered:  # times, or a gauge of each
             _, each = _EXTRAS["ensemble_each"]
             offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
+            _, back = _EXTRAS["pullback_each"]
+            named = "pullback_each"
+            offered |= {named: (_INT, (*back[:3], _POINTER, *back[3:]))} if named in offered else {}
         monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
         self._c = bound(
             self._library,
@@ -322,17 +326,10 @@ class CSolver:
 
     def _each(self, members: Members, x: Floats, status: Bytes, rows: Floats | None) -> None:
         """The same where each has numbers of its own; ``rows`` (frames, members, DIM) are to be filled."""
-        count, width = len(members), max(1, len(members.parameters))
-        packed = np.empty((count, width), self._real)
-        for k, value in enumerate(members.parameters.values()):
-            packed[:, k] = value
+        count = len(members)
+        packed, began, h = self._given(members)
         own = [packed.ctypes.data if members.parameters else None, x.ctypes.data, count]
-        h, t0 = (np.array(np.broadcast_to(value, count), self._real) for value in (members.h, members.t0))
-        gauge = None if self._gauge is None else np.array(np.broadcast_to(self._gauge, (count, self._gauge.shape[-1])))
-        if self.interface.time:
-            own.append(t0.ctypes.data)
-        elif hasattr(self._c, "init_gauge"):
-            own.append(None if gauge is None else gauge.ctypes.data)
+        own += [None if a is None else a.ctypes.data for a in began]
         stride = members.stride or 1
         frames = None if rows is None else np.empty((members.steps // stride, *x.shape), self._real)
         at = None if frames is None else frames.ctypes.data
@@ -340,30 +337,60 @@ class CSolver:
         if rows is not None and frames is not None:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
 
-    def pullback(
-        self,
-        x0: Floats,
-        h: float,
-        steps: int,
-        stride: int,
-        bars: Floats,
-        parameters: Mapping[str, float],
-        t0: float = 0.0,
-    ) -> tuple[Floats, Floats, Floats]:
+    def _given(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
+        """Of each member the parameters (members, parameters), the time or the gauge, where there is one, the step."""
+        count, width = len(members), max(1, len(members.parameters))
+        packed = np.empty((count, width), self._real)
+        for k, value in enumerate(members.parameters.values()):
+            packed[:, k] = value
+        h, t0 = (np.array(np.broadcast_to(value, count), self._real) for value in (members.h, members.t0))
+        gauge = None if self._gauge is None else np.array(np.broadcast_to(self._gauge, (count, self._gauge.shape[-1])))
+        own: list[Floats | None] = [t0] if self.interface.time else [gauge] if hasattr(self._c, "init_gauge") else []
+        return packed, own, h
+
+    def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "pullback"):
             raise MissingExtraError("pullback")
-        of_step = int(self._c.trail_size())
-        pieces = segments(steps, stride, max(1, KEPT // of_step))
-        trail = np.empty(of_step * max((s.count for s in pieces), default=1), self._real)
-        rows, x0_bar, found = np.empty_like(bars), np.empty_like(x0), np.empty((len(parameters), len(x0)))
-        for m, start in enumerate(x0):
-            try:
-                own = bars[:, m]
-                rows[:, m], x0_bar[m], found[:, m] = self._pulled(start, h, pieces, trail, own, parameters, t0)
-            except BackendError as error:
-                raise BackendError(error.status, error.step, error.states, (m,)) from error
+        of_step, count = int(self._c.trail_size()), len(members)
+        pieces = segments(members.steps, members.stride, max(1, KEPT // of_step))
+        room = of_step * max((s.count for s in pieces), default=1)
+        rows, x0_bar, found = np.empty_like(bars), np.empty_like(members.x0), np.zeros((len(members.parameters), count))
+        status = np.zeros(count, dtype=np.uint8)
+
+        def make(part: slice) -> None:
+            trail = np.empty(room, self._real)
+            if hasattr(self._c, "pullback_each") and len(pieces) <= 1:
+                own = self._all_pulled(members.part(part), bars[:, part], trail, status[part])
+                rows[:, part], x0_bar[part], found[:, part] = own
+                return
+            for m in range(count)[part]:
+                h, parameters, t0 = members.numbers(m)
+                try:
+                    own = self._pulled(members.x0[m], h, pieces, trail, bars[:, m], parameters, t0)
+                except BackendError as error:
+                    raise BackendError(error.status, error.step, error.states, (m,)) from error
+                rows[:, m], x0_bar[m], found[:, m] = own
+
+        shared_out(members, threads, make)
+        for m in np.flatnonzero(status)[:1].tolist():
+            raise BackendError(status_name(int(status[m])), 0, members.x0, (m,))
         return rows, x0_bar, found
+
+    def _all_pulled(
+        self, members: Members, bars: Floats, trail: Floats, status: Bytes
+    ) -> tuple[Floats, Floats, Floats]:
+        """`pullback` of some members by one call."""
+        count, rows = len(members), np.empty_like(bars)
+        packed, own, h = self._given(members)
+        x0, given = self._own(members.x0), self._own(bars[1:].transpose(1, 0, 2))
+        made, x0_bar, found = np.empty_like(given), np.empty_like(x0), np.zeros_like(packed)
+        out = made.ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found.ctypes.data, trail.ctypes.data
+        start = packed.ctypes.data if members.parameters else None, x0.ctypes.data, count
+        more = (members.steps, max(1, members.stride), *out, status.ctypes.data)
+        self._c.pullback_each(*start, *(None if a is None else a.ctypes.data for a in own), h.ctypes.data, *more)
+        rows[0], rows[1:] = members.x0, made.transpose(1, 0, 2)
+        return rows, x0_bar + bars[0], found.T[: len(members.parameters)]
 
     def _pulled(
         self,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -71,72 +71,40 @@ def segments(steps: int, stride: int, most: int) -> list[Segment]:
 def pullback(
     solver: Solver,
     x0: ArrayLike,
-    h: float,
+    h: ArrayLike,
     steps: int,
     cotangent: ArrayLike,
     stride: int | None,
-    t0: float,
+    t0: ArrayLike | None,
+    threads: int | None,
     given: Mapping[str, Any],
 ) -> Pullback:
-    """`Solver.pullback`, for a start at ``t0`` and the parameters that were given."""
+    """`Solver.pullback`, with the parameters that were given."""
     interface = solver.interface
-    start, h = arguments.states(x0, "x0", interface), arguments.step_size(h)
+    start = arguments.states(x0, "x0", interface)
     if start.ndim > 2:
         shapes = f"({interface.dimension},) or (members, {interface.dimension})"
         raise ValueError(f"x0 must have shape {shapes}, not {start.shape}")
-    steps, members = arguments.count(steps, "steps", 0), start.reshape(-1, interface.dimension)
+    steps, rest = arguments.count(steps, "steps", 0), dict(given)
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
+    several = start.reshape(-1, interface.dimension)
+    members = arguments.ensemble(several, h, steps, width, t0, {}, rest, interface)
     rows = len(row_steps(steps, width))
-    bars = cotangents(cotangent, start.shape if stride is None else (rows, *start.shape)).reshape(-1, *members.shape)
+    bars = cotangents(cotangent, start.shape if stride is None else (rows, *start.shape)).reshape(-1, *several.shape)
     if stride is None:
-        bars = np.concatenate([np.zeros((rows - 1, *members.shape)), bars])
-
-    def back(x: Floats, values: Mapping[str, float], own: Floats) -> tuple[Floats, Floats, Floats]:
-        try:
-            return solver.backend.pullback(x, h, steps, width, own, values, t0)
-        except MissingExtraError:
-            hint = "compile it with adjoint=True, or say adjoint: true in the spec"
-            raise TypeError(f"{interface.name} was compiled without pullback; {hint}") from None
-        except BackendError as error:
-            raise solver.failure(error, h, None, values) from error
-
-    states, x0_bar, of_parameters = _of_members(back, members, solver.values, given, bars)
+        bars = np.concatenate([np.zeros((rows - 1, *several.shape)), bars])
+    try:
+        states, x0_bar, found = solver.backend.pullback(members, bars, threads)
+    except MissingExtraError:
+        hint = "compile it with adjoint=True, or say adjoint: true in the spec"
+        raise TypeError(f"{interface.name} was compiled without pullback; {hint}") from None
+    except BackendError as error:
+        size, values, _ = members.numbers(error.members[0] if error.members else 0)
+        raise solver.failure(error, size, None, values) from error
     states = states.reshape(-1, *start.shape)
-    return Pullback(states[-1] if stride is None else states, x0_bar.reshape(start.shape), of_parameters)
-
-
-#: Pull cotangents of some members back: with x0 (members, DIM), parameters, and cotangents (rows, members, DIM) gives
-#: the rows, the cotangents (members, DIM) of x0 and those (parameters, members) of parameters.
-Back = Callable[[Floats, Mapping[str, float], Floats], tuple[Floats, Floats, Floats]]
-
-
-def _of_members(
-    back: Back,
-    x0: Floats,
-    values: Callable[[Mapping[str, float], Mapping[str, float]], dict[str, float]],
-    given: Mapping[str, Any],
-    bars: Floats,
-) -> tuple[Floats, Floats, dict[str, Floats]]:
-    """`Back` for members (members, DIM), where parameters may be arrays of one value for each.
-
-    The cotangent of a parameter that all members share is the sum over members.
-    """
-    own = {name: np.asarray(value, dtype=np.float64) for name, value in given.items() if np.ndim(value) == 1}
-    for name, value in own.items():
-        if len(value) != len(x0):
-            raise ValueError(f"parameter {name!r} has {len(value)} values, and there are {len(x0)} members")
-    shared = {name: value for name, value in given.items() if name not in own}
-    if not own:
-        common = values(shared, {})
-        rows, x0_bar, found = back(x0, common, bars)
-        return rows, x0_bar, {name: found[k].sum() for k, name in enumerate(common)}
-    each, names = [], list[str]()
-    for m in range(len(x0)):
-        mine = values(shared, {name: float(value[m]) for name, value in own.items()})
-        names = list(mine)
-        each.append(back(x0[m : m + 1], mine, bars[:, m : m + 1]))
-    rows, x0_bar, found = (np.concatenate([e[k] for e in each], axis=axis) for k, axis in ((0, 1), (1, 0), (2, 1)))
-    return rows, x0_bar, {name: found[k] if name in own else found[k].sum() for k, name in enumerate(names)}
+    each = zip(members.parameters.items(), found, strict=True)
+    bars_of = {name: bar if np.ndim(value) else bar.sum() for (name, value), bar in each}
+    return Pullback(states[-1] if stride is None else states, x0_bar.reshape(start.shape), bars_of)
 
 
 def cotangents(cotangent: ArrayLike, shape: tuple[int, ...]) -> Floats:

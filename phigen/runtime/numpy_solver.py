@@ -337,30 +337,23 @@ class NumpySolver:
             remaining = np.delete(remaining, lost)
         return members.told(frames if members.stride else x, failures, first)
 
-    def pullback(
-        self,
-        x0: Floats,
-        h: float,
-        steps: int,
-        stride: int,
-        bars: Floats,
-        parameters: Mapping[str, float],
-        t0: float = 0.0,
-    ) -> tuple[Floats, Floats, Floats]:
+    def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self.module, "pullback"):
             raise MissingExtraError("pullback")
-        self._expect_admissible(x0, parameters)
-        options: dict[str, Any] = {"t0": t0} if self.interface.time else {}
+        x0, own = members.x0, members.parameters
+        self._expect_admissible(x0, own)
+        options: dict[str, Any] = {"t0": members.t0} if self.interface.time else {}
         options |= {"gauge": self._gauge} if self._gauge is not None else {}
         try:
-            rows, x0_bar, found = self.module.pullback(x0, h, steps, bars, stride, **options, **parameters)
+            given = x0, members.h, members.steps, bars, members.stride
+            rows, x0_bar, found = self.module.pullback(*given, **options, **own)
         except self.module.StepError as error:
             raise BackendError(
                 str(error.status), int(error.step), np.asarray(error.states)[-1], error.members
             ) from error
-        own = [np.asarray(found[name], dtype=np.float64) for name in self.interface.parameters]
-        return rows, x0_bar, np.array(own).reshape(len(own), len(x0))
+        slopes = [np.asarray(found[name], dtype=np.float64) for name in self.interface.parameters]
+        return rows, x0_bar, np.array(slopes).reshape(len(slopes), len(x0))
 
     def _expect_admissible(self, x0: Floats, parameters: Mapping[str, Any]) -> None:
         values = self.module._values(parameters)

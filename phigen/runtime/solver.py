@@ -350,12 +350,13 @@ class Solver(Named[Backend, Interface]):
     def pullback(
         self,
         x0: ArrayLike,
-        h: float,
+        h: ArrayLike,
         steps: int,
         cotangent: ArrayLike,
         stride: int | None = None,
         *,
-        t0: float | None = None,
+        t0: ArrayLike | None = None,
+        threads: int | None = None,
         parameters: Mapping[str, ArrayLike] | None = None,
         **more: ArrayLike,
     ) -> Pullback:
@@ -363,17 +364,18 @@ class Solver(Named[Backend, Interface]):
         parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters.
 
         ``x0`` is (DIM,) or (members, DIM), x1 and the cotangent have its shape. With a ``stride``, x1 are all rows of
-        `integrate`, (rows, …), and so is the cotangent. Parameters are numbers, or (members,); of a number that all
-        members share, the derivative is the sum over members. All is exact to round-off for the steps as they are made:
-        the choice of a gauge is held fixed, that of e = −H(x0) with a monitor is not; times and attitudes have no part.
+        `integrate`, (rows, …), and so is the cotangent. Parameters, h and t0 are numbers, or (members,); of a number
+        that all members share, the derivative is the sum over members. ``threads`` are as for `ensemble`. All is exact
+        to round-off for the steps as they are made: the choice of a gauge is held fixed, that of e = −H(x0) with a
+        monitor is not; times and attitudes have no part.
         Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
-        rest: dict[str, Any] = dict(more)
-        begin = arguments.start_time(t0, self.interface, rest)
-        both = sorted(set(parameters or {}) & set(rest))
+        both = sorted(set(parameters or {}) & set(more))
         if both:
             raise TypeError(f"parameter {both[0]!r} is given twice")
-        return gradients.pullback(self, x0, h, steps, cotangent, stride, begin, {**(parameters or {}), **rest})
+        threads = threads if threads is None else arguments.count(threads, "threads", 1)
+        given = {**(parameters or {}), **more}
+        return gradients.pullback(self, x0, h, steps, cotangent, stride, t0, threads, given)
 
     def jacobian(
         self,

@@ -12,6 +12,7 @@ from support import RATTLEBACK, TARGETS, PreciseStep, RawC, files, precisely, so
 from phigen import SpecError, StepError, compile, spec
 from phigen.compiler import compile_spec, emit
 from phigen.runtime import c_solver
+from phigen.runtime import members as runs
 from phigen.runtime.gradients import segments
 from phigen.scheme.lowering import cost
 from phigen.scheme.steps import Explicit, Newton, Path, Splitting
@@ -207,6 +208,32 @@ def test_members_and_their_parameters_have_cotangents(target):
     assert together.parameters_bar["I2"] == pytest.approx(sum(e.parameters_bar["I2"] for e in apart), abs=1e-14)
 
 
+@pytest.mark.parametrize("kind", ["newton, gauge", "newton, monitor", "newton, time", "path", "kicks, time"])
+def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypatch):
+    """Steps, parameters and times of their own; long runs are those of segments."""
+    made, rng = solver(compilation(kind), "c"), np.random.default_rng(2)
+    monkeypatch.setattr(runs, "LEAST", 2)
+    monkeypatch.setattr(runs, "_REPAID", 1)
+    many, h = start(kind) + 0.1 * rng.random((5, len(start(kind)))), H * (1 + 0.1 * rng.random(5))
+    own = {name: value * (1 + 0.1 * rng.random(5)) for name, value in made.interface.parameters.items()}
+    t0 = rng.random(5) if made.interface.time else None
+    bar = rng.normal(size=(4, *many.shape))
+    together = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=1, parameters=own)
+    shared = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=own)
+    for m in range(5):
+        mine, begin = {name: value[m] for name, value in own.items()}, None if t0 is None else t0[m]
+        alone = made.pullback(many[m], h[m], STEPS, bar[:, m], 2, t0=begin, parameters=mine)
+        for found in (together, shared):
+            assert np.array_equal(found.x1[:, m], alone.x1)
+            assert np.array_equal(found.x0_bar[m], alone.x0_bar)
+            assert all(found.parameters_bar[name][m] == alone.parameters_bar[name] for name in own)
+    monkeypatch.setattr(c_solver, "KEPT", 1)
+    cut = made.pullback(many, h, STEPS, bar, 2, t0=t0, threads=3, parameters=own)
+    assert np.max(np.abs(cut.x0_bar - together.x0_bar)) <= 1e-12 * np.max(np.abs(cut.x0_bar))
+    for name, bars in cut.parameters_bar.items():
+        assert bars == pytest.approx(together.parameters_bar[name], rel=1e-10, abs=1e-13)
+
+
 def test_jacobian_has_columns_for_state_and_parameters():
     made, x = solver(compilation("newton"), "c"), start("newton")
     x1, by_x0, by = made.jacobian(x, H, I2=1.9)
@@ -246,7 +273,7 @@ def test_what_cannot_be_pulled_back_is_told(target):
             made.pullback(x, H, 2, np.ones(shape))
     with pytest.raises(ValueError, match="finite"):
         made.pullback(x, H, 2, [1, np.nan, 1])
-    with pytest.raises(ValueError, match="'I2' has 2 values"):
+    with pytest.raises(ValueError, match=r"'I2' must have shape \(1,\)"):
         made.pullback([x], H, 2, [x], I2=[1, 2])
     with pytest.raises(TypeError, match="unknown parameter"):
         made.pullback(x, H, 2, x, I4=1)

@@ -304,4 +304,54 @@ phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM
     return phi_pullback(s, h, 1, 1, NULL, x1_bar, x0_bar, params_bar, trail);
 #endif
 }
+#if PHI_EACH
+
+#if PHI_TIMED
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *t0, const double *h,
+    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
+    double *trail, unsigned char *status)
+#elif PHI_GAUGE
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *gauge, const double *h,
+    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
+    double *trail, unsigned char *status)
+#else
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *h,
+    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
+    double *trail, unsigned char *status)
+#endif
+{
+    const size_t each = stride > 0 ? (steps + stride - 1) / stride * PHI_DIM : 0;
+    phi_status worst = PHI_OK;
+    if (members > 0 && (x0 == NULL || h == NULL || rows_bar == NULL || x0_bar == NULL)) return PHI_BAD_ARGUMENT;
+#if PHI_TIMED
+    if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
+#endif
+    for (size_t m = 0; m < members; ++m) {
+        const phi_params *own = params != NULL ? params + m : NULL;
+        const double *x = x0 + m * PHI_DIM, *bars = rows_bar + m * each;
+        double *made = rows != NULL ? rows + m * each : NULL, *bar = x0_bar + m * PHI_DIM;
+        phi_params *own_bar = params_bar != NULL ? params_bar + m : NULL;
+        phi_solver s;
+#if PHI_GAUGE
+        phi_status member = phi_init_gauge(&s, own, x, gauge != NULL ? gauge + m * PHI_GAUGES : NULL);
+#elif PHI_TIMED
+        phi_status member = phi_init_at(&s, own, x, t0[m]);
+#else
+        phi_status member = phi_init(&s, own, x);
+#endif
+#if PHI_MONITOR
+        double e_bar = 0.0;
+        if (member == PHI_OK) member = phi_pullback(&s, h[m], steps, stride, made, bars, bar, own_bar, &e_bar, trail);
+        phi_params unused = phi_default_params;
+        if (member == PHI_OK && gauge == NULL)
+            phi_level_bar(own, x, e_bar, bar, own_bar != NULL ? own_bar : &unused);
+#else
+        if (member == PHI_OK) member = phi_pullback(&s, h[m], steps, stride, made, bars, bar, own_bar, trail);
+#endif
+        if (status != NULL) status[m] = (unsigned char)member;
+        if (worst == PHI_OK) worst = member;
+    }
+    return worst;
+}
+#endif
 #endif
