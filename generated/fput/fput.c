@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: b733b11037c39d01b35c8f3fce588697905a551c72dd576bfd96d03a8ce1e710
+ * body-sha256: 4f40a1de039dd42229e4b07baf3825bf0dc21772fff7dd0094db62eefe1ebf3d
  */
 #include "fput.h"
 
@@ -499,6 +499,28 @@ static void fput_take(const fput_solver *s, double *const fields[fput_DIM], doub
 }
 
 void fput_state(const fput_solver *s, double *x) { fput_take(s, s->x, x); }
+
+/* To x and so many times what is there. */
+static fput_status fput_move(fput_solver *s, const double *x, double kept)
+{
+    if (s == NULL || x == NULL) return fput_BAD_ARGUMENT;
+    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+        for (size_t r = 0; r < fput_DIM * s->rows; ++r) {
+            double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) {
+                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(moved)) return fput_BAD_ARGUMENT;
+                row[i] = moving ? moved : row[i];
+            }
+            fput_ends(row, s->length, 0, s->length);
+        }
+    s->open = 0;
+    return fput_OK;
+}
+
+fput_status fput_set_state(fput_solver *s, const double *x) { return fput_move(s, x, 0.0); }
+
+fput_status fput_kick(fput_solver *s, const double *change) { return fput_move(s, change, 1.0); }
 
 int fput_saved(const fput_solver *s, double *x, size_t *far)
 {

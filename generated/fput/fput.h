@@ -2,7 +2,7 @@
  * fput.h: the declarations; fput.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 933f1f0a759aa15005ea1735bdd81f151fb088572b0ce016dc50dc114159072d
+ * body-sha256: 49e7d368befb082945896db9541d1cd5dd65c6b28d325e9657a2dabe5dc7de2c
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -76,6 +76,11 @@ fput_status fput_integrate(fput_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void fput_state(const fput_solver *s, double *x);
+
+/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on
+   fput_BAD_ARGUMENT. */
+fput_status fput_set_state(fput_solver *s, const double *x);
+fput_status fput_kick(fput_solver *s, const double *change);
 
 /* To go on elsewhere with the same bits: if fput_saved is 1, x is what the next step begins with, for
    fput_resume after fput_init at the state. */

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: fee55aeee3fa59cc02c5b59b2893e4bf392ff99bcc9d2526b8f7d5970edbb1e0
+ * body-sha256: 778bd0b692cf0bcd2a3895d79870bb870ed455fb0bde7068c236db72e9ad2306
  */
 #include "heisenberg.h"
 
@@ -755,6 +755,34 @@ static void heisenberg_take(const heisenberg_solver *s, double *const fields[hei
 }
 
 void heisenberg_state(const heisenberg_solver *s, double *x) { heisenberg_take(s, s->x, x); }
+
+/* To x and so many times what is there. */
+static heisenberg_status heisenberg_move(heisenberg_solver *s, const double *x, double kept)
+{
+    if (s == NULL || x == NULL) return heisenberg_BAD_ARGUMENT;
+    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+        for (size_t r = 0; r < heisenberg_DIM * s->rows; ++r) {
+            double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) {
+                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(moved)) return heisenberg_BAD_ARGUMENT;
+                row[i] = moving ? moved : row[i];
+            }
+            heisenberg_ends(row, s->length, 0, s->length);
+        }
+    s->open = 0;
+    return heisenberg_OK;
+}
+
+heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x)
+{
+    return heisenberg_move(s, x, 0.0);
+}
+
+heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change)
+{
+    return heisenberg_move(s, change, 1.0);
+}
 
 int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
 {

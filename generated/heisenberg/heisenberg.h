@@ -2,7 +2,7 @@
  * heisenberg.h: the declarations; heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 106b84bc12249bb13d12cf6d5ca9863c24bcf5387d9f6adcccb1986e6ea313cb
+ * body-sha256: 2224bc0f9c9c48d3a5752333b9323f662e5d1b50c6e2595a955f1050c76e1b3b
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -77,6 +77,11 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 
 /* The state x[field][site]. */
 void heisenberg_state(const heisenberg_solver *s, double *x);
+
+/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on
+   heisenberg_BAD_ARGUMENT. */
+heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
+heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
 /* To go on elsewhere with the same bits: if heisenberg_saved is 1, x is what the next step begins with, for
    heisenberg_resume after heisenberg_init at the state. */

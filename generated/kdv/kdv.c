@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 180d8b1607078c6d0abba779235217c4e6a2e98064fc1f654e3cdf9647a6db9d
+ * body-sha256: a5025797102e56bf14599acf1ae8d3c02833321e753f49ab9d76ada4763e8d68
  */
 #include "kdv.h"
 
@@ -927,6 +927,27 @@ static void kdv_take(const kdv_solver *s, double *const fields[kdv_DIM], double 
 }
 
 void kdv_state(const kdv_solver *s, double *x) { kdv_take(s, s->x, x); }
+
+/* To x and so many times what is there. */
+static kdv_status kdv_move(kdv_solver *s, const double *x, double kept)
+{
+    if (s == NULL || x == NULL) return kdv_BAD_ARGUMENT;
+    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+        for (size_t r = 0; r < kdv_DIM * s->rows; ++r) {
+            double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) {
+                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(moved)) return kdv_BAD_ARGUMENT;
+                row[i] = moving ? moved : row[i];
+            }
+            kdv_ends(row, s->length, 0, s->length);
+        }
+    return kdv_OK;
+}
+
+kdv_status kdv_set_state(kdv_solver *s, const double *x) { return kdv_move(s, x, 0.0); }
+
+kdv_status kdv_kick(kdv_solver *s, const double *change) { return kdv_move(s, change, 1.0); }
 
 /* ---- What is seen at sites ---- */
 double kdv_hamiltonian(const kdv_solver *s)

@@ -2,7 +2,7 @@
  * kdv.h: the declarations; kdv.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 88f5cd1d9f60da4f4140126489cdb614e416784652061d5ac6d6ca45271eeea9
+ * body-sha256: 02c4c71f0010176fa1b169bbb4048761a01a1e281624b8ba38e13917cc8a265a
  */
 #ifndef KDV_H
 #define KDV_H
@@ -89,6 +89,11 @@ kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void kdv_state(const kdv_solver *s, double *x);
+
+/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on
+   kdv_BAD_ARGUMENT. */
+kdv_status kdv_set_state(kdv_solver *s, const double *x);
+kdv_status kdv_kick(kdv_solver *s, const double *change);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

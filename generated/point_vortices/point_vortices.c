@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: af967c812f7b26b387b63fd21fab84baa9b23dab6e2af65a83f3b1a0eedfff09
+ * body-sha256: 749646a7431d35b2445dda71f595a4eb393914ec08aef4abfe019486292ae0f3
  */
 #include "point_vortices.h"
 
@@ -1062,6 +1062,33 @@ static void point_vortices_take(const point_vortices_solver *s, double *const fi
 }
 
 void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
+
+/* To x and so many times what is there. */
+static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double kept)
+{
+    if (s == NULL || x == NULL) return point_vortices_BAD_ARGUMENT;
+    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+        for (size_t r = 0; r < point_vortices_DIM * s->rows; ++r) {
+            double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) {
+                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(moved)) return point_vortices_BAD_ARGUMENT;
+                row[i] = moving ? moved : row[i];
+            }
+            point_vortices_ends(row, s->length, 0, s->length);
+        }
+    return point_vortices_OK;
+}
+
+point_vortices_status point_vortices_set_state(point_vortices_solver *s, const double *x)
+{
+    return point_vortices_move(s, x, 0.0);
+}
+
+point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change)
+{
+    return point_vortices_move(s, change, 1.0);
+}
 
 /* ---- What is seen at sites ---- */
 double point_vortices_hamiltonian(const point_vortices_solver *s)

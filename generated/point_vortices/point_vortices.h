@@ -2,7 +2,7 @@
  * point_vortices.h: the declarations; point_vortices.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 76ea86f33f2c91d078e090bcedd9878bf4073a6626083336e67de38fa4ce9358
+ * body-sha256: c6b9a0046fa47d5bd93a84b99cbcc8f2a82252596443be4b8feff7ff44e2c03c
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -93,6 +93,11 @@ point_vortices_status point_vortices_integrate(point_vortices_solver *s, double 
 
 /* The state x[field][site]. */
 void point_vortices_state(const point_vortices_solver *s, double *x);
+
+/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on
+   point_vortices_BAD_ARGUMENT. */
+point_vortices_status point_vortices_set_state(point_vortices_solver *s, const double *x);
+point_vortices_status point_vortices_kick(point_vortices_solver *s, const double *change);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

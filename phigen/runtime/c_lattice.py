@@ -61,6 +61,8 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "put_planes": (_INT, (_POINTER, _SIZE, _SIZE, _SIZE, _POINTER)),
     "holds": (_INT, (_POINTER, _SIZE, _SIZE)),
     "set_planes": (_INT, (_POINTER, _SIZE, _SIZE)),
+    "set_state": (_INT, (_POINTER, _POINTER)),
+    "kick": (_INT, (_POINTER, _POINTER)),
 }
 
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
@@ -181,6 +183,23 @@ class CLatticeSession:
         if "before" in kept:
             x = np.ascontiguousarray(kept["before"], dtype=self._real)
             self._expect_done(self._c.resume(self._address, h, x.ctypes.data, int(kept["far"][0])))
+
+    def place(self, x: Floats) -> None:
+        """Stand at ``x`` (coordinates, *sizes). Raises `BackendError` where that is not finite."""
+        self._moved("set_state", x)
+
+    def kick(self, change: Floats) -> None:
+        """Move the state by ``change`` (coordinates, *sizes). Raises `BackendError` where that is not finite."""
+        self._moved("kick", change)
+
+    def _moved(self, name: str, given: Floats) -> None:
+        function = getattr(self._c, name, None)
+        if function is None:
+            raise TypeError("this lattice was compiled without kicks: profile fast has them")
+        x = np.ascontiguousarray(given, dtype=self._real)
+        status = function(self._address, x.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self.state()[None])
 
     def passed(self, h: float, steps: int) -> None:
         """Count so many steps of size h as made; of lattices with a time, or noise."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -25,6 +26,7 @@ from phigen.runtime.interface import (
     row_steps,
 )
 from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
+from phigen.runtime.live import LiveLattice
 from phigen.runtime.named import Named
 from phigen.writing import replacing
 
@@ -58,6 +60,14 @@ class LatticeSession(Protocol):
 
     def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
         """Go on from what was saved after so many steps of size h, in a session that began at the state."""
+        ...
+
+    def place(self, x: Floats) -> None:
+        """Stand at ``x`` (coordinates, *sizes), with all else as it is; raises `BackendError` if it is not finite."""
+        ...
+
+    def kick(self, change: Floats) -> None:
+        """Move the state by ``change`` (coordinates, *sizes), else as `place`."""
         ...
 
     def hamiltonian(self) -> float:
@@ -379,6 +389,27 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             raise TypeError(f"parameter {both[0]!r} is given twice")
         given = {**(parameters or {}), **more}
         return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, given)
+
+    def session(
+        self,
+        x0: ArrayLike,
+        *,
+        t0: float | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> LiveLattice:
+        """A lattice from ``x0`` (coordinates, *sizes) in the hands of the caller: ``.step(h)``, ``.kick(dx)``, ``.x``.
+
+        The other arguments are those of `integrate`.
+        """
+        begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
+        start = self.state(x0, "x0")
+        values = self.values(parameters, more, start.shape[1:])
+        return LiveLattice(self, self.started(start, math.nan, values, begin, draws), values, begin, draws)
 
     # --- what is seen
 

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
 from phigen.runtime import arguments
-from phigen.runtime.interface import BackendError, Clock, Floats
+from phigen.runtime.interface import BackendError, Clock, Draws, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.trajectory import turned_into
 
 if TYPE_CHECKING:
+    from phigen.runtime.lattice import LatticeSession, LatticeSolver
     from phigen.runtime.solver import Solver
 
 
@@ -29,14 +30,14 @@ class LiveSession:
     """
 
     def __init__(self, solver: Solver, session: Session, parameters: Mapping[str, float], t0: float) -> None:
-        self.solver = solver
+        self.solver: Any = solver
         self.parameters = dict(parameters)
         self._session = session
         self._clock = Clock(t0)
         self._put = session.state()
 
     def __repr__(self) -> str:
-        return f"<LiveSession of {self.solver.interface.name}: t = {self.t!r}, {self.steps} steps>"
+        return f"<{type(self).__name__} of {self.solver.interface.name}: t = {self.t!r}, {self.steps} steps>"
 
     @property
     def x(self) -> Floats:
@@ -45,14 +46,14 @@ class LiveSession:
 
     @x.setter
     def x(self, value: ArrayLike) -> None:
-        self._move(self._session.place, arguments.state(value, "x", self.solver.interface))
+        self._move(self._session.place, self._checked(value, "x"))
 
-    def kick(self, change: ArrayLike) -> LiveSession:
+    def kick(self, change: ArrayLike) -> Self:
         """Move the state by ``change`` (DIM,), as an impulse does. Where that leaves the leaf, ``leaf`` follows."""
-        self._move(self._session.kick, arguments.state(change, "change", self.solver.interface))
+        self._move(self._session.kick, self._checked(change, "change"))
         return self
 
-    def step(self, h: float, steps: int = 1) -> LiveSession:
+    def step(self, h: float, steps: int = 1) -> Self:
         """Make steps of size ``h``, in τ with a monitor. Raises `StepError`, and stands before the step that failed."""
         h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
         if not self.solver.interface.monitored:
@@ -116,6 +117,9 @@ class LiveSession:
         self.__dict__.update(state)
         self._session = self.solver.backend.restored(state["_session"], self.parameters)
 
+    def _checked(self, value: ArrayLike, what: str) -> Floats:
+        return arguments.state(value, what, self.solver.interface)
+
     def _casimirs_of(self, x: Floats) -> dict[str, float]:
         found = self.solver.casimirs(x, parameters=self.parameters)
         return {name: float(value) for name, value in found.items()}
@@ -131,3 +135,68 @@ class LiveSession:
             name = self.solver.interface.name
             raise StepError(f"{name}: the state is not finite, {said}", step=self.steps, status=error.status) from error
         self._put = self.x
+
+
+class LiveLattice(LiveSession):
+    """A lattice that stands somewhere; `LatticeSolver.session` makes one.
+
+    ``x`` has the shape (coordinates, *sizes), and Casimirs of sites have one value for each. All else is as of
+    `LiveSession`, and a step, a kick or a copy take work in proportion to the sites.
+    """
+
+    def __init__(
+        self, solver: LatticeSolver, session: LatticeSession, parameters: Mapping[str, Any], t0: float, draws: Draws
+    ) -> None:
+        self.solver = solver
+        self.parameters = dict(parameters)
+        self._session = cast("Session", session)
+        self._clock, self._draws, self._before = Clock(t0), draws, 0
+        self._put = session.state()
+
+    @property
+    def steps(self) -> int:
+        """Steps made since the start."""
+        return self._before + self._session.steps
+
+    @property
+    def energy(self) -> float:
+        """H of the state."""
+        return self._lattice.hamiltonian()
+
+    def copy(self) -> LiveLattice:
+        """An independent copy."""
+        twin = object.__new__(LiveLattice)
+        twin.__setstate__(self.__getstate__())
+        return twin
+
+    def __getstate__(self) -> dict[str, Any]:
+        kept = {"_session": (self._session.state(), self._lattice.saved()), "_made": self.steps}
+        return {**self.__dict__, "parameters": dict(self.parameters), "_clock": replace(self._clock), **kept}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        x, saved = state["_session"]
+        made = state.pop("_made")
+        self.__dict__.update(state)
+        # counted from where the size of the step was set: with the same times and random numbers
+        clock, self._before = self._clock, self._clock.counted
+        draws = replace(self._draws, step=self._draws.step + self._before)
+        self._session = self.solver.started(x, clock.h, self.parameters, clock.t, draws)
+        if clock.h:
+            self._lattice.resume(clock.h, made - self._before, saved)
+
+    @property
+    def _lattice(self) -> LatticeSession:
+        return cast("LatticeSession", self._session)
+
+    def _checked(self, value: ArrayLike, what: str) -> Floats:
+        found: Floats = self.solver.state(value, what)
+        if found.shape != self._put.shape:
+            raise ValueError(f"{what} must have shape {self._put.shape}, not {found.shape}")
+        return found
+
+    def _casimirs_of(self, x: Floats) -> dict[str, Any]:
+        found: dict[str, Any] = self.solver.casimirs(x, parameters=self.parameters)
+        return found
+
+    def _element(self) -> tuple[None, None]:
+        return None, None

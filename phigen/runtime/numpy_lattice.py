@@ -105,6 +105,17 @@ class NumpyLatticeSession:
         self.steps = steps
         self._tell_time()
 
+    def place(self, x: Floats) -> None:
+        """Stand at ``x`` (coordinates, *sizes)."""
+        if not np.isfinite(x).all():
+            raise BackendError("BAD_ARGUMENT", self.steps, self._x[None].copy())
+        self._x = np.array(x)
+
+    def kick(self, change: Floats) -> None:
+        """Move the state by ``change`` (coordinates, *sizes)."""
+        with np.errstate(all="ignore"):
+            self.place(self._x + change)
+
     def hamiltonian(self) -> float:
         """H of the state."""
         return float(self.density().sum())

@@ -377,6 +377,32 @@ static void phi_take(const phi_solver *s, double *const fields[PHI_DIM], double 
 }
 
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
+#if PHI_KICKED
+
+/* To x and so many times what is there. */
+static phi_status phi_move(phi_solver *s, const double *x, double kept)
+{
+    if (s == NULL || x == NULL) return PHI_BAD_ARGUMENT;
+    for (int moving = 0; moving < 2; ++moving) /* nothing, unless all of it can be */
+        for (size_t r = 0; r < PHI_DIM * s->rows; ++r) {
+            double *row = s->x[r / s->rows] + (ptrdiff_t)(r % s->rows) * s->width;
+            for (ptrdiff_t i = 0; i < s->length; ++i) {
+                const double moved = kept * row[i] + x[(ptrdiff_t)r * s->length + i];
+                if (!isfinite(moved)) return PHI_BAD_ARGUMENT;
+                row[i] = moving ? moved : row[i];
+            }
+            phi_ends(row, s->length, 0, s->length);
+        }
+#if !PHI_SERIES
+    s->open = 0;
+#endif
+    return PHI_OK;
+}
+
+phi_status phi_set_state(phi_solver *s, const double *x) { return phi_move(s, x, 0.0); }
+
+phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, change, 1.0); }
+#endif
 
 #if PHI_TANGENT
 #include "lattice_tangent.c"

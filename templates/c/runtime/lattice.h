@@ -161,6 +161,12 @@ phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, vo
 #endif
 /* The state x[field][site]. */
 void phi_state(const phi_solver *s, double *x);
+#if PHI_KICKED
+
+/* Between steps: stand at x, or move by change, both [field][site], all else being as it was, also on PHI_BAD_ARGUMENT. */
+phi_status phi_set_state(phi_solver *s, const double *x);
+phi_status phi_kick(phi_solver *s, const double *change);
+#endif
 #if !PHI_SERIES
 
 /* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after

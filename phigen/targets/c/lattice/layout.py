@@ -95,6 +95,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
     """The switches of the runtime for lattices."""
     banded = layout.band > 0 and program.offers("recurrences")
     return {
+        "KICKED": program.offers("kicks") and program.profile == "fast",
         "OPEN": bool(layout.weights),
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,

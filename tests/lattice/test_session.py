@@ -1,0 +1,72 @@
+"""Lattices in the hands of the caller: steps, kicks and states put in place, branches, pickles."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from lattice import test_acting as acting
+from lattice import test_sweeps as sweeps
+from lattice import test_time as timed
+
+from phigen.errors import StepError
+
+#: A splitting whose steps are joined, one in time, the series with noise, and a splitting with noise.
+CASES = {"xxz": sweeps, "coloured": timed, "bath": acting, "langevin": acting}
+
+
+def prepared(name: str, target: str) -> tuple[Any, np.ndarray, dict[str, Any]]:
+    module = CASES[name]
+    order = 4 if module is sweeps else 2
+    if module is sweeps:
+        return sweeps.solver(name, 4, target), sweeps.start(name, (5,)), {}
+    x, values = module.given(name)
+    asked = {"parameters": values} | ({"t0": 0.3} if name == "coloured" else {"seed": 3, "step0": 2})
+    return module.solver(name, order, target), x, asked
+
+
+@pytest.mark.parametrize(("name", "target"), [(n, "numpy") for n in CASES] + [("xxz", "c"), ("bath", "c")])
+def test_steps_kicks_and_states_are_those_of_single_runs(name: str, target: str) -> None:
+    solver, x, asked = prepared(name, target)
+    session = solver.session(x, **asked)
+    change = np.random.default_rng(2).normal(size=x.shape) / 10
+    session.step(0.05, 3).kick(change)
+    half = solver.integrate(x, 0.05, 3, 3, **asked).x[-1]
+    np.testing.assert_allclose(session.x, half + change, rtol=0, atol=1e-13)
+    later = {k: v + 3 if k == "step0" else v + 0.15 if k == "t0" else v for k, v in asked.items()}
+    session.step(0.05, 2)
+    whole = solver.integrate(half + change, 0.05, 2, 2, **later)
+    np.testing.assert_allclose(session.x, whole.x[-1], rtol=0, atol=1e-13)
+    np.testing.assert_allclose(session.energy, whole.energy[-1], rtol=1e-12)
+    assert (session.steps, round(session.t, 12)) == (5, asked.get("t0", 0.0) + 0.25)
+    session.x = x
+    np.testing.assert_array_equal(session.x, x)
+
+
+@pytest.mark.parametrize(("name", "target"), [("xxz", "c"), ("coloured", "numpy"), ("bath", "c")])
+def test_copies_and_pickles_go_on_to_the_last_bit(name: str, target: str) -> None:
+    solver, x, asked = prepared(name, target)
+    session = solver.session(x, **asked).step(0.05, 2).step(0.03, 2)
+    others = [session.copy(), pickle.loads(pickle.dumps(session))]
+    for other in others:
+        assert (other.t, other.steps) == (session.t, session.steps)
+        other.step(0.03, 2)
+    session.step(0.03, 2)
+    for other in others:
+        assert other.x.tobytes() == session.x.tobytes()
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_states_that_cannot_be_are_refused_and_leave_the_session_where_it_was(target: str) -> None:
+    solver, x, _ = prepared("xxz", target)
+    session = solver.session(x).step(0.05)
+    before = session.x
+    with pytest.raises(StepError, match="not finite"):
+        session.kick(np.full(x.shape, 1.7e308)).kick(np.full(x.shape, 1.7e308))
+    session.x = before
+    with pytest.raises(ValueError, match="must have shape"):
+        session.kick(x[:, :4])
+    np.testing.assert_array_equal(session.x, before)
+    assert session.casimirs["C"].shape == x.shape[1:]
