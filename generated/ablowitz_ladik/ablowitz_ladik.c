@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: e6df7a8cb8470a49401ff7ba7c20c284756bed07fcff8ac0293248a636ea81cb
+ * body-sha256: 4ac76abbcf84aa85d7ae5f4d6bca73591a1ebe8dcba021cdcfcd77fa88d65950
  */
 #include "ablowitz_ladik.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const ablowitz_ladik_params ablowitz_ladik_default_params = { 0 };
@@ -684,4 +688,8 @@ size_t ablowitz_ladik_solver_steps_done(const ablowitz_ladik_solver *s) { return
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

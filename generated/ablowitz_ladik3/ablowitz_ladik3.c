@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: d4d94c2ad36a7ae995670f878990df91d9fba0a6c211ad4e5e723197b2131c96
+ * body-sha256: 1772ea7541c5417fbe60bbcd92a71035a540e4aa07175ee6967a19fda1a737f9
  */
 #include "ablowitz_ladik3.h"
 
@@ -44,7 +44,7 @@ static const double ablowitz_ladik3_fractions[ablowitz_ladik3_STAGES] = { 0.4144
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
 /* everything that depends on parameters and step size only */
-static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double h, double coef[restrict 3])
+static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double h, double coef[3])
 {
     (void)params;
     coef[0] = 2.0 * h;
@@ -53,8 +53,8 @@ static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
-static void ablowitz_ladik3_generate(const double coef[3], const double y[6], double slope[restrict 6],
-    double jacobian[restrict 36])
+static void ablowitz_ladik3_generate(const double coef[3], const double y[6], double slope[6],
+    double jacobian[36])
 {
     const double x1 = y[0], y1 = y[1], x2 = y[2], y2 = y[3], x3 = y[4], y3 = y[5];
     /* slope */

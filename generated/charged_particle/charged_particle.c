@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: a236a9eec60369b6477e82a7e65655a3c99cde016eaa99e8ebf69383ca7d1402
+ * body-sha256: 13fcb65bb75e2034e50940208dd21073dbd2bdaf10b38cbbaca8a194403417e2
  */
 #include "charged_particle.h"
 
@@ -39,8 +39,7 @@ enum { charged_particle_SERIES = 19 }; /* of a path, those of the coordinates fi
 enum { charged_particle_FIXED = 1 };   /* values that are constant along a path */
 
 /* everything that depends on parameters and step size only */
-static void charged_particle_prepare(const charged_particle_params *params, double h,
-    double coef[restrict 14])
+static void charged_particle_prepare(const charged_particle_params *params, double h, double coef[14])
 {
     (void)params;
     const double t1 = h * h, t2 = h * t1, t3 = h * (1.0 / 5.0 + 1.0 / 150.0 * t1);
@@ -62,8 +61,8 @@ static void charged_particle_prepare(const charged_particle_params *params, doub
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
-static void charged_particle_generate(const double coef[14], const double y[6], double slope[restrict 6],
-    double jacobian[restrict 36])
+static void charged_particle_generate(const double coef[14], const double y[6], double slope[6],
+    double jacobian[36])
 {
     const double x = y[0], y_ = y[1], z = y[2], u = y[3], v = y[4], w = y[5];
     /* slope */

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 42a647d65dbd8239b9bef23e5e20d91812d11adeba9f0e61193e5e55f3f9ad3a
+ * body-sha256: 377fe664c6e999d4e059732308407b74ed7d15b54e731d547d08bded10359776
  */
 #include "chiral_magnet.h"
 
@@ -31,6 +31,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const chiral_magnet_params chiral_magnet_default_params = { 1.0, 0.5, NULL, NULL, 0.1, 0.15 };
@@ -1156,4 +1160,8 @@ size_t chiral_magnet_solver_steps_done(const chiral_magnet_solver *s) { return s
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

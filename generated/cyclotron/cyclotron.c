@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 187d5aa82f100107313b942dcc559ee27040ae51798884823d0f0295ad9eb371
+ * body-sha256: dc1177bd8aa8454e8ee48f72eeac0aace92c2abdb4b4983c9c033bc6debf1390
  */
 #include "cyclotron.h"
 
@@ -36,7 +36,7 @@ enum { cyclotron_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define cyclotron_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
-static void cyclotron_prepare(const cyclotron_params *params, double h, double coef[restrict 3])
+static void cyclotron_prepare(const cyclotron_params *params, double h, double coef[3])
 {
     (void)params;
     const double t1 = h * (h * h);
@@ -47,8 +47,8 @@ static void cyclotron_prepare(const cyclotron_params *params, double h, double c
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void cyclotron_linearise(const double coef[3], const double y[3], double displacement[restrict 3],
-    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
+static void cyclotron_linearise(const double coef[3], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double u = y[0], v = y[1], b = y[2];
     /* momenta */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 09fa12c71169efe5843113c3d5eb14f4a088ab6366a21a2d10aecf4f9cafcdf0
+ * body-sha256: 2cbd74cfae8051c2197957559a56560a9e27fdc1e63cae0bca7c1ab95917d7b4
  */
 #include "dnls.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const dnls_params dnls_default_params = { 1.0 };
@@ -612,4 +616,8 @@ size_t dnls_solver_steps_done(const dnls_solver *s) { return s->steps; }
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

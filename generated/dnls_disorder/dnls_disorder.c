@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a173801cc4fd87c23117081f0a6876ce6a8bed4806359e3ab879e954860e3413
+ * body-sha256: 163af8ae55009d830700d95cbd72d1af3dd2c72e97d3aebec1abab5e804a7b40
  */
 #include "dnls_disorder.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const dnls_disorder_params dnls_disorder_default_params = { 0.72, NULL };
@@ -699,4 +703,8 @@ size_t dnls_disorder_solver_steps_done(const dnls_disorder_solver *s) { return s
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -26,7 +26,7 @@
  *   6. Noise
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 84959247ab731c844b6a4bbbb964abbd37aa4a4f2b51de22ffb3c423e5e85752
+ * body-sha256: 4ed6ab04a909d887d2cc75e54f8d708bccd3aaeb8557c2617b2903873738e2a9
  */
 #include "double_well.h"
 
@@ -53,13 +53,13 @@ static int double_well_allowed(const double_well_params *params)
 }
 
 /* everything that depends on the increments of the noise, but not on the state */
-static void double_well_at_step(const double coef[9], const double dw[1], double now[restrict 1])
+static void double_well_at_step(const double coef[9], const double dw[1], double now[1])
 {
     now[0] = coef[8] * dw[0];
 }
 
 /* everything that depends on parameters and step size only */
-static void double_well_prepare(const double_well_params *params, double h, double coef[restrict 9])
+static void double_well_prepare(const double_well_params *params, double h, double coef[9])
 {
     const double t1 = params->barrier * h, t2 = params->gamma * h;
     coef[0] = (-4.0) * t1;
@@ -75,8 +75,8 @@ static void double_well_prepare(const double_well_params *params, double h, doub
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void double_well_linearise(const double coef[10], const double y[2], double displacement[restrict 2],
-    double increment[restrict 2], double jacobian[restrict 4], double increment_jacobian[restrict 4])
+static void double_well_linearise(const double coef[10], const double y[2], double displacement[2],
+    double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double q = y[0], p = y[1];
     /* momenta */

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 6ad3648340fc1631ec526ea1a947463c51891362da0d9a6b79f653d31e3f678b
+ * body-sha256: ec58b5a7a3e01f42c59583cc585db28433ec989cacf40ae1940e2537c7a91fbc
  */
 #include "duffing.h"
 
@@ -46,7 +46,7 @@ static int duffing_allowed(const duffing_params *params)
 }
 
 /* everything that depends on the time, but not on the state */
-static void duffing_at_time(const double coef[22], double t, double now[restrict 11])
+static void duffing_at_time(const double coef[22], double t, double now[11])
 {
     const double t1 = coef[14] * t, t2 = cos(t1), t3 = coef[16] * t2, t4 = sin(t1), t5 = coef[19] * t4;
     const double t6 = coef[20] * t2;
@@ -64,7 +64,7 @@ static void duffing_at_time(const double coef[22], double t, double now[restrict
 }
 
 /* everything that depends on parameters and step size only */
-static void duffing_prepare(const duffing_params *params, double h, double coef[restrict 22])
+static void duffing_prepare(const duffing_params *params, double h, double coef[22])
 {
     const double t1 = h * h, t2 = h * t1, t3 = t2 * (0.125 - 3.0 / 80.0 * t1);
     const double t4 = h * (0.25 + t1 * (-1.0 / 12.0 + 1.0 / 48.0 * t1)), t5 = h * (t1 * t1);
@@ -98,8 +98,8 @@ static void duffing_prepare(const duffing_params *params, double h, double coef[
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void duffing_linearise(const double coef[33], const double y[2], double displacement[restrict 2],
-    double increment[restrict 2], double jacobian[restrict 4], double increment_jacobian[restrict 4])
+static void duffing_linearise(const double coef[33], const double y[2], double displacement[2],
+    double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double q = y[0], p = y[1];
     /* momenta */

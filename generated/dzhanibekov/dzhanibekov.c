@@ -24,7 +24,7 @@
  *   7. Between steps
  *   8. The solver
  *   9. Ensembles
- * body-sha256: bf92e8594e2885785a6892e4654bb1b4b17fb85e9373c6c09e7f0fa6e70591bc
+ * body-sha256: a10a6d6c05a051593f6712fa6a261d5f7556e48bdb04e15f9538f41bae847d11
  */
 #include "dzhanibekov.h"
 
@@ -98,7 +98,7 @@ static double dzhanibekov_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void dzhanibekov_prepare(const dzhanibekov_params *params, const double gauge[1], double h,
-    double coef[restrict 35])
+    double coef[35])
 {
     const double t1 = 1.0 / params->I1, t2 = h * h, t3 = h * t2, t4 = t1 * t1, t5 = 1.0 / params->I2;
     const double t6 = 1.0 / 24.0 * t5, t7 = 1.0 / 12.0 * gauge[0], t8 = 1.0 / params->I3;
@@ -204,8 +204,8 @@ static void dzhanibekov_prepare(const dzhanibekov_params *params, const double g
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void dzhanibekov_linearise(const double coef[35], const double y[3], double displacement[restrict 3],
-    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
+static void dzhanibekov_linearise(const double coef[35], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     /* momenta */
@@ -275,7 +275,7 @@ static void dzhanibekov_linearise(const double coef[35], const double y[3], doub
 }
 
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void dzhanibekov_products(const dzhanibekov_params *params, const double x[3], double out[restrict 3])
+static void dzhanibekov_products(const dzhanibekov_params *params, const double x[3], double out[3])
 {
     const double x1 = x[0], x2 = x[1], x3 = x[2];
     const double t1 = x3 / params->I3, t2 = x2 / params->I2, t3 = x1 / params->I1;
@@ -285,7 +285,7 @@ static void dzhanibekov_products(const dzhanibekov_params *params, const double 
 }
 
 /* what p = grad S_h(y) turns by, a quaternion less 1 */
-static void dzhanibekov_turn(const double coef[35], const double y[3], double turn[restrict 4])
+static void dzhanibekov_turn(const double coef[35], const double y[3], double turn[4])
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     const double t1 = x1 * x1, t2 = x2 * x2, t3 = x3 * x3;
@@ -306,7 +306,7 @@ static void dzhanibekov_turn(const double coef[35], const double y[3], double tu
 
 /* the gradient of the Casimirs that are taken from H */
 static void dzhanibekov_rate(const dzhanibekov_params *params, const double gauge[1], const double x[3],
-    double rate[restrict 3])
+    double rate[3])
 {
     (void)params;
     const double x1 = x[0], x2 = x[1], x3 = x[2];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: bf014adef24240fc74fdb723d1207bea33a8c4bf1117f763f03bee58167fd16a
+ * body-sha256: 583ad52f265026e2d83b2a3f1f0a0d450fff0c4a0ecc1cdb72e5f47514e5e8f6
  */
 #include "engel_geodesics.h"
 
@@ -36,7 +36,7 @@ enum { engel_geodesics_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define engel_geodesics_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
-static void engel_geodesics_prepare(const engel_geodesics_params *params, double h, double coef[restrict 3])
+static void engel_geodesics_prepare(const engel_geodesics_params *params, double h, double coef[3])
 {
     (void)params;
     const double t1 = h * (h * h);
@@ -47,9 +47,8 @@ static void engel_geodesics_prepare(const engel_geodesics_params *params, double
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void engel_geodesics_linearise(const double coef[3], const double y[4],
-    double displacement[restrict 4], double increment[restrict 4], double jacobian[restrict 16],
-    double increment_jacobian[restrict 16])
+static void engel_geodesics_linearise(const double coef[3], const double y[4], double displacement[4],
+    double increment[4], double jacobian[16], double increment_jacobian[16])
 {
     const double h1 = y[0], h2 = y[1], h3 = y[2], h4 = y[3];
     /* momenta */

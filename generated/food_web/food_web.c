@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: aecaa5f36ee78128fbd485df30db034d850d20014cede052047d5f83a41913bd
+ * body-sha256: 85ea3ffa30b16a95c82fbfd7b29d84456038f7200b49039c6f17e0306ca0a652
  */
 #include "food_web.h"
 
@@ -31,6 +31,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const food_web_params food_web_default_params = { NULL, NULL };
@@ -833,4 +837,8 @@ size_t food_web_solver_steps_done(const food_web_solver *s) { return s->steps; }
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 4f40a1de039dd42229e4b07baf3825bf0dc21772fff7dd0094db62eefe1ebf3d
+ * body-sha256: abe1fd3bdeee804c71e97c671807d00f16d0368301b596666af4f425297e59f6
  */
 #include "fput.h"
 
@@ -30,6 +30,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const fput_params fput_default_params = { 0.25, 0.1 };
@@ -671,4 +675,8 @@ size_t fput_solver_steps_done(const fput_solver *s) { return s->steps; }
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 272265976d46ac7471970fb123526598194f29a4f01bd9af81f3686ef993d707
+ * body-sha256: 1bd416825fd0a265978f89a69fb3f1e8ae034abc0030937bbd59255075610b44
  */
 #include "gaussian_moments.h"
 
@@ -93,8 +93,7 @@ static double gaussian_moments_phi1(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void gaussian_moments_prepare(const gaussian_moments_params *params, double h,
-    double coef[restrict 14])
+static void gaussian_moments_prepare(const gaussian_moments_params *params, double h, double coef[14])
 {
     const double t1 = h * h, t2 = t1 * t1, t3 = h * t2, t4 = params->g * params->g, t5 = t3 * t4;
     const double t6 = t3 * (params->k * t4), t7 = t3 * (params->g * t4);
@@ -116,9 +115,8 @@ static void gaussian_moments_prepare(const gaussian_moments_params *params, doub
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void gaussian_moments_linearise(const double coef[14], const double y[3],
-    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
-    double increment_jacobian[restrict 9])
+static void gaussian_moments_linearise(const double coef[14], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double a = y[0], b = y[1], c = y[2];
     /* momenta */

@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 35a91d5cc2e2855c7903fdc6b37bb588dd953f1142f6d0b48d2c572b31976665
+ * body-sha256: 7d6330119cb4f515420168f13c9a1383eea7bf911cfa58f2b71457cd2e7781ba
  */
 #include "guiding_centre.h"
 
@@ -51,7 +51,7 @@ static int guiding_centre_allowed(const guiding_centre_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void guiding_centre_prepare(const guiding_centre_params *params, double h, double coef[restrict 5])
+static void guiding_centre_prepare(const guiding_centre_params *params, double h, double coef[5])
 {
     const double t1 = params->kappa * params->kappa;
     coef[0] = t1 * (h * params->mu);
@@ -62,8 +62,8 @@ static void guiding_centre_prepare(const guiding_centre_params *params, double h
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
-static void guiding_centre_generate(const double coef[5], const double y[4], double slope[restrict 4],
-    double jacobian[restrict 16])
+static void guiding_centre_generate(const double coef[5], const double y[4], double slope[4],
+    double jacobian[16])
 {
     const double x = y[0], y_ = y[1], z = y[2], u = y[3];
     /* slope */

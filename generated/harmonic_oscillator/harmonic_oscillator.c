@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 909bc6fa7412dc71d0d314384213c0e101454cb6a29a64f223c9216688340382
+ * body-sha256: 33307d59a7f331201e939f337cb54f10049a8cf6e32526c3f56e931d89410fb7
  */
 #include "harmonic_oscillator.h"
 
@@ -43,8 +43,7 @@ static int harmonic_oscillator_allowed(const harmonic_oscillator_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params, double h,
-    double coef[restrict 5])
+static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params, double h, double coef[5])
 {
     const double t1 = 1.0 / params->m, t2 = 0.5 + 1.0 / 24.0 * (t1 * (params->k * (h * h)));
     const double t3 = h * params->k * t2, t4 = h * t1 * t2;
@@ -57,9 +56,8 @@ static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void harmonic_oscillator_linearise(const double coef[5], const double y[2],
-    double displacement[restrict 2], double increment[restrict 2], double jacobian[restrict 4],
-    double increment_jacobian[restrict 4])
+static void harmonic_oscillator_linearise(const double coef[5], const double y[2], double displacement[2],
+    double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double q = y[0], p = y[1];
     /* momenta */

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: 778bd0b692cf0bcd2a3895d79870bb870ed455fb0bde7068c236db72e9ad2306
+ * body-sha256: ebd680d19a1e19e30ee1c75fee751df97c7d60573364555f2877c60856d31416
  */
 #include "heisenberg.h"
 
@@ -30,6 +30,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const heisenberg_params heisenberg_default_params = { 1.0, NULL };
@@ -945,4 +949,8 @@ size_t heisenberg_solver_steps_done(const heisenberg_solver *s) { return s->step
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

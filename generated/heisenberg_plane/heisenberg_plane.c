@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b9e3048d7ee513ba7766acfce9b878f4bffa72a34b737662a3f8a4a1d06da22c
+ * body-sha256: 3ef4e667067a4cab0a21750a4ff3b1e0769a8110bc4bbd9141b5db1c28ffc688
  */
 #include "heisenberg_plane.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const heisenberg_plane_params heisenberg_plane_default_params = { 1.0, 0.9 };
@@ -735,4 +739,8 @@ size_t heisenberg_plane_solver_steps_done(const heisenberg_plane_solver *s) { re
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

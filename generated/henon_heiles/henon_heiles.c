@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 5d73f5bf0dc642fcecb9368683b1a1338ce16ac03087fe3c3b738dc9df6b73b0
+ * body-sha256: 38ebe7741c2ab8dae2a95e10cf99bc4ea31d05aec99309710529199fc32fdd7f
  */
 #include "henon_heiles.h"
 
@@ -36,7 +36,7 @@ enum { henon_heiles_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define henon_heiles_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
-static void henon_heiles_prepare(const henon_heiles_params *params, double h, double coef[restrict 24])
+static void henon_heiles_prepare(const henon_heiles_params *params, double h, double coef[24])
 {
     (void)params;
     const double t1 = h * h, t2 = h * t1, t3 = 1.0 / 24.0 * t1, t4 = h * (t1 * t1);
@@ -72,8 +72,8 @@ static void henon_heiles_prepare(const henon_heiles_params *params, double h, do
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void henon_heiles_linearise(const double coef[24], const double y[4], double displacement[restrict 4],
-    double increment[restrict 4], double jacobian[restrict 16], double increment_jacobian[restrict 16])
+static void henon_heiles_linearise(const double coef[24], const double y[4], double displacement[4],
+    double increment[4], double jacobian[16], double increment_jacobian[16])
 {
     const double x = y[0], y_ = y[1], px = y[2], py = y[3];
     /* momenta */

@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: a5025797102e56bf14599acf1ae8d3c02833321e753f49ab9d76ada4763e8d68
+ * body-sha256: b296959ff6bbd44002351797c3e0c1e2bfe44dcd2c2312f49fa75b87a3775c90
  */
 #include "kdv.h"
 
@@ -31,6 +31,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const kdv_params kdv_default_params = { 0.022, 0.015625 };
@@ -1004,4 +1008,8 @@ size_t kdv_solver_steps_done(const kdv_solver *s) { return s->steps; }
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

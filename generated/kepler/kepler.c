@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 6c7e6167c234c1435d99ffb4e7603eb66b199114045d14cf44bb1c5a22c5cf96
+ * body-sha256: a2b1b18d134f0db773d9fa0a2717b30ab3732aa2926cca382ab115e851d1922b
  */
 #include "kepler.h"
 
@@ -49,7 +49,7 @@ static int kepler_allowed(const kepler_params *params)
 #endif
 
 /* everything that depends on parameters and step size only */
-static void kepler_prepare(const kepler_params *params, double h, double coef[restrict 118])
+static void kepler_prepare(const kepler_params *params, double h, double coef[118])
 {
     const double t1 = h * params->mu, t2 = h * h, t3 = h * t2, t4 = params->mu * t3, t5 = (-0.125) * t4;
     const double t6 = h * (t2 * t2), t7 = params->mu * params->mu, t8 = t6 * t7, t9 = (-1.0 / 40.0) * t8;
@@ -189,8 +189,8 @@ static void kepler_prepare(const kepler_params *params, double h, double coef[re
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 2) */
 kepler_APART static void kepler_linearise_part1(const double coef[118], const double y[4],
-    double displacement[restrict 4], double increment[restrict 4], double jacobian[restrict 16],
-    double increment_jacobian[restrict 16], double work[restrict 36])
+    double displacement[4], double increment[4], double jacobian[16], double increment_jacobian[16],
+    double work[36])
 {
     const double x = y[0], y_ = y[1], px = y[2], py = y[3];
     work[19] = x * x;
@@ -397,8 +397,8 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 2) */
 kepler_APART static void kepler_linearise_part2(const double coef[118], const double y[4],
-    double displacement[restrict 4], double increment[restrict 4], double jacobian[restrict 16],
-    double increment_jacobian[restrict 16], double work[restrict 36])
+    double displacement[4], double increment[4], double jacobian[16], double increment_jacobian[16],
+    double work[36])
 {
     (void)displacement, (void)increment;
     const double x = y[0], y_ = y[1], px = y[2];
@@ -425,8 +425,8 @@ kepler_APART static void kepler_linearise_part2(const double coef[118], const do
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void kepler_linearise(const double coef[118], const double y[4], double displacement[restrict 4],
-    double increment[restrict 4], double jacobian[restrict 16], double increment_jacobian[restrict 16])
+static void kepler_linearise(const double coef[118], const double y[4], double displacement[4],
+    double increment[4], double jacobian[16], double increment_jacobian[16])
 {
     double work[36];
     kepler_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);

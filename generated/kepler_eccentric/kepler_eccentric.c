@@ -23,7 +23,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: c9d0de00477ac4e3f2fbbae7c1aa225de6ee52eaa6de00cdd6489c9f4f5213f1
+ * body-sha256: f22a1894131d68a722b96557fbbf841ed4d6ec9be18abb6631265879aefeed5a
  */
 #include "kepler_eccentric.h"
 
@@ -149,7 +149,7 @@ static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry
 
 /* everything that depends on parameters and the time of a flow only */
 static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, const double gauge[1],
-    double h, double coef[restrict 4])
+    double h, double coef[4])
 {
     coef[0] = gauge[0];
     coef[1] = h;
@@ -158,7 +158,7 @@ static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, 
 }
 
 /* the flow of H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted */
-static void kepler_eccentric_change1(const double coef[2], const double state[4], double change[restrict 4])
+static void kepler_eccentric_change1(const double coef[2], const double state[4], double change[4])
 {
     const double p1 = state[2], p2 = state[3];
     const double t1 = coef[0] + (0.5 * (p2 * p2) + 0.5 * (p1 * p1)), t2 = coef[1] / t1;
@@ -182,7 +182,7 @@ static inline void kepler_eccentric_flow1(const double *coef, double x[6], doubl
 
 /* the flow of H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 + q1**2)))) - (q2**2 +
    q1**2)**(-1/2): p1, p2 shifted */
-static void kepler_eccentric_change2(const double coef[4], const double state[4], double change[restrict 3])
+static void kepler_eccentric_change2(const double coef[4], const double state[4], double change[3])
 {
     const double q1 = state[0], q2 = state[1];
     const double t1 = q2 * q2, t2 = t1 + q1 * q1, t3 = 1.0 / sqrt(t2), t4 = t3 * (t3 * t3), t5 = 1.0 / t2;

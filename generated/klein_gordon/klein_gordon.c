@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 429cf475882e4052e176212a62113918936c2705f8f4cf770b6ae9d59b34d245
+ * body-sha256: aed57fe9c1948560a149c0d2042580fc1c003d66424197d3076d27394a4d4340
  */
 #include "klein_gordon.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const klein_gordon_params klein_gordon_default_params = { 0.2 };
@@ -582,4 +586,8 @@ size_t klein_gordon_solver_steps_done(const klein_gordon_solver *s) { return s->
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

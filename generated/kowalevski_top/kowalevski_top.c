@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 408c0df8bbd3a3ed37d7250fdca559cbb42d95090673359f5943c0d7d89e791e
+ * body-sha256: 86884b1c089037a662b05b308bfb4f407373dea80106a3d0f6e406b1b31261b4
  */
 #include "kowalevski_top.h"
 
@@ -36,6 +36,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const kowalevski_top_params kowalevski_top_default_params = { 0 };
@@ -3557,4 +3561,8 @@ kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 59c3916a1937d8ce7b7d5c56afc2ad5d557922818c323d8d991c78c765becbd7
+ * body-sha256: 8b7043061dd90fb3510f493684bf2ce7e85b75f3443569d724d8e91b55bc8d5f
  */
 #include "lagrange_top.h"
 
@@ -124,7 +124,7 @@ static double lagrange_top_phi2(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void lagrange_top_prepare(const lagrange_top_params *params, double h, double coef[restrict 8])
+static void lagrange_top_prepare(const lagrange_top_params *params, double h, double coef[8])
 {
     const double t1 = 1.0 / params->I3, t2 = 1.0 / params->I1, t3 = 1.0 / 12.0 * t2, t4 = h * (h * h);
     const double t5 = t4 * t2 * (1.0 / 24.0 * (t2 * t2) + t1 * (1.0 / 24.0 * t1 - t3));
@@ -142,8 +142,8 @@ static void lagrange_top_prepare(const lagrange_top_params *params, double h, do
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 2) */
 lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 113])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[113])
 {
     const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
     work[1] = coef[2] * (P2 * P2) + (coef[3] + coef[2] * (P1 * P1));
@@ -331,8 +331,8 @@ lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8]
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 2) */
 lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 113])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[113])
 {
     (void)displacement, (void)increment;
     const double P1 = y[0], P2 = y[1], P3 = y[2], G1 = y[3], G2 = y[4], G3 = y[5];
@@ -519,8 +519,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void lagrange_top_linearise(const double coef[8], const double y[6], double displacement[restrict 6],
-    double increment[restrict 6], double jacobian[restrict 36], double increment_jacobian[restrict 36])
+static void lagrange_top_linearise(const double coef[8], const double y[6], double displacement[6],
+    double increment[6], double jacobian[36], double increment_jacobian[36])
 {
     double work[113];
     lagrange_top_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);

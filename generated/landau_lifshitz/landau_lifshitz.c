@@ -24,7 +24,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: f45985599aeab3371137b296e48a5c4b1ba88bad307077c70fe99bd926316753
+ * body-sha256: 620eb0712205e5ad0ffd84dd4c3684ae4cfeeb5e331f85e2cf1417eccd2ccba6
  */
 #include "landau_lifshitz.h"
 
@@ -101,7 +101,7 @@ static double landau_lifshitz_phi1(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void landau_lifshitz_prepare(const landau_lifshitz_params *params, double h, double coef[restrict 6])
+static void landau_lifshitz_prepare(const landau_lifshitz_params *params, double h, double coef[6])
 {
     coef[0] = params->B * h;
     coef[1] = -(params->K * h);
@@ -113,9 +113,8 @@ static void landau_lifshitz_prepare(const landau_lifshitz_params *params, double
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void landau_lifshitz_linearise(const double coef[6], const double y[3],
-    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
-    double increment_jacobian[restrict 9])
+static void landau_lifshitz_linearise(const double coef[6], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x = y[0], y_ = y[1], z = y[2];
     /* momenta */

@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: a74b51b66943fef72c15e0e03421c6f47a54cf15b3b9045bad22afb95cd697bd
+ * body-sha256: 2f8c9758855abafae5fc5e8a8f7bb7129078e013931e93e3fcea7ea0878383b7
  */
 #include "lotka_volterra.h"
 
@@ -36,6 +36,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const lotka_volterra_params lotka_volterra_default_params = { 0 };
@@ -1683,4 +1687,8 @@ lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: dab3b5d865a21c276998c915958adaf7e0ebf9a381284eaa835e1cdcd2ebd562
+ * body-sha256: 1d9c040da80288e0c89cf82939891ffc07ada062eb8479ff91be0fd488311d39
  */
 #include "maxwell_bloch.h"
 
@@ -36,7 +36,7 @@ enum { maxwell_bloch_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define maxwell_bloch_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
-static void maxwell_bloch_prepare(const maxwell_bloch_params *params, double h, double coef[restrict 3])
+static void maxwell_bloch_prepare(const maxwell_bloch_params *params, double h, double coef[3])
 {
     (void)params;
     const double t1 = h * (h * h);
@@ -47,8 +47,8 @@ static void maxwell_bloch_prepare(const maxwell_bloch_params *params, double h, 
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void maxwell_bloch_linearise(const double coef[3], const double y[3], double displacement[restrict 3],
-    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
+static void maxwell_bloch_linearise(const double coef[3], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x = y[0], y_ = y[1], z = y[2];
     /* momenta */

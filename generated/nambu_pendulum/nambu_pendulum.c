@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: 194b57db14022aa9c8a9f5d05ee3fe61ea55c9e75fae3cf72baf23d6bd6a66ec
+ * body-sha256: 64a04515e57d31d59f566b7342ed90d9614d9446a5103930b0d22ac7c9d6822a
  */
 #include "nambu_pendulum.h"
 
@@ -38,6 +38,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const nambu_pendulum_params nambu_pendulum_default_params = { 0 };
@@ -2428,4 +2432,8 @@ nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 7350a7c768da4129341401be9af522168622bb755d1366b541f0359d07524036
+ * body-sha256: 3e8449fe3b89545f0400f91361ea391044b758be0b08df5a1c8b4cc570b0fdb1
  */
 #include "nonlinear_wave.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const nonlinear_wave_params nonlinear_wave_default_params = { 1.0, 0.1 };
@@ -593,4 +597,8 @@ size_t nonlinear_wave_solver_steps_done(const nonlinear_wave_solver *s) { return
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

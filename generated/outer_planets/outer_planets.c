@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 485df6806fa1fecd9b0987859820ab7ef7df7f563571e072250e107c0674fc3b
+ * body-sha256: e58e144722b145fd432f00c49804f91639ae8e8378769a65eeb73ba3a458ca36
  */
 #include "outer_planets.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const outer_planets_params outer_planets_default_params = { 0.000295912208286, NULL };
@@ -715,4 +719,8 @@ size_t outer_planets_solver_steps_done(const outer_planets_solver *s) { return s
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 6e36a1388bde155bddb68926fbe2168ff72361ed8f8204ab204db72ca4f889d7
+ * body-sha256: 1d46d03081c12c518017f480e2b8eea38fae5aa158d159f1cfb3f3df22d4af1b
  */
 #include "pendulum.h"
 
@@ -42,7 +42,7 @@ static int pendulum_allowed(const pendulum_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void pendulum_prepare(const pendulum_params *params, double h, double coef[restrict 19])
+static void pendulum_prepare(const pendulum_params *params, double h, double coef[19])
 {
     const double t1 = h * h, t2 = h * t1, t3 = params->g * params->g, t4 = t2 * t3, t5 = h * (t1 * t1);
     const double t6 = t5 * (params->g * t3), t7 = t5 * t3, t8 = (-1.0 / 240.0) * t7;
@@ -70,8 +70,8 @@ static void pendulum_prepare(const pendulum_params *params, double h, double coe
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void pendulum_linearise(const double coef[19], const double y[2], double displacement[restrict 2],
-    double increment[restrict 2], double jacobian[restrict 4], double increment_jacobian[restrict 4])
+static void pendulum_linearise(const double coef[19], const double y[2], double displacement[2],
+    double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double q = y[0], p = y[1];
     /* momenta */

@@ -20,7 +20,7 @@
  *   4. Between steps
  *   5. The solver
  *   6. Ensembles
- * body-sha256: 408b90f63cc7df8a7faf0428ea13ddf90be536392c9c44007eacd5091a6627e8
+ * body-sha256: 3f3e875dee6e29712ef21532b5fe5e8a89271e5c52620aaec6dca267fad8969e
  */
 #include "pendulum_euler.h"
 
@@ -37,14 +37,14 @@ static int pendulum_euler_allowed(const pendulum_euler_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void pendulum_euler_prepare(const pendulum_euler_params *params, double h, double coef[restrict 2])
+static void pendulum_euler_prepare(const pendulum_euler_params *params, double h, double coef[2])
 {
     coef[0] = params->g * h;
     coef[1] = h;
 }
 
 /* the increment of one step from the state */
-static void pendulum_euler_explicit(const double coef[2], const double state[2], double increment[restrict 2])
+static void pendulum_euler_explicit(const double coef[2], const double state[2], double increment[2])
 {
     const double q = state[0], p = state[1];
     const double t1 = coef[0] * sin(q);

@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 749646a7431d35b2445dda71f595a4eb393914ec08aef4abfe019486292ae0f3
+ * body-sha256: 1c643f7ca7fc98e655252484c71f55cb9ec78b39ad0163f8f0b70e1b3d23d6a1
  */
 #include "point_vortices.h"
 
@@ -32,6 +32,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const point_vortices_params point_vortices_default_params = { NULL };
@@ -1156,4 +1160,8 @@ size_t point_vortices_solver_steps_done(const point_vortices_solver *s) { return
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

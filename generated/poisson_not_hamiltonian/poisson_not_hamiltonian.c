@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: a65b04b14165fd935154390e131383c8f5f85b9e196f353e9e77dac3ba90eeaa
+ * body-sha256: 55edd98f984a2d20d3f5e02d8dcac3e228534f02939784eee324ae0c55b69504
  */
 #include "poisson_not_hamiltonian.h"
 
@@ -38,7 +38,7 @@ enum { poisson_not_hamiltonian_MAX_ITERATIONS = 20 }; /* of an inner solve */
 
 /* everything that depends on parameters and step size only */
 static void poisson_not_hamiltonian_prepare(const poisson_not_hamiltonian_params *params, double h,
-    double coef[restrict 2])
+    double coef[2])
 {
     (void)params;
     coef[0] = 0.5 * h;
@@ -47,9 +47,8 @@ static void poisson_not_hamiltonian_prepare(const poisson_not_hamiltonian_params
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void poisson_not_hamiltonian_linearise(const double coef[2], const double y[3],
-    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
-    double increment_jacobian[restrict 9])
+static void poisson_not_hamiltonian_linearise(const double coef[2], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x = y[0], y_ = y[1], z = y[2];
     /* momenta */

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 44d28eec788b4934806fcca4b4613a7d5d3ddeb7d1250a4cfb89caa0a3293f22
+ * body-sha256: ee82c0cae396cfb08d2a2da05540c65e44092ce6d0ad2ee18d2d7045005a4535
  */
 #include "predator_prey.h"
 
@@ -44,7 +44,7 @@ static int predator_prey_allowed(const predator_prey_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void predator_prey_prepare(const predator_prey_params *params, double h, double coef[restrict 11])
+static void predator_prey_prepare(const predator_prey_params *params, double h, double coef[11])
 {
     const double t1 = params->death * h, t2 = h * h, t3 = h * t2;
     const double t4 = t3 * (params->gain * (params->attack * params->attack));
@@ -64,8 +64,8 @@ static void predator_prey_prepare(const predator_prey_params *params, double h, 
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void predator_prey_linearise(const double coef[11], const double y[2], double displacement[restrict 2],
-    double increment[restrict 2], double jacobian[restrict 4], double increment_jacobian[restrict 4])
+static void predator_prey_linearise(const double coef[11], const double y[2], double displacement[2],
+    double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double prey = y[0], predator = y[1];
     /* momenta */

@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: c4dfd33f75228de18119599920464d70778220fef0c5ddda2ffc044ff4c3e3da
+ * body-sha256: f4c9c440043a27b94021f1be63bb558170ff1e67a4c05d02f963e853deaa5c10
  */
 #include "rigid_body.h"
 
@@ -38,6 +38,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const rigid_body_params rigid_body_default_params = { 2.0, 1.0, 0.6666666666666666 };
@@ -2054,4 +2058,8 @@ rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, doub
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 98fab96545df9c856b5fb83fc23b0f388a92459429a82e0d9885eb3a16e7c2ff
+ * body-sha256: 94e561249b1a0d5257d16c914c45b7ec52e0b33261c400514401ed2fccdf54d1
  */
 #include "rigid_body_dual.h"
 
@@ -97,7 +97,7 @@ static double rigid_body_dual_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void rigid_body_dual_prepare(const rigid_body_dual_params *params, const double gauge[1], double h,
-    double coef[restrict 12])
+    double coef[12])
 {
     const double t1 = 1.0 / params->I1, t2 = gauge[0] * t1, t3 = h * (h * h), t4 = 1.0 / params->I3;
     const double t5 = t4 * t4, t6 = 1.0 / params->I2, t7 = gauge[0] * t6, t8 = 1.0 / 12.0 * t4;
@@ -123,9 +123,8 @@ static void rigid_body_dual_prepare(const rigid_body_dual_params *params, const 
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void rigid_body_dual_linearise(const double coef[12], const double y[3],
-    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
-    double increment_jacobian[restrict 9])
+static void rigid_body_dual_linearise(const double coef[12], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     /* momenta */
@@ -186,8 +185,7 @@ static void rigid_body_dual_linearise(const double coef[12], const double y[3],
 }
 
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void rigid_body_dual_products(const rigid_body_dual_params *params, const double x[3],
-    double out[restrict 3])
+static void rigid_body_dual_products(const rigid_body_dual_params *params, const double x[3], double out[3])
 {
     const double x1 = x[0], x2 = x[1], x3 = x[2];
     const double t1 = x3 / params->I3, t2 = x2 / params->I2, t3 = x1 / params->I1;

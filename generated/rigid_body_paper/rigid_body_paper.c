@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 30ceb753558d0e2e38535e7e0243b174a6c8498044d3071cd5bd96b4823c1cb0
+ * body-sha256: af36717d5de59703ca592f89ba93689381ce4f1db77a798034d873fed5fd28dc
  */
 #include "rigid_body_paper.h"
 
@@ -94,7 +94,7 @@ static double rigid_body_paper_phi1(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void rigid_body_paper_prepare(const rigid_body_paper_params *params, double h, double coef[restrict 3])
+static void rigid_body_paper_prepare(const rigid_body_paper_params *params, double h, double coef[3])
 {
     const double t1 = 0.5 * params->J2, t2 = 0.5 * params->J3, t3 = 0.5 * params->J1;
     coef[0] = 2.0 * (h * (t1 + t2));
@@ -104,9 +104,8 @@ static void rigid_body_paper_prepare(const rigid_body_paper_params *params, doub
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void rigid_body_paper_linearise(const double coef[3], const double y[3],
-    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
-    double increment_jacobian[restrict 9])
+static void rigid_body_paper_linearise(const double coef[3], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x1 = y[0], x2 = y[1], x3 = y[2];
     /* momenta */

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 73a7bc48af13c664e881608c194f219ffe2f9ed7bddf2daffb345be2b9d79f74
+ * body-sha256: c12ab7f03d15f5bd87890d9932ba9caa5d443b979ec4c390ad8e4473f9375440
  */
 #include "satellite.h"
 
@@ -130,7 +130,7 @@ static double satellite_phi2(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void satellite_prepare(const satellite_params *params, double h, double coef[restrict 7])
+static void satellite_prepare(const satellite_params *params, double h, double coef[7])
 {
     const double t1 = params->n * params->n;
     coef[0] = -(h * params->n);
@@ -145,8 +145,8 @@ static void satellite_prepare(const satellite_params *params, double h, double c
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 4) */
 satellite_APART static void satellite_linearise_part1(const double coef[7], const double y[9],
-    double displacement[restrict 9], double increment[restrict 9], double jacobian[restrict 81],
-    double increment_jacobian[restrict 81], double work[restrict 240])
+    double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
+    double work[240])
 {
     const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
         G3 = y[8];
@@ -361,8 +361,8 @@ satellite_APART static void satellite_linearise_part1(const double coef[7], cons
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 4) */
 satellite_APART static void satellite_linearise_part2(const double coef[7], const double y[9],
-    double displacement[restrict 9], double increment[restrict 9], double jacobian[restrict 81],
-    double increment_jacobian[restrict 81], double work[restrict 240])
+    double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
+    double work[240])
 {
     (void)increment, (void)increment_jacobian;
     const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
@@ -583,8 +583,8 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 4) */
 satellite_APART static void satellite_linearise_part3(const double coef[7], const double y[9],
-    double displacement[restrict 9], double increment[restrict 9], double jacobian[restrict 81],
-    double increment_jacobian[restrict 81], double work[restrict 240])
+    double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
+    double work[240])
 {
     (void)displacement, (void)increment, (void)increment_jacobian;
     const double m1 = y[0], N1 = y[3], G1 = y[6], G2 = y[7], G3 = y[8];
@@ -834,8 +834,8 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 4 of 4) */
 satellite_APART static void satellite_linearise_part4(const double coef[7], const double y[9],
-    double displacement[restrict 9], double increment[restrict 9], double jacobian[restrict 81],
-    double increment_jacobian[restrict 81], double work[restrict 240])
+    double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
+    double work[240])
 {
     (void)displacement, (void)increment;
     const double G1 = y[6], G2 = y[7], G3 = y[8];
@@ -868,8 +868,8 @@ satellite_APART static void satellite_linearise_part4(const double coef[7], cons
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void satellite_linearise(const double coef[7], const double y[9], double displacement[restrict 9],
-    double increment[restrict 9], double jacobian[restrict 81], double increment_jacobian[restrict 81])
+static void satellite_linearise(const double coef[7], const double y[9], double displacement[9],
+    double increment[9], double jacobian[81], double increment_jacobian[81])
 {
     double work[240];
     satellite_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -879,7 +879,7 @@ static void satellite_linearise(const double coef[7], const double y[9], double 
 }
 
 /* what p = grad S_h(y) turns by, a quaternion less 1 */
-static void satellite_turn(const double coef[7], const double y[9], double turn[restrict 4])
+static void satellite_turn(const double coef[7], const double y[9], double turn[4])
 {
     const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5];
     const double t1 = coef[3] * m3 + N3 * coef[0], t2 = coef[1] * m1 + N1 * coef[0];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: e6cc88e64d4a6c4ea5c3fa7904a0e59637a40cdb8e60b211b56566ea4b2f30da
+ * body-sha256: 562cd43da15057afa60107e39cc1c2ac9a4cb4b3ddeb394ad4e577e88e604608
  */
 #include "seasonal_predator_prey.h"
 
@@ -50,7 +50,7 @@ static int seasonal_predator_prey_allowed(const seasonal_predator_prey_params *p
 }
 
 /* everything that depends on the time, but not on the state */
-static void seasonal_predator_prey_at_time(const double coef[16], double t, double now[restrict 4])
+static void seasonal_predator_prey_at_time(const double coef[16], double t, double now[4])
 {
     const double t1 = coef[7] * t, t2 = cos(t1), t3 = coef[15] + coef[14] * t2;
     now[0] = coef[9] - 1.0 / 12.0 * (coef[8] * sin(t1)) + t2 * (coef[11] - 1.0 / 24.0 * (coef[10] * t2));
@@ -61,7 +61,7 @@ static void seasonal_predator_prey_at_time(const double coef[16], double t, doub
 
 /* everything that depends on parameters and step size only */
 static void seasonal_predator_prey_prepare(const seasonal_predator_prey_params *params, double h,
-    double coef[restrict 16])
+    double coef[16])
 {
     const double t1 = params->gamma * h, t2 = h * h, t3 = h * t2;
     const double t4 = t3 * (params->delta * (params->beta * params->beta));
@@ -89,9 +89,8 @@ static void seasonal_predator_prey_prepare(const seasonal_predator_prey_params *
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void seasonal_predator_prey_linearise(const double coef[20], const double y[2],
-    double displacement[restrict 2], double increment[restrict 2], double jacobian[restrict 4],
-    double increment_jacobian[restrict 4])
+static void seasonal_predator_prey_linearise(const double coef[20], const double y[2], double displacement[2],
+    double increment[2], double jacobian[4], double increment_jacobian[4])
 {
     const double x = y[0], y_ = y[1];
     /* momenta */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 560c67c0cd24fc42bcbe03ed70911a597d6e421485e8b82093028ed47fcdf0e5
+ * body-sha256: 966eadda4f89e8c05b9834be1b70ea04cbd27424b485b9b0f3dae9eb55c25132
  */
 #include "sine_gordon.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const sine_gordon_params sine_gordon_default_params = { 0.25 };
@@ -617,4 +621,8 @@ size_t sine_gordon_solver_steps_done(const sine_gordon_solver *s) { return s->st
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 0bd65948f56f01f83764cacdccb6681e111c534439e5770617cd0368e9ed2686
+ * body-sha256: b5353ac590ac97bde7acd0f47bc075684a36cedd28065fe4a2745a420ea57cca
  */
 #include "sir_epidemic.h"
 
@@ -45,7 +45,7 @@ static int sir_epidemic_allowed(const sir_epidemic_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, double coef[restrict 4])
+static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, double coef[4])
 {
     const double t1 = params->gamma * h;
     coef[0] = t1;
@@ -55,8 +55,8 @@ static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, do
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
-static void sir_epidemic_generate(const double coef[4], const double y[3], double slope[restrict 3],
-    double jacobian[restrict 9])
+static void sir_epidemic_generate(const double coef[4], const double y[3], double slope[3],
+    double jacobian[9])
 {
     const double S = y[0], I_ = y[1];
     /* slope */

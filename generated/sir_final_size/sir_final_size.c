@@ -20,7 +20,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 6879707149f65c7d5ffaeea86c4eb76a5b986c5b9c903990ba81760166982681
+ * body-sha256: ac8836297f48f1192dc52b9ed02b32a2f0702f8f9ceaa52dc83caa1b1b3e4b24
  */
 #include "sir_final_size.h"
 
@@ -44,7 +44,7 @@ static int sir_final_size_allowed(const sir_final_size_params *params)
 }
 
 /* everything that depends on parameters and step size only */
-static void sir_final_size_prepare(const sir_final_size_params *params, double h, double coef[restrict 3])
+static void sir_final_size_prepare(const sir_final_size_params *params, double h, double coef[3])
 {
     coef[0] = h;
     coef[1] = params->beta;
@@ -52,8 +52,8 @@ static void sir_final_size_prepare(const sir_final_size_params *params, double h
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
-static void sir_final_size_generate(const double coef[3], const double y[3], double slope[restrict 3],
-    double jacobian[restrict 9])
+static void sir_final_size_generate(const double coef[3], const double y[3], double slope[3],
+    double jacobian[9])
 {
     (void)y;
     /* slope */

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 9d483b13d796bc992a803785ac1c7d833508ce8fd519f430331348b4489afaf7
+ * body-sha256: cb9ee3fd278d3a45556da76c8813c86b57d0cd8e19a4219b6850710ed6882d0d
  */
 #include "sklyanin_gyrostat.h"
 
@@ -42,7 +42,7 @@ enum { sklyanin_gyrostat_FIXED = 1 };   /* values that are constant along a path
 
 /* everything that depends on parameters and step size only */
 static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, const double gauge[1], double h,
-    double coef[restrict 31])
+    double coef[31])
 {
     (void)params;
     const double t1 = h * (h * h), t2 = t1 * (3.0 / 400.0 - 1.0 / 60.0 * gauge[0]);
@@ -88,8 +88,8 @@ static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, co
 }
 
 /* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
-static void sklyanin_gyrostat_generate(const double coef[31], const double y[4], double slope[restrict 4],
-    double jacobian[restrict 16])
+static void sklyanin_gyrostat_generate(const double coef[31], const double y[4], double slope[4],
+    double jacobian[16])
 {
     const double S0 = y[0], S1 = y[1], S2 = y[2], S3 = y[3];
     /* slope */
@@ -136,7 +136,7 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
 
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
 static void sklyanin_gyrostat_products(const sklyanin_gyrostat_params *params, const double x[4],
-    double out[restrict 3])
+    double out[3])
 {
     (void)params;
     const double S1 = x[1], S2 = x[2], S3 = x[3];

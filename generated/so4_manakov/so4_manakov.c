@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: a3e10ec18f62bde4e7e5a9556a9269df96c28084609476cc307a28e3c07720d7
+ * body-sha256: 4a1c699cc9319b602772a5fb6a86a785b1479c6d0ab8139d515c061c03c6f94e
  */
 #include "so4_manakov.h"
 
@@ -97,7 +97,7 @@ static double so4_manakov_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void so4_manakov_prepare(const so4_manakov_params *params, const double gauge[1], double h,
-    double coef[restrict 32])
+    double coef[32])
 {
     (void)params;
     const double t1 = h * (h * h), t2 = t1 * (1.0 / 4320.0 - 1.0 / 432.0 * gauge[0]);
@@ -146,8 +146,8 @@ static void so4_manakov_prepare(const so4_manakov_params *params, const double g
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
 so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 130])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[130])
 {
     (void)jacobian, (void)increment_jacobian;
     const double x12 = y[0], x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4], x34 = y[5];
@@ -332,8 +332,8 @@ so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
 so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 130])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[130])
 {
     (void)displacement, (void)increment;
     const double x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4];
@@ -527,8 +527,8 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
 so4_manakov_APART static void so4_manakov_linearise_part3(const double coef[32], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 130])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[130])
 {
     (void)coef, (void)displacement, (void)increment, (void)jacobian;
     const double x12 = y[0], x13 = y[1], x14 = y[2], x23 = y[3], x24 = y[4], x34 = y[5];
@@ -569,8 +569,8 @@ so4_manakov_APART static void so4_manakov_linearise_part3(const double coef[32],
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void so4_manakov_linearise(const double coef[32], const double y[6], double displacement[restrict 6],
-    double increment[restrict 6], double jacobian[restrict 36], double increment_jacobian[restrict 36])
+static void so4_manakov_linearise(const double coef[32], const double y[6], double displacement[6],
+    double increment[6], double jacobian[36], double increment_jacobian[36])
 {
     double work[130];
     so4_manakov_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -579,7 +579,7 @@ static void so4_manakov_linearise(const double coef[32], const double y[6], doub
 }
 
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void so4_manakov_products(const so4_manakov_params *params, const double x[6], double out[restrict 3])
+static void so4_manakov_products(const so4_manakov_params *params, const double x[6], double out[3])
 {
     (void)params;
     const double x12 = x[0], x13 = x[1], x14 = x[2], x23 = x[3], x24 = x[4], x34 = x[5];

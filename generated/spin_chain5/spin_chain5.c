@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: efcb8fdde2bdd676118cb1acedc74b593bb2a7ada2e6ddbdd494797ce2ef4d79
+ * body-sha256: 7935d4c825aa17bf819486fac4c5bf902837204fcacd5d80a169007ad2199513
  */
 #include "spin_chain5.h"
 
@@ -103,7 +103,7 @@ static double spin_chain5_phi1(double s)
 
 /* everything that depends on parameters and step size only */
 static void spin_chain5_prepare(const spin_chain5_params *params, const double gauge[5], double h,
-    double coef[restrict 33])
+    double coef[33])
 {
     const double t1 = 1.0 / 6.0 * gauge[4], t2 = 1.0 / 6.0 * params->J, t3 = h * (h * h);
     const double t4 = params->J * params->J, t5 = t3 * t4, t6 = t5 * (t2 - t1);
@@ -151,8 +151,8 @@ static void spin_chain5_prepare(const spin_chain5_params *params, const double g
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     (void)displacement, (void)increment, (void)jacobian, (void)increment_jacobian;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
@@ -360,8 +360,8 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     (void)jacobian, (void)increment_jacobian;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
@@ -565,8 +565,8 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
         z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11], x5 = y[12], y5 = y[13], z5 = y[14];
@@ -765,8 +765,8 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 4 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     (void)displacement, (void)increment;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
@@ -969,8 +969,8 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 5 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     (void)displacement, (void)increment;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
@@ -1170,8 +1170,8 @@ spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 6 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     (void)displacement, (void)increment;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x3 = y[6], y3 = y[7], z3 = y[8], x4 = y[9], y4 = y[10],
@@ -1364,8 +1364,8 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 7 of 7) */
 spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33], const double y[15],
-    double displacement[restrict 15], double increment[restrict 15], double jacobian[restrict 225],
-    double increment_jacobian[restrict 225], double work[restrict 505])
+    double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
+    double work[505])
 {
     (void)displacement, (void)increment;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
@@ -1441,8 +1441,8 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void spin_chain5_linearise(const double coef[33], const double y[15], double displacement[restrict 15],
-    double increment[restrict 15], double jacobian[restrict 225], double increment_jacobian[restrict 225])
+static void spin_chain5_linearise(const double coef[33], const double y[15], double displacement[15],
+    double increment[15], double jacobian[225], double increment_jacobian[225])
 {
     double work[505];
     spin_chain5_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
@@ -1455,8 +1455,7 @@ static void spin_chain5_linearise(const double coef[33], const double y[15], dou
 }
 
 /* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
-static void spin_chain5_products(const spin_chain5_params *params, const double x[15],
-    double out[restrict 11])
+static void spin_chain5_products(const spin_chain5_params *params, const double x[15], double out[11])
 {
     const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7],
         z3 = x[8], x4 = x[9], y4 = x[10], z4 = x[11], x5 = x[12], y5 = x[13], z5 = x[14];

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: a2f8acbb8303d68868133b592af0027c0fbd863b286bf70ede41f03013116329
+ * body-sha256: b806a2bd6c82df64de2fde641a949b169139205f5d6c5ce8686e5b8d42166eb7
  */
 #include "spin_resonance.h"
 
@@ -97,7 +97,7 @@ static double spin_resonance_phi1(double s)
 }
 
 /* everything that depends on the time, but not on the state */
-static void spin_resonance_at_time(const double coef[7], double t, double now[restrict 8])
+static void spin_resonance_at_time(const double coef[7], double t, double now[8])
 {
     const double t1 = coef[1] * t, t2 = cos(t1), t3 = sin(t1), t4 = t3 * t3, t5 = t2 * t2;
     now[0] = coef[2] * t2;
@@ -111,7 +111,7 @@ static void spin_resonance_at_time(const double coef[7], double t, double now[re
 }
 
 /* everything that depends on parameters and step size only */
-static void spin_resonance_prepare(const spin_resonance_params *params, double h, double coef[restrict 7])
+static void spin_resonance_prepare(const spin_resonance_params *params, double h, double coef[7])
 {
     const double t1 = h * h, t2 = h * t1, t3 = params->b * params->b;
     coef[0] = params->D * h;
@@ -126,9 +126,8 @@ static void spin_resonance_prepare(const spin_resonance_params *params, double h
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void spin_resonance_linearise(const double coef[15], const double y[3],
-    double displacement[restrict 3], double increment[restrict 3], double jacobian[restrict 9],
-    double increment_jacobian[restrict 9])
+static void spin_resonance_linearise(const double coef[15], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double m1 = y[0], m2 = y[1], m3 = y[2];
     /* momenta */

@@ -28,7 +28,7 @@
  *   6. Noise
  *   7. The solver
  *   8. Ensembles
- * body-sha256: dd3c6ce7902ce3b428a0bb615176485cf423d115af4d16b92964d6e3655e48fc
+ * body-sha256: c0a4ff9398bd6290a59799c4c376205fa9034a410e0d91e9348b738d01e0c55e
  */
 #include "thermal_chain.h"
 
@@ -113,7 +113,7 @@ static double thermal_chain_phi1(double s)
 }
 
 /* everything that depends on the increments of the noise, but not on the state */
-static void thermal_chain_at_step(const double coef[5], const double dw[12], double now[restrict 12])
+static void thermal_chain_at_step(const double coef[5], const double dw[12], double now[12])
 {
     now[0] = coef[4] * dw[2];
     now[1] = coef[4] * dw[1];
@@ -130,7 +130,7 @@ static void thermal_chain_at_step(const double coef[5], const double dw[12], dou
 }
 
 /* everything that depends on parameters and step size only */
-static void thermal_chain_prepare(const thermal_chain_params *params, double h, double coef[restrict 5])
+static void thermal_chain_prepare(const thermal_chain_params *params, double h, double coef[5])
 {
     coef[0] = -(params->J * h);
     coef[1] = params->J;
@@ -142,8 +142,8 @@ static void thermal_chain_prepare(const thermal_chain_params *params, double h, 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 4) */
 thermal_chain_APART static void thermal_chain_linearise_part1(const double coef[17], const double y[12],
-    double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
-    double increment_jacobian[restrict 144], double work[restrict 136])
+    double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
+    double work[136])
 {
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
         z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11];
@@ -352,8 +352,8 @@ thermal_chain_APART static void thermal_chain_linearise_part1(const double coef[
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 4) */
 thermal_chain_APART static void thermal_chain_linearise_part2(const double coef[17], const double y[12],
-    double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
-    double increment_jacobian[restrict 144], double work[restrict 136])
+    double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
+    double work[136])
 {
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
         z3 = y[8], x4 = y[9], y4 = y[10], z4 = y[11];
@@ -542,8 +542,8 @@ thermal_chain_APART static void thermal_chain_linearise_part2(const double coef[
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 4) */
 thermal_chain_APART static void thermal_chain_linearise_part3(const double coef[17], const double y[12],
-    double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
-    double increment_jacobian[restrict 144], double work[restrict 136])
+    double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
+    double work[136])
 {
     (void)displacement, (void)increment;
     const double x1 = y[0], y1 = y[1], z1 = y[2], x2 = y[3], y2 = y[4], z2 = y[5], x3 = y[6], y3 = y[7],
@@ -712,8 +712,8 @@ thermal_chain_APART static void thermal_chain_linearise_part3(const double coef[
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 4 of 4) */
 thermal_chain_APART static void thermal_chain_linearise_part4(const double coef[17], const double y[12],
-    double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
-    double increment_jacobian[restrict 144], double work[restrict 136])
+    double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
+    double work[136])
 {
     (void)coef, (void)displacement, (void)increment, (void)jacobian;
     const double x4 = y[9];
@@ -725,9 +725,8 @@ thermal_chain_APART static void thermal_chain_linearise_part4(const double coef[
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void thermal_chain_linearise(const double coef[17], const double y[12],
-    double displacement[restrict 12], double increment[restrict 12], double jacobian[restrict 144],
-    double increment_jacobian[restrict 144])
+static void thermal_chain_linearise(const double coef[17], const double y[12], double displacement[12],
+    double increment[12], double jacobian[144], double increment_jacobian[144])
 {
     double work[136];
     thermal_chain_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);

@@ -27,7 +27,7 @@
  *   6. Noise
  *   7. The solver
  *   8. Ensembles
- * body-sha256: f460489a6b8bb57418a2ef31c584b09e80fded1e9b396b08bf75aa13e2904e97
+ * body-sha256: 437c23da650005c91e497f702c437c395ac03f8d050018f652405d091de92cef
  */
 #include "thermal_spin.h"
 
@@ -105,7 +105,7 @@ static double thermal_spin_phi1(double s)
 }
 
 /* everything that depends on the increments of the noise, but not on the state */
-static void thermal_spin_at_step(const double coef[7], const double dw[3], double now[restrict 6])
+static void thermal_spin_at_step(const double coef[7], const double dw[3], double now[6])
 {
     const double t1 = coef[5] * dw[2], t2 = t1 - coef[6];
     now[0] = coef[5] * dw[0];
@@ -117,7 +117,7 @@ static void thermal_spin_at_step(const double coef[7], const double dw[3], doubl
 }
 
 /* everything that depends on parameters and step size only */
-static void thermal_spin_prepare(const thermal_spin_params *params, double h, double coef[restrict 7])
+static void thermal_spin_prepare(const thermal_spin_params *params, double h, double coef[7])
 {
     const double t1 = params->B * h;
     coef[0] = -t1;
@@ -131,8 +131,8 @@ static void thermal_spin_prepare(const thermal_spin_params *params, double h, do
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void thermal_spin_linearise(const double coef[13], const double y[3], double displacement[restrict 3],
-    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
+static void thermal_spin_linearise(const double coef[13], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double x = y[0], y_ = y[1], z = y[2];
     /* momenta */

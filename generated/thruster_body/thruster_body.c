@@ -24,7 +24,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fb9f104e0a76e88ecd6fee26fc539684b7e62f2260185d79892772c2fb056187
+ * body-sha256: 34050d79abe49c497e89405a805a62706054c8c87e5980bd17cbab749aa9968b
  */
 #include "thruster_body.h"
 
@@ -102,7 +102,7 @@ static double thruster_body_phi1(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void thruster_body_prepare(const thruster_body_params *params, double h, double coef[restrict 8])
+static void thruster_body_prepare(const thruster_body_params *params, double h, double coef[8])
 {
     const double t1 = params->drag * h;
     coef[0] = h / params->I1;
@@ -117,8 +117,8 @@ static void thruster_body_prepare(const thruster_body_params *params, double h, 
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void thruster_body_linearise(const double coef[8], const double y[3], double displacement[restrict 3],
-    double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
+static void thruster_body_linearise(const double coef[8], const double y[3], double displacement[3],
+    double increment[3], double jacobian[9], double increment_jacobian[9])
 {
     const double m1 = y[0], m2 = y[1], m3 = y[2];
     /* momenta */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 530e8633c3ba578019ddc20afea001e022e0f52d1ee8a6f76c352332170f6b39
+ * body-sha256: e0ff99bce4b66f0bb3dc874c55db1307fddd6e784680cd677235fb875a9b8f52
  */
 #include "toda.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const toda_params toda_default_params = { 0 };
@@ -586,4 +590,8 @@ size_t toda_solver_steps_done(const toda_solver *s) { return s->steps; }
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fe168747454693f402a21e179a3a19645e94adc93012f755a7c0d164bc938f28
+ * body-sha256: 3b55a7b8bf7651613d9d880b23163ea7e0139a0b504d8dc9ec1eb7f0ffbe2494
  */
 #include "toda3.h"
 
@@ -87,7 +87,7 @@ static double toda3_phi1(double s)
 }
 
 /* everything that depends on parameters and step size only */
-static void toda3_prepare(const toda3_params *params, double h, double coef[restrict 10])
+static void toda3_prepare(const toda3_params *params, double h, double coef[10])
 {
     (void)params;
     const double t1 = h * (h * h);
@@ -105,8 +105,8 @@ static void toda3_prepare(const toda3_params *params, double h, double coef[rest
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void toda3_linearise(const double coef[10], const double y[5], double displacement[restrict 5],
-    double increment[restrict 5], double jacobian[restrict 25], double increment_jacobian[restrict 25])
+static void toda3_linearise(const double coef[10], const double y[5], double displacement[5],
+    double increment[5], double jacobian[25], double increment_jacobian[25])
 {
     const double a1 = y[0], a2 = y[1], b1 = y[2], b2 = y[3], b3 = y[4];
     /* momenta */

@@ -22,13 +22,17 @@
  *   7. The solver
  *   8. Members of an ensemble
  *   9. Ensembles
- * body-sha256: a744335c3858ff7e41fe38894d6a2fe35363f8eacfac7007b08e6fd6ac6da5f2
+ * body-sha256: 61d269e69a54a81856c22a4bf13392137a2000626c480940738061dd6c1c4603
  */
 #include "toda3_quadratic.h"
 
 #include <float.h>
 #include <math.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const toda3_quadratic_params toda3_quadratic_default_params = { 0 };
@@ -957,3 +961,7 @@ toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_param
     all.status = status;
     return toda3_quadratic_run(&all);
 }
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
+#endif

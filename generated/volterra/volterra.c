@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 11cba1a1971ad337cdc9ccfa70b587ffcf88d8091feace65ab7399ae783c01af
+ * body-sha256: abf3da13f46989d3c86d4492a91924e4a2b05035266028b3a2aa412d5ae1b268
  */
 #include "volterra.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const volterra_params volterra_default_params = { 0 };
@@ -607,4 +611,8 @@ size_t volterra_solver_steps_done(const volterra_solver *s) { return s->steps; }
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 10fe86decb7bdd15c67884823b06c91d54007f4f96d50c33e034093b9981b720
+ * body-sha256: 0cf9b55daeb842c332b98f602f35e232a414376e435831e02ee836d8644d5521
  */
 #include "volterra5.h"
 
@@ -36,7 +36,7 @@ enum { volterra5_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define volterra5_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
 /* everything that depends on parameters and step size only */
-static void volterra5_prepare(const volterra5_params *params, double h, double coef[restrict 4])
+static void volterra5_prepare(const volterra5_params *params, double h, double coef[4])
 {
     (void)params;
     const double t1 = h * (h * h);
@@ -48,8 +48,8 @@ static void volterra5_prepare(const volterra5_params *params, double h, double c
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void volterra5_linearise(const double coef[4], const double y[5], double displacement[restrict 5],
-    double increment[restrict 5], double jacobian[restrict 25], double increment_jacobian[restrict 25])
+static void volterra5_linearise(const double coef[4], const double y[5], double displacement[5],
+    double increment[5], double jacobian[25], double increment_jacobian[25])
 {
     const double v1 = y[0], v2 = y[1], v3 = y[2], v4 = y[3], v5 = y[4];
     /* momenta */

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: fdaac42ab0e1dfd1fae78a23bf4b5977c0db271891d7178e0207414a49cc31b1
+ * body-sha256: ff3787a39e105649f44915f5c1bf3067533bba65a5665263c16faa2b39c3a447
  */
 #include "vortices3.h"
 
@@ -43,7 +43,7 @@ enum { vortices3_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #endif
 
 /* everything that depends on parameters and step size only */
-static void vortices3_prepare(const vortices3_params *params, double h, double coef[restrict 3])
+static void vortices3_prepare(const vortices3_params *params, double h, double coef[3])
 {
     (void)params;
     const double t1 = 1.0 / 3.141592653589793;
@@ -55,8 +55,8 @@ static void vortices3_prepare(const vortices3_params *params, double h, double c
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 1 of 4) */
 vortices3_APART static void vortices3_linearise_part1(const double coef[3], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 218])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[218])
 {
     const double x1 = y[0], y1 = y[1], x2 = y[2], y2 = y[3], x3 = y[4], y3 = y[5];
     work[6] = x1 - x3;
@@ -265,8 +265,8 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 2 of 4) */
 vortices3_APART static void vortices3_linearise_part2(const double coef[3], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 218])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[218])
 {
     (void)displacement, (void)increment;
     const double y1 = y[1], y2 = y[3];
@@ -473,8 +473,8 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 3 of 4) */
 vortices3_APART static void vortices3_linearise_part3(const double coef[3], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 218])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[218])
 {
     (void)y, (void)displacement, (void)increment;
     const double t1 = 1.0 / 3.0 * (work[87] * work[44]);
@@ -681,8 +681,8 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) (part 4 of 4) */
 vortices3_APART static void vortices3_linearise_part4(const double coef[3], const double y[6],
-    double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
-    double increment_jacobian[restrict 36], double work[restrict 218])
+    double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
+    double work[218])
 {
     (void)y, (void)displacement, (void)increment;
     const double t1 = work[178] + work[179];
@@ -713,8 +713,8 @@ vortices3_APART static void vortices3_linearise_part4(const double coef[3], cons
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
    increment, all with the momenta p = grad S_h(y) */
-static void vortices3_linearise(const double coef[3], const double y[6], double displacement[restrict 6],
-    double increment[restrict 6], double jacobian[restrict 36], double increment_jacobian[restrict 36])
+static void vortices3_linearise(const double coef[3], const double y[6], double displacement[6],
+    double increment[6], double jacobian[36], double increment_jacobian[36])
 {
     double work[218];
     vortices3_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);

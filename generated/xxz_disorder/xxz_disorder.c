@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d622f80d9810242d79410b020c33bac0411933371671ead775bab983f9e531b5
+ * body-sha256: e805ecc73bfb8dff59d0fad658ff37e27c6e9e5315ada07d62fdd495d8db6398
  */
 #include "xxz_disorder.h"
 
@@ -29,6 +29,10 @@
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#define restrict /* C++ has no such word, Microsoft's C not in the brackets of an array */
+#endif
 
 /* ---- The model ---- */
 const xxz_disorder_params xxz_disorder_default_params = { 1.0, 1.3, NULL };
@@ -694,4 +698,8 @@ size_t xxz_disorder_solver_steps_done(const xxz_disorder_solver *s) { return s->
 
 #if defined(__clang__)
 #pragma clang diagnostic pop
+#endif
+
+#if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
+#undef restrict
 #endif

@@ -61,6 +61,15 @@ def test_header_compiles_as_cpp(name, compiler, sources):
     run([tool(compiler), *_CPP_FLAGS.split(), "-fsyntax-only", "user.cpp"], sources)
 
 
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_all_c_is_cpp_as_well(compiler, tmp_path):
+    """As where a project compiles all its files so, or as Microsoft's compiler, which has no restrict in brackets."""
+    solvers = sorted(GENERATED.glob("*/*.c"))
+    after = "#include <stdlib.h>\nint restrict = 0; /* a macro no longer */\n"
+    write(tmp_path, {"all.cpp": "".join(f'#include "{path}"\n' for path in solvers) + after})
+    run([tool(compiler), "-std=c++17", "-Wall", "-Werror", "-Wvla", "-fsyntax-only", "all.cpp"], tmp_path)
+
+
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_all_solvers_can_be_one_translation_unit(compiler, tmp_path):
     """No name of one is a name of another, static ones and macros included."""

@@ -53,7 +53,8 @@ def printed(program: Program, step: Path, slopes: PathSlopes) -> str:
             for e in slopes.along
         ],
     }
-    return render("c", "path_lanes.c", own)
+    along = "\n" + render("c", "path_along_lanes.c", own) if used else ""
+    return render("c", "path_lanes.c", own) + along
 
 
 class _Show:

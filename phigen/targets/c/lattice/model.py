@@ -139,7 +139,9 @@ def model(program: Program, step: Sweeps) -> str:
     prepare = render("c", "middles.c", values) if timed else ""
     prepare += function(program, step.prepare)
     prepare += "\n" + function(program, step.refresh) if step.refresh else ""
-    return render("c", "lattice.c", values) + render("c", "lattice_allowed.c", values) + prepare
+    return (
+        "".join(render("c", f"{part}.c", values) for part in ("lattice", "lattice_flows", "lattice_allowed")) + prepare
+    )
 
 
 def _moments(step: Sweeps) -> list[float]:
