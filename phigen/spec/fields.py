@@ -200,6 +200,15 @@ SOURCE = Record(
     ),
 )
 
+#: Where keys of specs, and the time, belong that are looked for in runs.
+_BESIDE_RUNS = {
+    key: f"{key}: belongs beside runs, to the whole spec"
+    for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")
+} | {
+    "tolerance": "solver: {tolerance: …} belongs beside runs, to the whole spec",
+    "time": "start is the time at the start of a run, until that at its end",
+}
+
 RUN = Record(
     "a run",
     (
@@ -236,6 +245,7 @@ RUN = Record(
     ),
     one=("steps", "duration", "until"),
     exactly=True,
+    elsewhere=_BESIDE_RUNS,
 )
 
 AXIS = Record(
@@ -267,6 +277,11 @@ SWEEP = Record(
 def _switch(key: str, *words: str) -> Kind:
     return Choice(words)
 
+
+#: Keys of runs that are looked for beside them.
+_IN_RUNS = {f.key: f"{f.key}: belongs to a run, runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
+_IN_RUNS["step"] += "; monitor: adapts steps to the motion"
+_IN_RUNS["tolerance"] = "solver: {tolerance: …}; steps have one size, and their error is that of order and step"
 
 SPEC = Record(
     "a spec",
@@ -341,4 +356,5 @@ SPEC = Record(
         Field("sweeps", MapOf(RUN_NAME, SWEEP), "runs over ranges of parameters and initial values, for phigen sweep"),
     ),
     one=("order", "terms"),
+    elsewhere=_IN_RUNS,
 )

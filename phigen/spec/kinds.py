@@ -11,7 +11,7 @@ are known. A value with an error is reported and reads as ``None``, which is nev
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -296,7 +296,8 @@ class Record(Kind):
     """A mapping with fixed keys; reads as key → value, keys in error absent.
 
     ``one`` lists keys of which at most (``exactly``: exactly) one may be given; a key of ``instead`` does where one is
-    needed, and may stand beside it. ``example`` is shown to who writes something else than a mapping.
+    needed, and may stand beside it. ``example`` is shown to who writes something else than a mapping; ``elsewhere``
+    says of keys that are none here where they belong.
     """
 
     what: str
@@ -305,6 +306,7 @@ class Record(Kind):
     exactly: bool = False
     instead: tuple[str, ...] = ()
     example: str = ""
+    elsewhere: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def expected(self) -> str:  # type: ignore[override]
@@ -317,8 +319,7 @@ class Record(Kind):
         values = {}
         for name, (key, item) in node.entries.items():
             if name not in known:
-                hint = did_you_mean(name, known, MEANT) or "keys: " + ", ".join(known)
-                reader.error(key, f"{self.what} has no key {shown(name)}", hint)
+                reader.error(key, f"{self.what} has no key {shown(name)}", self._hint(name, known))
             else:
                 inner = (*path, name)
                 reader.locations[inner] = place(key, item)
@@ -327,6 +328,12 @@ class Record(Kind):
                     values[name] = value
         self.check_presence(node, reader)
         return values
+
+    def _hint(self, name: str, known: Iterable[str]) -> str:
+        """What is meant by the name of a key that is none."""
+        meant = MEANT.get(name, name)
+        misplaced = "" if meant in known else self.elsewhere.get(name) or self.elsewhere.get(meant, "")
+        return misplaced or did_you_mean(name, known, MEANT) or "keys: " + ", ".join(known)
 
     def instructions(self, node: Node) -> str:
         """How the mapping is written, for who wrote something else: where that is the name of a key, with this key."""
