@@ -134,3 +134,29 @@ def test_a_step_too_large_for_one_member_is_that_of_no_other(target):
     for m, (h, I2) in {0: (0.1, 0.9), 2: (0.05, 1.2)}.items():
         alone = solve.integrate(start, h, 10, I2=I2).x[-1]
         np.testing.assert_allclose(many.value.trajectory[m], alone, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["rigid_body", "nambu_pendulum", "duffing"])
+def test_members_whose_guess_misleads_begin_again_with_their_own_numbers(name):
+    """The first members' coefficients, parameters, steps or times in place of their own would make other steps."""
+    compilation, few = compiled(name), np.array([1, 3])
+    module, (x, h, given) = solver(compilation, "numpy").backend.module, own(compilation, 4)
+    t0 = given.pop("t0", np.zeros(4))
+
+    def stage(members):
+        parameters = module._values({key: value[members] for key, value in given.items()})
+        made = module._coefficients(parameters, x[members], h[members], None)[0]
+        return module._renewed(made, t0[members], h[members]) if compilation.program.time else made
+
+    everybody, still = stage(np.arange(4)), np.zeros_like(x)
+    for found, alone in zip(module._stage_at(everybody, few), stage(few), strict=True):
+        for a, b in zip(found.values(), alone.values(), strict=True) if isinstance(alone, dict) else [(found, alone)]:
+            np.testing.assert_array_equal(a, b)
+    misled = still.copy()
+    misled[few] = 1e6 * (1 + x[few])
+    expected, *_ = module._advance(everybody, x, still, (still, still))
+    with np.errstate(all="ignore"):
+        assert (module._solved(everybody, x, still, misled)[3] != "").any()
+        found, _, _, status = module._advance(everybody, x, still, (misled, misled))
+    assert (status == "").all()
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-14 * np.max(np.abs(expected)))
