@@ -11,7 +11,7 @@ import click
 from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import prepared
 from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option
-from phigen.cli.tune_summary import described, print_tuning, unreached
+from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
 from phigen.errors import CheckError, SpecError
 
 if TYPE_CHECKING:
@@ -83,6 +83,8 @@ def command(
         out_json(described(found, spec, experiment.run))
     elif found.winner:
         print_tuning(found, spec, experiment.run)
+    elif found.monitors:
+        print_monitors(found.monitors, found, experiment.run)
     if plot:
         from phigen.drawing import figures
 

@@ -12,6 +12,7 @@ from phigen.cli.run_summary import finite
 
 if TYPE_CHECKING:
     from phigen.spec.model import Run, Spec
+    from phigen.tuning.monitors import Monitors, Trial
     from phigen.tuning.search import Curve
     from phigen.tuning.study import Finalist, Tuning
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 _OTHERS = (1e4, 1e2, 1e-2, 1e-4)
 #: An error so much below the accuracy did not decide the step.
 _SLACK = 20
+#: Monitors that are shown, and how many times fewer steps are worth a line.
+_SHOWN, _GAINING, _LONGEST = 5, 2.0, 60
 #: States that the proposed run stores.
 _ROWS = 1000
 
@@ -45,6 +48,47 @@ def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
     out("\n".join(lines_of(found.winner)))
     out(f"\nand into its run {run.name}, instead of step, stride, and steps or duration:\n")
     out("\n".join(f"    {line}" for line in run_lines_of(found, run)))
+    if found.monitors:
+        print_monitors(found.monitors, found, run)
+
+
+def print_monitors(monitors: Monitors, found: Tuning, run: Run) -> None:
+    """What monitors would gain, and the lines that ask for the best."""
+    from phigen.tuning.search import rounded_down
+
+    gaining = [t for t in monitors.found if monitors.gain(t) > _GAINING]
+    out(f"\nThe motion is fast at times. Steps up to t = {monitors.span:.6g}, for the same error of the energy:\n")
+    rows = [["monitor", "scheme", "steps", "fewer", "run, ms"]]
+    for trial in [*monitors.found[:_SHOWN], monitors.plain]:
+        gain = monitors.gain(trial)
+        told = [f"{trial.steps:.0f}", f"{gain:.3g} times", f"{1e3 * trial.seconds:.3g}"]
+        told = told if math.isfinite(trial.steps) else ["more than can be made", "", ""]
+        told[1] = told[1] * (trial is not monitors.plain and math.isfinite(gain))
+        rows.append([_cut(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *told])
+    for line in table(rows, right=[2, 3, 4]):
+        out(f"  {line}")
+    out("\n  With a monitor steps are equal in τ, and still Poisson maps.")
+    for reason in dict.fromkeys(monitors.refused.values()):
+        names = [_cut(m) for m, why in monitors.refused.items() if why == reason]
+        out(f"  Not measured: {'; '.join(names)}: {reason}.")
+    if gaining:
+        best = gaining[0]
+        out("\nTo paste into the spec" + ", in place of what is above" * bool(found.winner) + ":\n")
+        out("\n".join(monitored_lines(best)))
+        out(f"\nand into its run {run.name}, instead of step, stride, and steps or duration:\n")
+        step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(found.horizon, run.step)
+        out(f"    step: {step!r}\n    until: {end!r}")
+    else:
+        out("  None of them gains what a step with it costs.")
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…"
+
+
+def monitored_lines(trial: Trial) -> list[str]:
+    """The top-level lines of a spec that give what was measured of a monitor."""
+    return replace(trial.setting, order=trial.order).lines()
 
 
 def listed(found: Tuning) -> Iterator[tuple[str, Finalist]]:
@@ -197,9 +241,24 @@ def described(found: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
         "present": _finalist(found.present) if found.present else None,
         "curves": [_curve(c) for c in found.curves],
         "not_measured": {s.described(): why for s, why in found.refused.items()},
+        "monitors": _monitors(found.monitors) if found.monitors else None,
     }
     cleaned: dict[str, Any] = finite(data)
     return cleaned
+
+
+def _monitors(monitors: Monitors) -> dict[str, Any]:
+    return {
+        "time": monitors.span,
+        "without": _trial(monitors.plain),
+        "with": [_trial(t) | {"gain": monitors.gain(t), "lines": monitored_lines(t)} for t in monitors.found],
+        "not_measured": dict(monitors.refused),
+    }
+
+
+def _trial(t: Trial) -> dict[str, Any]:
+    keys = ("order", "step", "steps", "error", "seconds")
+    return {"monitor": t.setting.monitor, "method": t.label, **{key: getattr(t, key) for key in keys}}
 
 
 def _finalist(f: Finalist) -> dict[str, Any]:

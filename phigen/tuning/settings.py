@@ -10,8 +10,10 @@ from phigen.geometry.system import System
 from phigen.scheme import choosing
 from phigen.scheme.composition import COMPOSITIONS
 from phigen.spec import limits
+from phigen.spec.grammar import Scope, parse
 from phigen.spec.model import BirealisationChoice, Spec
-from phigen.spec.names import BIREALISATIONS
+from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
+from phigen.symbolic.expression import Expression, symbol
 
 #: What the spec itself says, where that cannot be said by a name: formulas, or options of a kind.
 OWN = "as in the spec"
@@ -32,7 +34,8 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 class Setting:
     """One way to solve a system; ``kind`` and ``gauge`` may be `OWN`. ``of`` is that of products and pull-backs.
 
-    A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``.
+    A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``. ``monitor`` is that of the spec if it
+    is empty.
     """
 
     kind: str
@@ -40,6 +43,7 @@ class Setting:
     gauge: str = "auto"
     composition: str = "none"
     of: str = "auto"
+    monitor: str = ""
 
     @property
     def family(self) -> Setting:
@@ -79,6 +83,7 @@ class Setting:
         lines = [f"scheme: {SPLITTING if self.is_splitting else 'series'}"]
         lines += [] if kind == OWN else [f"birealisation: {named}"]
         lines += [f"order: {self.order}", f"composition: {self.composition}"]
+        lines += [f"monitor: {self.monitor}"] if self.monitor else []
         return lines if self.gauge == OWN else [*lines, f"gauge: {self.gauge}"]
 
     def applied(self, spec: Spec) -> Spec:
@@ -89,7 +94,19 @@ class Setting:
             spec, scheme=SPLITTING if self.is_splitting else "series", birealisation=replace(choice, order=self.order),
             order=self.order, terms=None, composition=self.composition,
             gauge=spec.gauge if self.gauge == OWN else self.gauge,
+            monitor=monitor_of(self.monitor, spec) if self.monitor else spec.monitor,
         )  # fmt: skip
+
+
+def monitor_of(written: str, spec: Spec) -> str | Expression:
+    """What a monitor stands for that is written so: ``log``, or a function of coordinates and parameters."""
+    if written == LOGARITHMIC:
+        return LOGARITHMIC
+    names = (*spec.coordinates, *(p.name for p in spec.parameters))
+    found = parse(written, Scope({n: symbol(n) for n in names}), lambda *_, **__: None)
+    if found is None:
+        raise ValueError(f"{written!r} is no monitor")
+    return found
 
 
 def own_setting(compilation: Compilation) -> Setting:

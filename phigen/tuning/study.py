@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from statistics import median
@@ -10,17 +11,20 @@ from statistics import median
 from phigen.compilation import Compilation
 from phigen.study.conservation import Unit
 from phigen.tuning import search
-from phigen.tuning.problem import Problem, steps_in
+from phigen.tuning.monitors import Monitors, candidates, compare, is_uneven, settings
+from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.search import Curve
 from phigen.tuning.settings import Setting
 from phigen.tuning.timing import nanoseconds_per_step
-from phigen.tuning.trials import Point
+from phigen.tuning.trials import ROWS, Point
 from phigen.tuning.tuner import Clock, Notify, Tuner
 
 #: The share of the budget that one confirming run may take, how many times as much if it must, the attempts at a step.
 CONFIRMING, PATIENCE, ATTEMPTS = 0.05, 4.0, 4
 #: Finalists, how far behind the best they may be, and the rounds in which all are timed in turn.
 FINALISTS, BEHIND, ROUNDS = 4, 2.0, 7
+#: The share of the budget that monitors are tried for, beyond it.
+MONITORS = 0.5
 #: Costs this close are equal: then the lower order wins.
 EQUAL = 1.1
 
@@ -50,7 +54,8 @@ class Tuning:
     step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
     ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
     trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
-    ``unit`` is what errors of the energy are counted in.
+    ``unit`` is what errors of the energy are counted in; ``monitors`` what monitors would gain, where the spec has none
+    and the motion is fast at times.
     """
 
     measure: str
@@ -66,6 +71,7 @@ class Tuning:
     finished: bool = True
     orbit_error: float | None = None
     unit: Unit = field(default_factory=Unit)
+    monitors: Monitors | None = None
 
     @property
     def winner(self) -> Finalist | None:
@@ -105,7 +111,27 @@ def tune(
         next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
         {s: why for s, why in tuner.refused.items() if why}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
+        monitored(tuner, own),
     )  # fmt: skip
+
+
+def monitored(tuner: Tuner, own: Curve) -> Monitors | None:
+    """What monitors gain over the time of a scan; None where that is not asked, as the motion is even."""
+    compilation, problem = tuner.compilation, tuner.problem
+    spec, system, setting = compilation.spec, compilation.system, own.setting
+    if spec.monitor is not None or system.driven or setting is None:
+        return None
+    h = min(p.step for p in own.points)
+    states = tuner.methods[setting].rows(h, steps_in(tuner.piece, h), max(1, steps_in(tuner.piece, h) // ROWS))
+    method = tuner.methods[setting]
+    if states is None or not isinstance(method, Candidate):
+        return None
+    if not is_uneven(lambda x: method.solver.vector_field(x, problem.parameters), states):
+        return None
+    tuner.note("trying monitors")
+    wanted = settings(setting, own.order, list(candidates(system, problem.parameters, states)))
+    deadline = time.perf_counter() + MONITORS * tuner.clock.budget
+    return compare(spec, system, wanted, problem, states, tuner.piece, tuner.accuracy, deadline)
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:

@@ -1,0 +1,235 @@
+"""Monitors for a spec without one: which there might be, and how many steps each takes for the same error.
+
+Tried are powers of the distances that H has in denominators, roots and logarithms, powers of the speed |π∇H|, and
+``log`` where H splits in two. What each gains is counted in steps over the same time, at the same order, for the same
+error of the energy; a step in τ is found by halving, and by the order between two halves.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+import numpy as np
+
+from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.runtime.interface import BackendError
+from phigen.runtime.solver import Solver
+from phigen.spec.model import Spec
+from phigen.spec.names import LOGARITHMIC
+from phigen.symbolic.arrays import Floats, evaluate
+from phigen.symbolic.expression import (
+    ONE,
+    Expression,
+    gradient,
+    number,
+    power,
+    symbol,
+    symbols_of,
+    topological,
+    total,
+)
+from phigen.symbolic.numeric import DomainError
+from phigen.tuning.building import Built, Refusal, build_all
+from phigen.tuning.problem import Problem
+from phigen.tuning.scales import MOST_TURN, fastest_rate
+from phigen.tuning.settings import SPLITTING, Setting
+from phigen.tuning.trials import ROUNDING, ROWS
+
+#: Monitors are of use where the greatest speed is so many times the median one.
+UNEVEN = 3.0
+#: Distances that are looked at, at most; the quarters of powers of their squares that are tried, the likeliest first;
+#: and of 1 + the square of the speed.
+MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
+#: The order at which monitors are compared, at most; the fewest steps, and the seconds of one run.
+HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
+#: The share of the time that is left for runs when all is built.
+MEASURING = 0.25
+#: How often a step is halved, and how many times the steps of the method without a monitor are too many.
+HALVINGS, MOST = 30, 64
+
+
+@dataclass(frozen=True)
+class Trial:
+    """So many steps of a size in τ (in t, without a monitor) have the ``error`` over the time; inf if none has."""
+
+    setting: Setting
+    label: str
+    order: int
+    step: float
+    steps: float
+    error: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Monitors:
+    """What monitors gain over a ``span`` of time: steps equal in t, and all that were tried, the best first."""
+
+    span: float
+    plain: Trial
+    found: tuple[Trial, ...] = ()
+    refused: Mapping[str, str] = field(default_factory=dict)
+
+    def gain(self, trial: Trial) -> float:
+        """How many times fewer steps."""
+        return self.plain.steps / trial.steps
+
+
+def is_uneven(rates: Callable[[Floats], Floats], states: Floats) -> bool:
+    """Whether the motion by a vector field is much faster at times; ``states`` (rows, DIM) are at equal times."""
+    speeds = np.linalg.norm(rates(states), axis=1)
+    return bool(np.isfinite(speeds).all() and speeds.max() > UNEVEN * np.median(speeds))
+
+
+def candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
+    """Positive functions that are small where the motion is fast."""
+    columns: dict[str, Floats | float] = {**parameters}
+    columns |= {c: states[:, i] for i, c in enumerate(system.coordinates)}
+    bases = [b for b in _bases(system) if _is_positive(b, columns)][:MOST_BASES]
+    nearness = total(power(b, -1) for b in bases)
+    for k in QUARTERS:
+        if len(bases) > 1:
+            yield power(ONE + nearness, number(Fraction(-k, 4)))
+        yield from (power(b, number(Fraction(k, 4))) for b in bases if _is_square(b))
+    size = total(symbol(c) ** 2 for c in system.coordinates)
+    yield power(ONE + size, number(Fraction(-1, 2)))
+    rates = hamiltonian_vector_field(system.poisson, gradient(system.hamiltonian, system.coordinates))
+    speed = total(f * f for f in rates)
+    (found,) = evaluate([speed], columns)
+    scale = float(np.median(np.broadcast_to(found, len(states))))
+    if math.isfinite(scale) and scale > 0:
+        near = number(Fraction(f"{scale:.1e}"))
+        yield from (power(ONE + speed / near, number(Fraction(-k, 4))) for k in OF_SPEED)
+
+
+def _bases(system: System) -> list[Expression]:
+    """What stands in denominators, under roots and in logarithms of H, and moves."""
+    found: dict[str, Expression] = {}
+    for node in topological([system.hamiltonian]):
+        rooted = node.op == "pow" and (node.value < 0 or node.value != int(node.value))
+        if (rooted or node.op == "log") and any(s in system.coordinates for s in symbols_of(node.args[0])):
+            base = node.args[0]
+            while base.op == "pow" and base.value > 0:
+                base = base.args[0]
+            found.setdefault(str(base), base)
+    return list(found.values())
+
+
+def _is_square(b: Expression) -> bool:
+    """Whether it is the square of a distance rather than one: a sum."""
+    return b.op in ("add", "sub")
+
+
+def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
+    try:
+        (found,) = evaluate([b], columns)
+    except DomainError:
+        return False
+    return bool(np.all(np.isfinite(found)) and np.all(np.asarray(found) > 0))
+
+
+def settings(own: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
+    """The settings to be built: steps equal in t, and each monitor, at the same order."""
+    order = min(order + order % 2, HIGHEST)
+    series = Setting("auto", order, "none") if own.is_splitting else replace(own, order=order, gauge="none")
+    series = replace(series, composition="auto")
+    explicit = Setting(SPLITTING, order, "none", "auto", monitor=LOGARITHMIC)
+    return [series, explicit, *(replace(series, monitor=str(g)) for g in dict.fromkeys(monitors))]
+
+
+def compare(
+    spec: Spec,
+    system: System,
+    wanted: Sequence[Setting],
+    problem: Problem,
+    states: Floats,
+    span: float,
+    accuracy: float,
+    deadline: float,
+) -> Monitors | None:
+    """Each setting at the step that reaches the accuracy; the first is without a monitor, None if it cannot be built.
+
+    ``states`` (rows, DIM) are some along the motion.
+    """
+    building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
+    outcomes = dict(build_all(spec, system, wanted, building))
+    plain, *others = wanted
+    made = outcomes.get(plain)
+    if not isinstance(made, Built):
+        return None
+    first = _trial(made, problem, states, span, accuracy, span / problem.step, deadline)
+    trials, refused = [], {}
+    for setting in others:
+        outcome = outcomes.get(setting)
+        if isinstance(outcome, Built):
+            trials.append(_trial(outcome, problem, states, span, accuracy, first.steps, deadline))
+        elif isinstance(outcome, Refusal) and not outcome.inapplicable:
+            refused[setting.monitor] = outcome.reason
+    reached = [t for t in trials if math.isfinite(t.steps)]
+    return Monitors(span, first, tuple(sorted(reached, key=lambda t: t.steps)), refused)
+
+
+def _trial(
+    built: Built, problem: Problem, states: Floats, span: float, accuracy: float, most: float, deadline: float
+) -> Trial:
+    """The fewest steps with that error: their number is doubled until they have it, then taken by the order."""
+    solver = Solver(built.solver(), built.interface)
+    h, before = _largest(solver, problem, states), (math.nan, math.inf)
+    for _ in range(HALVINGS):
+        made = _run(solver, problem, span, h, MOST * max(most, FEWEST))
+        if made.error <= accuracy and math.isfinite(before[1]):
+            gained = math.log(before[1] / accuracy) / math.log(before[1] / max(made.error, ROUNDING))
+            finer = before[0] * math.pow(h / before[0], min(1.02 * gained, 1.0))
+            between = _run(solver, problem, span, finer, math.inf)
+            made = between if between.error <= accuracy else made
+        if made.error <= accuracy:
+            return Trial(built.setting, built.kind, built.order, made.h, made.steps, made.error, made.seconds)
+        if made.seconds >= SECONDS or time.perf_counter() > deadline:
+            break
+        before, h = (h, made.error), h / 2
+    return Trial(built.setting, built.kind, built.order, math.nan, math.inf, math.inf, 0.0)
+
+
+def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
+    """The largest step that shows the motion, in whose fastest turn it is."""
+    backend, given = solver.backend, problem.parameters
+
+    def moving(x: Floats) -> Floats:
+        rate = backend.rate(x, given)[:, np.newaxis] if solver.interface.monitored else 1.0
+        return np.asarray(rate * backend.vector_field(x, given))
+
+    return MOST_TURN / max(fastest_rate(moving, states[:: max(1, len(states) // 64)]), 1e-300)
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A run with one step: its largest error of the energy, inf if a step failed, and the seconds of CPU time."""
+
+    h: float
+    steps: float
+    error: float
+    seconds: float
+
+
+def _run(solver: Solver, problem: Problem, span: float, h: float, most: float) -> _Run:
+    """So many steps as reach the end of the span; none where they are more than ``most``, or take too long."""
+    begun, states = time.thread_time(), [problem.start]
+    session, done, passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
+    try:
+        while passed < span:
+            many = 1 + done // ROWS if solver.interface.monitored else max(1, int(span / h / ROWS))
+            session.advance(problem.direction * h, many)
+            done += many
+            passed = abs(session.time()) if solver.interface.monitored else done * h
+            states.append(session.state())
+            if done > most or time.thread_time() - begun > SECONDS:
+                return _Run(h, math.inf, math.inf, SECONDS)
+    except BackendError:
+        return _Run(h, 0, math.inf, time.thread_time() - begun)
+    seconds, energies = time.thread_time() - begun, problem.energies(np.array(states))
+    error = float(np.max(problem.unit.errors(energies, float(energies[0]))))
+    return _Run(h, done * span / passed, error if math.isfinite(error) else math.inf, seconds)

@@ -1,0 +1,95 @@
+"""Monitors that tune proposes: where H is singular, measured by steps for the same error of the energy."""
+
+import time
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from phigen import spec as specs
+from phigen.cli.tune_summary import print_monitors
+from phigen.compiler import compile_spec
+from phigen.tuning import monitors
+from phigen.tuning.problem import Problem
+from phigen.tuning.settings import Setting, own_setting
+
+KEPLER = """phigen: 1
+name: eccentric
+coordinates: [q1, q2, p1, p2]
+poisson: {canonical: {q: [q1, q2], p: [p1, p2]}}
+hamiltonian: (p1**2 + p2**2)/2 - 1/sqrt(q1**2 + q2**2)
+order: 2
+runs: {r: {initial: [0.1, 0, 0, 4.358898943540674], step: 0.01, duration: 13}}
+"""
+VORTICES = """phigen: 1
+name: pairs
+coordinates: [x1, y1, x2, y2, x3, y3]
+poisson: {canonical: {q: [x1, x2, x3], p: [y1, y2, y3]}}
+hamiltonian: -log((x1 - x2)**2 + (y1 - y2)**2) - log((x1 - x3)**2 + (y1 - y3)**2)
+order: 2
+"""
+START = np.array([0.1, 0.0, 0.0, np.sqrt(19.0)])
+
+
+def along_the_orbit(t, y):
+    r = np.hypot(*y[:2])
+    return [*y[2:], *(-y[:2] / r**3)]
+
+
+@pytest.fixture(scope="module")
+def states():
+    times = np.linspace(0, 13, 400)
+    return solve_ivp(along_the_orbit, (0, 13), START, method="DOP853", rtol=1e-9, t_eval=times).y.T
+
+
+def test_distances_are_found_where_h_has_them(states):
+    system = compile_spec(specs.loads(KEPLER)).system
+    assert {"(q1**2 + q2**2)**(3/4)", "sqrt(q1**2 + q2**2)"} <= {_sorted(g) for g in candidates(system, states)}
+    six = np.random.default_rng(1).normal(size=(20, 6))
+    found = [str(g) for g in candidates(compile_spec(specs.loads(VORTICES)).system, six)]
+    assert any(g.count("x1") == 2 and g.startswith("(1 + ") and g.endswith("**(-1/2)") for g in found)
+
+
+def candidates(system, states):
+    return list(monitors.candidates(system, {}, states))
+
+
+def _sorted(g):
+    return str(g).replace("q2**2 + q1**2", "q1**2 + q2**2")
+
+
+def test_only_a_motion_that_is_fast_at_times_asks_for_one(states):
+    assert monitors.is_uneven(lambda x: np.array([along_the_orbit(0, row) for row in x]), states)
+    assert not monitors.is_uneven(lambda x: x, np.ones((10, 2)))
+
+
+def test_monitors_take_fewer_steps_for_the_same_error_and_say_how_they_are_written(states):
+    spec = specs.loads(KEPLER)
+    compilation = compile_spec(spec)
+    problem = Problem(compilation.system, START, {}, 0.01, 13.0)
+    wanted = monitors.settings(own_setting(compilation), 2, [])
+    wanted.append(Setting(wanted[0].kind, 2, "none", wanted[0].composition, monitor="(q1**2 + q2**2)**(3/4)"))
+    found = monitors.compare(spec, compilation.system, wanted, problem, states, 13.0, 1e-3, time.perf_counter() + 60)
+    gains = {trial.setting.monitor: found.gain(trial) for trial in found.found}
+    assert gains["(q1**2 + q2**2)**(3/4)"] > 10
+    assert gains["log"] > gains["(q1**2 + q2**2)**(3/4)"]
+    assert all(trial.error <= 1e-3 for trial in found.found)
+    best = found.found[0]
+    assert "monitor: log" in best.setting.lines()
+    again = best.setting.applied(spec)
+    assert (again.monitor, again.scheme) == ("log", "splitting")
+
+
+def test_the_lines_of_the_best_monitor_are_printed(capsys):
+    plain = monitors.Trial(Setting("constant", 4, "none", "auto"), "constant", 4, 0.001, 36000.0, 1e-6, 0.04)
+    best = replace(plain, setting=replace(plain.setting, monitor="1/(1 + q1**2)"), step=0.0505, steps=1000.0)
+    run = specs.loads(KEPLER).runs["r"]
+    found = SimpleNamespace(winner=None, horizon=13.0)
+    print_monitors(monitors.Monitors(13.0, plain, (best,), {"q1**2": "late"}), found, run)
+    text = capsys.readouterr().out
+    assert "36 times" in text
+    assert "Not measured: q1**2: late." in text
+    assert "monitor: 1/(1 + q1**2)\n" in text
+    assert "    step: 0.0505\n    until: 13.0" in text
