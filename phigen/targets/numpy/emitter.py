@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from phigen.scheme.kernel import SCALARS, Kernel, Output
+from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import (
@@ -19,6 +20,7 @@ from phigen.scheme.steps import (
     InnerSolve,
     Newton,
     Path,
+    PathAdjoint,
     Splitting,
     Step,
     Sweeps,
@@ -31,7 +33,7 @@ from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import Scope
 from phigen.targets.numpy import lattice
 from phigen.targets.numpy.language import LANGUAGE
-from phigen.targets.path import Syntax, adjoint_program, statements, tangent_program
+from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
@@ -199,20 +201,32 @@ def _adjoint(program: Program, adjoint: Adjoint) -> list[str]:
         values |= _splitting_values(step) | {"kicks": bool(step.schedule.multiples)}
         values["adjoints"] = ", ".join(f"_{kernel.name}" for kernel in adjoint.steps)
         parts = ["splitting"]
-    if adjoint.path:
-        extended, path = adjoint_program(program, adjoint.path), adjoint.path
-        n, count = program.dimension, extended.dimension
-        values |= statements(extended, path.recurrences, PATH_SYNTAX)
-        values |= {"series": len(path.recurrences.series), "n_back": count, "used": repr(list(path.used))}
-        values["groups"] = repr([min(i // n, 3) for i in range(count)])
-        kernels += [] if program.extras.tangent else [path.curvature]
-        parts = ["holds", "piece", "path"]
+    if adjoint.path and isinstance(step, Path):
+        values |= _varied(program, step, adjoint.path)
+        kernels += [] if program.extras.tangent else [adjoint.path.curvature]
+        parts = ["piece", "path"]
     kernels += [program.monitor.level] if program.monitor and program.monitor.level else []
     values |= _of_pullback(program, step)
     parts = [*parts, *(["early"] if step.refresh else []), "run", "parameters"]
     pieces = [_function(program, kernel) for kernel in kernels]
     pieces += [render("numpy", f"adjoint_{part}.py", values) for part in parts]
     return [*pieces, render("numpy", "pullback.py", values)]
+
+
+def _varied(program: Program, step: Path, adjoint: PathAdjoint) -> dict[str, object]:
+    """A path with its derivatives along its start, p and the coefficients that π depends on, column by column."""
+    path, slopes, n = step.recurrences, adjoint.slopes, program.dimension
+    whole = Recurrences((*path.series, *slopes.series), path.slopes, (*path.fixed, *slopes.fixed))
+    along_p = [(e.row, n + e.column, e.series, True) for e in slopes.tensor]
+    along_c = [(e.row, 2 * n + e.column, e.series, False) for e in slopes.along]
+    return {
+        **statements(program, whole, PATH_SYNTAX),
+        "series": len(whole.series),
+        "width": 2 * n + len(adjoint.used),
+        "used": repr(list(adjoint.used)),
+        "jacobian": [(e.row, e.column, e.series) for e in slopes.jacobian],
+        "sources": [*along_p, *along_c],
+    }
 
 
 def _with_level(prepare: Kernel) -> Kernel:
