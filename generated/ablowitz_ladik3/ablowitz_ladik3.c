@@ -22,7 +22,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 1772ea7541c5417fbe60bbcd92a71035a540e4aa07175ee6967a19fda1a737f9
+ * body-sha256: 6e2af522bfdb6e79881376f6a91fc8d4efcd55914b79d2932254369b182cd064
  */
 #include "ablowitz_ladik3.h"
 
@@ -75,40 +75,29 @@ static void ablowitz_ladik3_generate(const double coef[3], const double y[6], do
     const double t27 = (-0.5) * (coef[1] * t26), t28 = t13 - t23, t29 = (-0.5) * (coef[1] * t28);
     const double t30 = (-0.5) * (coef[1] * t19), t31 = coef[2] * (x2 * y2 * (t11 * t11));
     const double t32 = (-0.5) * (coef[1] * t17), t33 = coef[2] * (x3 * y3 * (t15 * t15));
+    memset(jacobian, 0, 36 * sizeof jacobian[0]);
     jacobian[0] = 1.0 - 0.5 * (t17 * t18);
     jacobian[1] = (-0.5) * (t19 * (t5 * (coef[0] + coef[2] * (t4 * t5))));
-    jacobian[2] = 0.0;
     jacobian[3] = t22;
-    jacobian[4] = 0.0;
     jacobian[5] = t25;
     jacobian[6] = (-0.5) * (t17 * (t5 * (coef[0] + coef[2] * (t3 * t5))));
     jacobian[7] = 1.0 - 0.5 * (t19 * t18);
     jacobian[8] = t27;
-    jacobian[9] = 0.0;
     jacobian[10] = t29;
-    jacobian[11] = 0.0;
-    jacobian[12] = 0.0;
     jacobian[13] = t30;
     jacobian[14] = 1.0 - 0.5 * (t26 * t31);
     jacobian[15] = (-0.5) * (t21 * (t11 * (coef[0] + coef[2] * (t10 * t11))));
-    jacobian[16] = 0.0;
     jacobian[17] = t25;
     jacobian[18] = t32;
-    jacobian[19] = 0.0;
     jacobian[20] = (-0.5) * (t26 * (t11 * (coef[0] + coef[2] * (t9 * t11))));
     jacobian[21] = 1.0 - 0.5 * (t21 * t31);
     jacobian[22] = t29;
-    jacobian[23] = 0.0;
-    jacobian[24] = 0.0;
     jacobian[25] = t30;
-    jacobian[26] = 0.0;
     jacobian[27] = t22;
     jacobian[28] = 1.0 - 0.5 * (t28 * t33);
     jacobian[29] = (-0.5) * (t24 * (t15 * (coef[0] + coef[2] * (t14 * t15))));
     jacobian[30] = t32;
-    jacobian[31] = 0.0;
     jacobian[32] = t27;
-    jacobian[33] = 0.0;
     jacobian[34] = (-0.5) * (t28 * (t15 * (coef[0] + coef[2] * (t13 * t15))));
     jacobian[35] = 1.0 - 0.5 * (t24 * t33);
 }

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 13fcb65bb75e2034e50940208dd21073dbd2bdaf10b38cbbaca8a194403417e2
+ * body-sha256: 8a5261af418ff87c731fe6374f665410d5cfc4d4a87795f727205fb57da8ccb1
  */
 #include "charged_particle.h"
 
@@ -86,41 +86,24 @@ static void charged_particle_generate(const double coef[14], const double y[6], 
     const double t30 = 2.0 * (v * (coef[0] * y_)) + x * (t28 + u * (coef[3] + t29));
     const double t31 = t12 + y_ * (t7 + t13), t32 = y_ * (t9 + t14), t33 = 0.5 * t32;
     const double t34 = t17 + y_ * (y_ * t19), t35 = t20 + x * (x * t21);
+    memset(jacobian, 0, 36 * sizeof jacobian[0]);
     jacobian[0] = 1.0 + t23;
     jacobian[1] = 0.5 * t24;
-    jacobian[2] = 0.0;
     jacobian[3] = (-0.5) * (x * (2.0 * (u * (u * t25)) + v * (coef[4] + 2.0 * (v * t25))) + t11 - t26 * t24);
     jacobian[4] = (-0.5) * (t30 + t26 * t22);
-    jacobian[5] = 0.0;
     jacobian[6] = 0.5 * t31;
     jacobian[7] = 1.0 + t33;
-    jacobian[8] = 0.0;
     jacobian[9] = (-0.5) * (t30 - t26 * t32);
     jacobian[10] = (-0.5) * (y_ * (t28 + u * (coef[6] + t29)) + t15 + t26 * t31);
-    jacobian[11] = 0.0;
-    jacobian[12] = 0.0;
-    jacobian[13] = 0.0;
     jacobian[14] = 1.0;
-    jacobian[15] = 0.0;
-    jacobian[16] = 0.0;
     jacobian[17] = coef[12];
     jacobian[18] = 0.5 * t34;
-    jacobian[19] = 0.0;
-    jacobian[20] = 0.0;
     jacobian[21] = 1.0 - t23;
     jacobian[22] = (-0.5) * (t26 * t34 + t31);
-    jacobian[23] = 0.0;
-    jacobian[24] = 0.0;
     jacobian[25] = 0.5 * t35;
-    jacobian[26] = 0.0;
     jacobian[27] = (-0.5) * (t24 - t26 * t35);
     jacobian[28] = 1.0 - t33;
-    jacobian[29] = 0.0;
-    jacobian[30] = 0.0;
-    jacobian[31] = 0.0;
     jacobian[32] = coef[13];
-    jacobian[33] = 0.0;
-    jacobian[34] = 0.0;
     jacobian[35] = 1.0;
 }
 

@@ -21,7 +21,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: 583ad52f265026e2d83b2a3f1f0a0d450fff0c4a0ecc1cdb72e5f47514e5e8f6
+ * body-sha256: 7e9835b86fa481aeb1f8c257285725472ee09a30ff856ab194ae11dfcbf9d12a
  */
 #include "engel_geodesics.h"
 
@@ -87,22 +87,16 @@ static void engel_geodesics_linearise(const double coef[3], const double y[4], d
     jacobian[15] = 1.0;
     /* increment jacobian */
     const double t18 = h3 * t1;
+    memset(increment_jacobian, 0, 16 * sizeof increment_jacobian[0]);
     increment_jacobian[0] = t8;
     increment_jacobian[1] = t13 + t18;
     increment_jacobian[2] = p_h2 + (h3 * t12 + t14);
     increment_jacobian[3] = p_h3;
     increment_jacobian[4] = -t18;
-    increment_jacobian[5] = 0.0;
     increment_jacobian[6] = -(h3 * t7 + p_h1);
-    increment_jacobian[7] = 0.0;
     increment_jacobian[8] = -t17;
-    increment_jacobian[9] = 0.0;
     increment_jacobian[10] = -t8;
     increment_jacobian[11] = -p_h1;
-    increment_jacobian[12] = 0.0;
-    increment_jacobian[13] = 0.0;
-    increment_jacobian[14] = 0.0;
-    increment_jacobian[15] = 0.0;
 }
 
 double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const double x[4])

@@ -23,7 +23,7 @@
  *   6. Between steps
  *   7. The solver
  *   8. Ensembles
- * body-sha256: c12ab7f03d15f5bd87890d9932ba9caa5d443b979ec4c390ad8e4473f9375440
+ * body-sha256: c0de65dc38cf2b35fc1623838570f65aa95d41103fc43af0074451cd92af09d1
  */
 #include "satellite.h"
 
@@ -143,727 +143,690 @@ static void satellite_prepare(const satellite_params *params, double h, double c
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 4) */
+   increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
 satellite_APART static void satellite_linearise_part1(const double coef[7], const double y[9],
     double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
-    double work[240])
+    double work[263])
 {
+    (void)jacobian;
     const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
         G3 = y[8];
     const double t1 = N3 * coef[0];
-    work[20] = coef[3] * m3 + t1;
+    work[12] = coef[3] * m3 + t1;
     const double t2 = N1 * coef[0];
-    work[18] = coef[1] * m1 + t2;
+    work[1] = coef[1] * m1 + t2;
     const double t3 = N2 * coef[0];
-    work[27] = t3 + coef[2] * m2;
-    work[0] = G3 * coef[6];
-    work[2] = G2 * coef[5];
-    work[4] = coef[0] * m3;
-    work[6] = coef[0] * m2;
-    work[12] = G1 * coef[4];
-    work[15] = coef[0] * m1;
-    work[54] = work[20] * work[20];
-    work[55] = work[18] * work[18];
-    work[53] = work[27] * work[27];
-    work[70] = work[55] + work[53];
-    work[10] = work[54] + work[70];
-    work[21] = satellite_phi0(work[10]);
-    work[43] = G3 * work[18];
-    work[77] = G1 * work[20];
-    work[36] = work[43] - work[77];
-    work[61] = G1 * work[27];
-    work[44] = G2 * work[18];
-    work[37] = work[61] - work[44];
-    work[39] = N3 * work[18];
-    work[38] = N1 * work[20];
-    work[32] = work[39] - work[38];
-    work[56] = N1 * work[27];
-    work[40] = N2 * work[18];
-    work[33] = work[56] - work[40];
-    work[45] = G3 * work[12];
-    work[76] = G1 * work[0];
-    work[46] = N3 * work[15];
-    work[75] = N1 * work[4];
-    work[47] = m3 * work[18];
-    work[74] = m1 * work[20];
-    work[23] = work[45] - work[76] + (work[46] - work[75] + (work[47] - work[74]));
-    work[58] = G1 * work[2];
-    work[50] = G2 * work[12];
-    work[59] = N1 * work[6];
-    work[49] = N2 * work[15];
-    work[60] = m1 * work[27];
-    work[48] = m2 * work[18];
-    work[29] = work[58] - work[50] + (work[59] - work[49] + (work[60] - work[48]));
-    work[51] = work[0] * work[36] - work[2] * work[37] + (work[4] * work[32] - work[6] * work[33]
-        + (work[20] * work[23] - work[27] * work[29]));
-    work[22] = satellite_phi1(work[10]);
-    work[78] = G2 * work[20];
-    work[62] = G3 * work[27];
-    work[35] = work[78] - work[62];
-    work[178] = work[27] * work[35];
-    work[177] = work[18] * work[36];
-    work[3] = work[178] - work[177];
-    work[211] = work[18] * work[3];
-    work[102] = work[20] * work[36];
-    work[101] = work[27] * work[37];
-    work[34] = work[102] - work[101];
-    work[210] = work[20] * work[34];
-    work[25] = work[211] - work[210];
-    work[96] = work[27] * work[34];
-    work[84] = work[18] * work[37];
-    work[83] = work[20] * work[35];
-    work[1] = work[84] - work[83];
-    work[95] = work[18] * work[1];
-    work[13] = work[96] - work[95];
-    work[73] = N2 * work[20];
-    work[57] = N3 * work[27];
-    work[31] = work[73] - work[57];
-    work[134] = work[27] * work[31];
-    work[133] = work[18] * work[32];
-    work[7] = work[134] - work[133];
-    work[197] = work[18] * work[7];
-    work[72] = work[20] * work[32];
-    work[71] = work[27] * work[33];
-    work[30] = work[72] - work[71];
-    work[196] = work[20] * work[30];
-    work[26] = work[197] - work[196];
-    work[69] = work[27] * work[30];
-    work[42] = work[18] * work[33];
-    work[41] = work[20] * work[31];
-    work[5] = work[42] - work[41];
-    work[68] = work[18] * work[5];
-    work[16] = work[69] - work[68];
-    work[79] = G2 * work[0];
-    work[66] = G3 * work[2];
-    work[80] = N2 * work[4];
-    work[65] = N3 * work[6];
-    work[81] = m2 * work[20];
-    work[64] = m3 * work[27];
-    work[63] = work[79] - work[66] + (work[80] - work[65] + (work[81] - work[64]));
-    work[24] = work[2] * work[35] - work[12] * work[36] + (work[6] * work[31] - work[15] * work[32]
-        + (work[27] * work[63] - work[18] * work[23]));
-    work[185] = work[18] * work[24];
-    work[82] = work[20] * work[51];
-    work[28] = work[12] * work[3] - work[0] * work[34] + (work[15] * work[7] - work[4] * work[30]
-        + (work[185] - work[82]));
-    work[67] = work[27] * work[51];
-    work[11] = work[12] * work[37] - work[0] * work[35] + (work[15] * work[33] - work[4] * work[31]
-        + (work[18] * work[29] - work[20] * work[63]));
-    work[121] = work[18] * work[11];
-    work[19] = work[2] * work[34] - work[12] * work[1] + (work[6] * work[30] - work[15] * work[5]
-        + (work[67] - work[121]));
-    work[52] = work[10] * work[51] + (work[0] * work[25] - work[2] * work[13] + (work[4] * work[26]
-        - work[6] * work[16] + (work[20] * work[28] - work[27] * work[19])));
-    work[180] = work[20] * work[1];
-    work[179] = work[27] * work[3];
-    work[14] = work[180] - work[179];
-    work[159] = work[20] * work[5];
-    work[158] = work[27] * work[7];
-    work[17] = work[159] - work[158];
-    work[8] = work[20] * work[11];
-    work[9] = work[27] * work[24];
-    jacobian[33] = 0.0;
-    jacobian[34] = 0.0;
-    jacobian[35] = 0.0;
-    jacobian[42] = 0.0;
-    jacobian[43] = 0.0;
-    jacobian[44] = 0.0;
-    jacobian[51] = 0.0;
-    jacobian[52] = 0.0;
-    jacobian[53] = 0.0;
-    increment_jacobian[0] = 0.0;
-    increment_jacobian[3] = 0.0;
-    increment_jacobian[4] = 0.0;
-    increment_jacobian[5] = 0.0;
-    increment_jacobian[6] = 0.0;
-    increment_jacobian[10] = 0.0;
-    increment_jacobian[12] = 0.0;
-    increment_jacobian[13] = 0.0;
-    increment_jacobian[14] = 0.0;
-    increment_jacobian[16] = 0.0;
-    increment_jacobian[20] = 0.0;
-    increment_jacobian[21] = 0.0;
-    increment_jacobian[22] = 0.0;
-    increment_jacobian[23] = 0.0;
-    increment_jacobian[26] = 0.0;
-    increment_jacobian[27] = 0.0;
+    work[29] = t3 + coef[2] * m2;
+    work[17] = G3 * coef[6];
+    work[25] = G2 * coef[5];
+    work[14] = coef[0] * m3;
+    work[27] = coef[0] * m2;
+    work[19] = G1 * coef[4];
+    work[16] = coef[0] * m1;
+    work[40] = work[12] * work[12];
+    work[45] = work[1] * work[1];
+    work[39] = work[29] * work[29];
+    work[73] = work[45] + work[39];
+    work[31] = work[40] + work[73];
+    work[35] = satellite_phi0(work[31]);
+    work[96] = G3 * work[1];
+    work[85] = G1 * work[12];
+    work[84] = work[96] - work[85];
+    work[55] = G1 * work[29];
+    work[103] = G2 * work[1];
+    work[56] = work[55] - work[103];
+    const double t4 = N3 * work[1];
+    work[75] = N1 * work[12];
+    work[74] = t4 - work[75];
+    work[47] = N1 * work[29];
+    work[46] = N2 * work[1];
+    work[61] = work[47] - work[46];
+    work[7] = G3 * work[19];
+    work[82] = G1 * work[17];
+    work[8] = N3 * work[16];
+    work[81] = N1 * work[14];
+    work[9] = m3 * work[1];
+    work[80] = m1 * work[12];
+    work[10] = work[7] - work[82] + (work[8] - work[81] + (work[9] - work[80]));
+    work[52] = G1 * work[25];
+    work[24] = G2 * work[19];
+    work[53] = N1 * work[27];
+    work[23] = N2 * work[16];
+    work[54] = m1 * work[29];
+    work[22] = m2 * work[1];
+    work[21] = work[52] - work[24] + (work[53] - work[23] + (work[54] - work[22]));
+    work[32] = work[17] * work[84] - work[25] * work[56] + (work[14] * work[74] - work[27] * work[61]
+        + (work[12] * work[10] - work[29] * work[21]));
+    work[37] = satellite_phi1(work[31]);
+    work[86] = G2 * work[12];
+    work[58] = G3 * work[29];
+    work[57] = work[86] - work[58];
+    work[191] = work[29] * work[57];
+    work[190] = work[1] * work[84];
+    work[97] = work[191] - work[190];
+    work[239] = work[1] * work[97];
+    work[107] = work[12] * work[84];
+    work[106] = work[29] * work[56];
+    work[60] = work[107] - work[106];
+    work[238] = work[12] * work[60];
+    work[108] = work[239] - work[238];
+    work[105] = work[29] * work[60];
+    work[100] = work[1] * work[56];
+    work[99] = work[12] * work[57];
+    work[147] = work[100] - work[99];
+    work[104] = work[1] * work[147];
+    work[187] = work[105] - work[104];
+    work[79] = N2 * work[12];
+    work[49] = N3 * work[29];
+    work[48] = work[79] - work[49];
+    work[129] = work[29] * work[48];
+    work[128] = work[1] * work[74];
+    work[0] = work[129] - work[128];
+    work[218] = work[1] * work[0];
+    work[78] = work[12] * work[74];
+    work[77] = work[29] * work[61];
+    work[51] = work[78] - work[77];
+    work[217] = work[12] * work[51];
+    work[95] = work[218] - work[217];
+    work[72] = work[29] * work[51];
+    const double t5 = work[1] * work[61], t6 = work[12] * work[48];
+    work[5] = t5 - t6;
+    work[71] = work[1] * work[5];
+    work[123] = work[72] - work[71];
+    work[90] = G2 * work[17];
+    work[65] = G3 * work[25];
+    work[91] = N2 * work[14];
+    work[64] = N3 * work[27];
+    work[92] = m2 * work[12];
+    work[63] = m3 * work[29];
+    work[62] = work[90] - work[65] + (work[91] - work[64] + (work[92] - work[63]));
+    work[11] = work[25] * work[57] - work[19] * work[84] + (work[27] * work[48] - work[16] * work[74]
+        + (work[29] * work[62] - work[1] * work[10]));
+    work[206] = work[1] * work[11];
+    work[93] = work[12] * work[32];
+    work[94] = work[19] * work[97] - work[17] * work[60] + (work[16] * work[0] - work[14] * work[51]
+        + (work[206] - work[93]));
+    work[69] = work[29] * work[32];
+    work[30] = work[19] * work[56] - work[17] * work[57] + (work[16] * work[61] - work[14] * work[48]
+        + (work[1] * work[21] - work[12] * work[62]));
+    work[111] = work[1] * work[30];
+    work[70] = work[25] * work[60] - work[19] * work[147] + (work[27] * work[51] - work[16] * work[5]
+        + (work[69] - work[111]));
+    work[38] = work[31] * work[32] + (work[17] * work[108] - work[25] * work[187] + (work[14] * work[95]
+        - work[27] * work[123] + (work[12] * work[94] - work[29] * work[70])));
+    work[200] = work[12] * work[147];
+    work[199] = work[29] * work[97];
+    work[242] = work[200] - work[199];
+    work[160] = work[12] * work[5];
+    work[159] = work[29] * work[0];
+    work[224] = work[160] - work[159];
+    work[152] = work[12] * work[30];
+    work[220] = work[29] * work[11];
+    work[156] = work[17] * work[147] - work[25] * work[97] + (work[14] * work[5] - work[27] * work[0]
+        + (work[152] - work[220]));
+    work[118] = work[31] * work[30] + (work[19] * work[187] - work[17] * work[242] + (work[16] * work[123]
+        - work[14] * work[224] + (work[1] * work[70] - work[12] * work[156])));
+    work[211] = work[31] * work[11] + (work[25] * work[242] - work[19] * work[108] + (work[27] * work[224]
+        - work[16] * work[95] + (work[29] * work[156] - work[1] * work[94])));
+    work[246] = work[31] * work[51] + (work[12] * work[95] - work[29] * work[123]);
+    work[253] = work[31] * work[5] + (work[1] * work[123] - work[12] * work[224]);
+    work[254] = work[31] * work[0] + (work[29] * work[224] - work[1] * work[95]);
+    work[257] = work[31] * work[60] + (work[12] * work[108] - work[29] * work[187]);
+    work[261] = work[31] * work[147] + (work[1] * work[187] - work[12] * work[242]);
+    work[262] = work[31] * work[97] + (work[29] * work[242] - work[1] * work[108]);
+    work[76] = N2 * work[29];
+    work[50] = N3 * work[12];
+    work[15] = work[76] + work[50];
+    work[41] = work[15] * work[35];
+    work[42] = work[15] * work[31];
+    work[109] = work[75] - t4 - t4;
+    work[3] = work[12] * work[15];
+    work[43] = work[0] + (work[1] * work[109] - work[3]);
+    work[4] = work[29] * work[15];
+    work[28] = work[61] - work[46];
+    work[6] = work[1] * work[28];
+    work[44] = t6 - t5 + (work[4] - work[6]);
+    work[66] = G3 * work[17];
+    work[87] = G2 * work[25];
+    work[67] = N3 * work[14];
+    work[88] = N2 * work[27];
+    work[89] = m2 * work[29];
+    work[68] = m3 * work[12];
+    work[13] = work[66] + work[87] + (work[67] + work[88] + (work[89] + work[68]));
+    work[36] = work[1] * work[37];
+    work[20] = work[96] + work[84];
+    work[83] = G2 * work[29];
+    work[59] = G3 * work[12];
+    work[18] = work[83] + work[59];
+    work[98] = work[12] * work[18];
+    work[33] = work[97] - work[1] * work[20] - work[98];
+    work[101] = work[29] * work[18];
+    work[26] = work[56] - work[103];
+    work[102] = work[1] * work[26];
+    work[34] = work[101] - (work[102] + work[147]);
+    work[2] = t4 + work[74];
     increment_jacobian[28] = -(N3 * coef[2]);
     increment_jacobian[29] = N2 * coef[3];
-    increment_jacobian[30] = 0.0;
-    increment_jacobian[33] = 0.0;
-    increment_jacobian[34] = 0.0;
-    increment_jacobian[35] = 0.0;
     increment_jacobian[36] = N3 * coef[1];
-    increment_jacobian[37] = 0.0;
     increment_jacobian[38] = -(N1 * coef[3]);
-    increment_jacobian[40] = 0.0;
-    increment_jacobian[42] = 0.0;
-    increment_jacobian[43] = 0.0;
-    increment_jacobian[44] = 0.0;
     increment_jacobian[45] = -(N2 * coef[1]);
     increment_jacobian[46] = N1 * coef[2];
-    increment_jacobian[47] = 0.0;
-    increment_jacobian[50] = 0.0;
-    increment_jacobian[51] = 0.0;
-    increment_jacobian[52] = 0.0;
-    increment_jacobian[53] = 0.0;
-    increment_jacobian[54] = 0.0;
     increment_jacobian[55] = -(G3 * coef[2]);
     increment_jacobian[56] = G2 * coef[3];
-    increment_jacobian[57] = 0.0;
-    increment_jacobian[60] = 0.0;
     increment_jacobian[63] = G3 * coef[1];
-    increment_jacobian[64] = 0.0;
     increment_jacobian[65] = -(G1 * coef[3]);
-    increment_jacobian[67] = 0.0;
-    increment_jacobian[70] = 0.0;
     increment_jacobian[72] = -(G2 * coef[1]);
     increment_jacobian[73] = G1 * coef[2];
-    increment_jacobian[74] = 0.0;
-    increment_jacobian[77] = 0.0;
-    increment_jacobian[80] = 0.0;
-    increment_jacobian[1] = work[20] - (coef[2] * m3 + t1);
-    increment_jacobian[9] = coef[1] * m3 + t1 - work[20];
-    increment_jacobian[31] = work[20] - t1;
-    increment_jacobian[39] = t1 - work[20];
-    increment_jacobian[61] = work[20];
-    increment_jacobian[69] = -work[20];
-    increment_jacobian[11] = work[18] - (coef[3] * m1 + t2);
-    increment_jacobian[19] = t2 + coef[2] * m1 - work[18];
-    increment_jacobian[41] = work[18] - t2;
-    increment_jacobian[49] = t2 - work[18];
-    increment_jacobian[71] = work[18];
-    increment_jacobian[79] = -work[18];
-    increment_jacobian[2] = coef[3] * m2 + t3 - work[27];
-    increment_jacobian[18] = work[27] - (coef[1] * m2 + t3);
-    increment_jacobian[32] = t3 - work[27];
-    increment_jacobian[48] = work[27] - t3;
-    increment_jacobian[62] = -work[27];
-    increment_jacobian[78] = work[27];
-    increment_jacobian[7] = work[0] - G3 * coef[5];
-    increment_jacobian[15] = G3 * coef[4] - work[0];
-    increment_jacobian[8] = G2 * coef[6] - work[2];
-    increment_jacobian[24] = work[2] - G2 * coef[4];
-    increment_jacobian[17] = work[12] - G1 * coef[6];
-    increment_jacobian[25] = G1 * coef[5] - work[12];
-    increment[7] = work[36];
-    increment[8] = work[37];
-    increment[4] = work[32];
-    increment[5] = work[33];
-    increment[1] = work[23];
-    increment[2] = work[29];
-    increment[6] = work[35];
-    increment[3] = work[31];
-    increment[0] = work[63];
-    displacement[0] = work[21] * work[51] - work[22] * work[52] - 0.5 * work[63];
+    increment_jacobian[1] = work[12] - (coef[2] * m3 + t1);
+    increment_jacobian[9] = coef[1] * m3 + t1 - work[12];
+    increment_jacobian[31] = work[12] - t1;
+    increment_jacobian[39] = t1 - work[12];
+    increment_jacobian[61] = work[12];
+    increment_jacobian[69] = -work[12];
+    increment_jacobian[11] = work[1] - (coef[3] * m1 + t2);
+    increment_jacobian[19] = t2 + coef[2] * m1 - work[1];
+    increment_jacobian[41] = work[1] - t2;
+    increment_jacobian[49] = t2 - work[1];
+    increment_jacobian[71] = work[1];
+    increment_jacobian[79] = -work[1];
+    increment_jacobian[2] = coef[3] * m2 + t3 - work[29];
+    increment_jacobian[18] = work[29] - (coef[1] * m2 + t3);
+    increment_jacobian[32] = t3 - work[29];
+    increment_jacobian[48] = work[29] - t3;
+    increment_jacobian[62] = -work[29];
+    increment_jacobian[78] = work[29];
+    increment_jacobian[7] = work[17] - G3 * coef[5];
+    increment_jacobian[15] = G3 * coef[4] - work[17];
+    increment_jacobian[8] = G2 * coef[6] - work[25];
+    increment_jacobian[24] = work[25] - G2 * coef[4];
+    increment_jacobian[17] = work[19] - G1 * coef[6];
+    increment_jacobian[25] = G1 * coef[5] - work[19];
+    increment[7] = work[84];
+    increment[8] = work[56];
+    increment[4] = work[74];
+    increment[5] = work[61];
+    increment[1] = work[10];
+    increment[2] = work[21];
+    increment[6] = work[57];
+    increment[3] = work[48];
+    increment[0] = work[62];
+    displacement[0] = work[35] * work[32] - work[37] * work[38] - 0.5 * work[62];
+    displacement[1] = work[35] * work[30] - work[37] * work[118] - 0.5 * work[10];
+    displacement[2] = work[35] * work[11] - work[37] * work[211] - 0.5 * work[21];
+    displacement[3] = work[35] * work[51] - work[37] * work[246] - 0.5 * work[48];
+    displacement[4] = work[5] * work[35] - work[37] * work[253] - 0.5 * work[74];
+    displacement[5] = work[35] * work[0] - work[37] * work[254] - 0.5 * work[61];
+    displacement[6] = work[35] * work[60] - work[37] * work[257] - 0.5 * work[57];
+    displacement[7] = work[35] * work[147] - work[37] * work[261] - 0.5 * work[84];
+    displacement[8] = work[35] * work[97] - work[37] * work[262] - 0.5 * work[56];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 4) */
+   increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
 satellite_APART static void satellite_linearise_part2(const double coef[7], const double y[9],
     double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
-    double work[240])
-{
-    (void)increment, (void)increment_jacobian;
-    const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
-        G3 = y[8];
-    work[155] = work[0] * work[1] - work[2] * work[3] + (work[4] * work[5] - work[6] * work[7]
-        + (work[8] - work[9]));
-    work[127] = work[10] * work[11] + (work[12] * work[13] - work[0] * work[14] + (work[15] * work[16]
-        - work[4] * work[17] + (work[18] * work[19] - work[20] * work[155])));
-    work[190] = work[10] * work[24] + (work[2] * work[14] - work[12] * work[25] + (work[6] * work[17]
-        - work[15] * work[26] + (work[27] * work[155] - work[18] * work[28])));
-    work[215] = work[10] * work[30] + (work[20] * work[26] - work[27] * work[16]);
-    work[222] = work[10] * work[5] + (work[18] * work[16] - work[20] * work[17]);
-    work[223] = work[10] * work[7] + (work[27] * work[17] - work[18] * work[26]);
-    work[226] = work[10] * work[34] + (work[20] * work[25] - work[27] * work[13]);
-    work[228] = work[10] * work[1] + (work[18] * work[13] - work[20] * work[14]);
-    work[231] = work[10] * work[3] + (work[27] * work[14] - work[18] * work[25]);
-    const double t1 = N2 * work[27], t2 = N3 * work[20], t3 = t1 + t2;
-    work[213] = t3 * work[21];
-    work[214] = t3 * work[10];
-    work[115] = work[38] - work[39] - work[39];
-    const double t4 = work[20] * t3;
-    work[198] = work[7] + (work[18] * work[115] - t4);
-    const double t5 = work[27] * t3;
-    work[114] = work[33] - work[40];
-    const double t6 = work[18] * work[114];
-    work[129] = work[41] - work[42] + (t5 - t6);
-    const double t7 = G3 * work[0], t8 = G2 * work[2], t9 = N3 * work[4], t10 = N2 * work[6];
-    const double t11 = m2 * work[27], t12 = m3 * work[20], t13 = t7 + t8 + (t9 + t10 + (t11 + t12));
-    work[125] = work[18] * work[22];
-    work[117] = work[43] + work[36];
-    const double t14 = G2 * work[27], t15 = G3 * work[20], t16 = t14 + t15, t17 = work[20] * t16;
-    work[186] = work[3] - work[18] * work[117] - t17;
-    const double t18 = work[27] * t16;
-    work[116] = work[37] - work[44];
-    const double t19 = work[18] * work[116];
-    work[122] = t18 - (t19 + work[1]);
-    work[118] = work[39] + work[32];
-    work[187] = work[7] - work[18] * work[118] - t4;
-    work[123] = t5 - (work[5] + t6);
-    work[120] = work[45] + (work[46] + (work[47] + work[23]));
-    work[188] = work[24] - work[18] * work[120] - work[20] * t13 - (work[4] * t3 + work[15] * work[118])
-        - (work[0] * t16 + work[12] * work[117]);
-    work[119] = work[29] - work[48] - work[49] - work[50];
-    work[124] = work[2] * t16 - work[12] * work[116] + (work[6] * t3 - work[15] * work[114] + (work[27] * t13
-        - (work[11] + work[18] * work[119])));
-    const double t20 = work[10] * t13 + 2.0 * (work[18] * work[51]) + (work[0] * work[186]
-        - work[2] * work[122] + (work[4] * work[187] - work[6] * work[123] + (work[20] * work[188]
-        - work[27] * work[124])));
-    const double t21 = satellite_phi2(work[10]);
-    work[126] = work[18] * t21;
-    const double t22 = work[21] * t13 + 2.0 * (work[125] * work[51]) - (work[22] * t20
-        + 2.0 * (work[126] * work[52]));
-    const double t23 = work[53] + work[54];
-    work[98] = work[20] * work[18];
-    work[183] = work[18] * work[98] + work[20] * t23;
-    work[88] = work[27] * work[18];
-    work[113] = work[18] * work[88] + work[27] * t23;
-    work[216] = t23 * work[21] + work[22] * (work[20] * work[183] + work[27] * work[113] - t23 * work[10]);
-    work[111] = work[88] * work[21];
-    work[112] = work[88] * work[10];
-    work[87] = work[20] * work[27];
-    const double t24 = work[18] * work[87];
-    work[108] = work[20] * work[88];
-    work[93] = t24 - work[108];
-    work[90] = work[55] + work[54];
-    work[94] = work[27] * work[88] + work[18] * work[90];
-    work[110] = 0.5 * work[20];
-    work[218] = work[111] - work[22] * (work[112] + (work[20] * work[93] - work[27] * work[94])) - work[110];
-    work[130] = 0.5 * N3;
-    const double t25 = work[40] - work[56] - work[56];
-    work[132] = work[31] - work[57];
-    const double t26 = work[18] * work[132];
-    work[202] = t26 - work[20] * t25;
-    const double t27 = N1 * work[18];
-    work[131] = t27 + t2;
-    const double t28 = work[18] * work[131];
-    work[144] = work[30] + (work[27] * t25 - t28);
-    work[128] = 0.5 * m3;
-    work[142] = work[27] * work[22];
-    const double t29 = work[58] + (work[59] + (work[60] + work[29]));
-    work[143] = work[27] * t21;
-    work[227] = work[61] + work[37];
-    work[136] = work[35] - work[62];
-    work[91] = work[18] * work[136];
-    work[199] = work[20] * work[227] + work[91];
-    const double t30 = G1 * work[18];
-    work[135] = t15 + t30;
-    work[92] = work[18] * work[135];
-    work[139] = work[34] - work[27] * work[227] - work[92];
-    work[217] = work[56] + work[33];
-    work[200] = t26 + work[20] * work[217];
-    work[140] = work[30] - work[27] * work[217] - t28;
-    work[138] = work[63] - work[64] - work[65] - work[66];
-    work[201] = work[0] * work[227] + work[12] * work[136] + (work[15] * work[132] + work[4] * work[217]
-        + (work[18] * work[138] + work[20] * t29));
-    const double t31 = G1 * work[12], t32 = N1 * work[15], t33 = m1 * work[18];
-    work[137] = t7 + t31 + (t9 + t32 + (t12 + t33));
-    work[141] = work[51] - work[27] * t29 - work[18] * work[137] - (work[15] * work[131]
-        + work[6] * work[217]) - (work[12] * work[135] + work[2] * work[227]);
-    const double t34 = 2.0 * work[67] - work[10] * t29 + (work[0] * work[199] - work[2] * work[139]
-        + (work[4] * work[200] - work[6] * work[140] + (work[20] * work[201]
-        - (work[19] + work[27] * work[141]))));
-    const double t35 = work[128] + (2.0 * (work[142] * work[51]) - work[21] * t29
-        - (2.0 * (work[143] * work[52]) + work[22] * t34));
-    const double t36 = work[218]
-        + (coef[0] * (work[130] + (t25 * work[21] - work[22] * (work[10] * t25 + (work[68] - work[69]
-        + (work[20] * work[202] - work[27] * work[144]))))) + coef[2] * t35);
-    work[184] = 0.5 * work[27];
-    work[181] = work[98] * work[21];
-    work[182] = work[98] * work[10];
-    work[109] = work[27] * work[98];
-    work[106] = work[109] - t24;
-    work[107] = work[20] * work[98] + work[18] * work[70];
-    work[221] = work[184] + (work[181] - work[22] * (work[182] - (work[27] * work[106]
-        + work[20] * work[107])));
-    const double t37 = work[32] - work[38];
-    work[219] = t37 * work[21];
-    work[220] = t37 * work[10];
-    work[145] = t27 + t1;
-    const double t38 = work[18] * work[145], t39 = work[20] * t37;
-    work[208] = work[71] - work[72] + (t38 - t39);
-    const double t40 = work[27] * t37;
-    work[146] = work[57] - work[73] - work[73];
-    work[160] = t40 - work[18] * work[146];
-    work[195] = 0.5 * N2;
-    const double t41 = work[23] - work[74] - work[75] - work[76];
-    work[156] = work[20] * work[22];
-    work[157] = work[20] * t21;
-    work[147] = t14 + t30;
-    work[103] = work[18] * work[147];
-    work[100] = work[36] - work[77];
-    work[104] = work[20] * work[100];
-    work[204] = work[103] - (work[104] + work[34]);
-    work[148] = work[78] + work[35];
-    work[105] = work[27] * work[100];
-    work[152] = work[18] * work[148] + work[105];
-    work[205] = t38 - (work[30] + t39);
-    work[149] = work[73] + work[31];
-    work[153] = work[18] * work[149] + t40;
-    work[151] = t31 + t8 + (t32 + t10 + (t11 + t33));
-    work[206] = work[12] * work[147] - work[0] * work[100] + (work[15] * work[145] - work[4] * t37
-        + (work[18] * work[151] - (work[51] + work[20] * t41)));
-    work[150] = work[79] + (work[80] + (work[81] + work[63]));
-    work[154] = work[2] * work[100] + work[12] * work[148] + (work[15] * work[149] + work[6] * t37
-        + (work[27] * t41 + work[18] * work[150]));
-    const double t42 = work[10] * t41 + 2.0 * work[82] + (work[0] * work[204] - work[2] * work[152]
-        + (work[4] * work[205] - work[6] * work[153] + (work[28] + work[20] * work[206]
-        - work[27] * work[154])));
-    work[189] = 0.5 * m2;
-    const double t43 = work[21] * t41 + 2.0 * (work[156] * work[51]) - (2.0 * (work[157] * work[52])
-        + work[22] * t42) - work[189];
-    const double t44 = work[6] * work[27], t45 = work[4] * work[20], t46 = t44 + t45, t47 = t46 + t46;
-    const double t48 = work[4] * work[18] + work[15] * work[20];
-    work[193] = work[15] * work[98] + work[4] * t23 + (work[18] * t48 + work[20] * t47);
-    const double t49 = work[6] * work[18] + work[15] * work[27];
-    work[168] = work[15] * work[88] + work[6] * t23 + (work[18] * t49 + work[27] * t47);
-    work[166] = t49 * work[21];
-    work[167] = t49 * work[10];
-    const double t50 = work[15] * work[87];
-    work[161] = work[4] * work[88];
-    work[169] = work[4] * work[27] + work[6] * work[20];
-    const double t51 = work[18] * work[169];
-    work[163] = work[20] * t49;
-    work[203] = t50 - work[161] + (t51 - work[163]);
-    const double t52 = work[15] * work[18], t53 = t52 + t45;
-    work[170] = t53 + t53;
-    work[171] = work[6] * work[88] + work[15] * work[90] + (work[27] * t49 + work[18] * work[170]);
-    work[165] = 0.5 * work[4];
-    work[194] = 0.5 * work[6];
-    work[191] = t48 * work[21];
-    work[192] = t48 * work[10];
-    work[162] = work[6] * work[98];
-    work[164] = work[27] * t48;
-    work[173] = work[162] - t50 + (work[164] - t51);
-    const double t54 = t52 + t44;
-    work[172] = t54 + t54;
-    work[207] = work[4] * work[98] + work[15] * work[70] + (work[20] * t48 + work[18] * work[172]);
-    work[224] = t16 * work[21];
-    work[225] = t16 * work[10];
-    work[174] = work[77] - work[43] - work[43];
-    work[212] = work[3] + (work[18] * work[174] - t17);
-    work[176] = work[83] - work[84] + (t18 - t19);
-    work[89] = work[0] * work[20];
-    work[99] = work[2] * work[27];
-    const double t55 = work[89] + work[99], t56 = t55 + t55;
-    work[97] = work[12] * work[20] + work[0] * work[18];
-    work[209] = work[12] * work[98] + work[0] * t23 + (work[18] * work[97] + work[20] * t56);
-    work[86] = work[12] * work[27] + work[2] * work[18];
-    work[175] = work[12] * work[88] + work[2] * t23 + (work[18] * work[86] + work[27] * t56);
-    work[85] = coef[4] * (work[224] - work[22] * (work[225] + (work[20] * work[212] - work[27] * work[176])))
-        - (t56 * work[21] + work[22] * (work[2] * work[113] + work[0] * work[183] + (work[20] * work[209]
-        + work[27] * work[175]) - work[10] * t56));
-    displacement[1] = work[21] * work[11] - work[22] * work[127] - 0.5 * work[23];
-    displacement[2] = work[21] * work[24] - work[22] * work[190] - 0.5 * work[29];
-    displacement[3] = work[21] * work[30] - work[22] * work[215] - 0.5 * work[31];
-    displacement[4] = work[5] * work[21] - work[22] * work[222] - 0.5 * work[32];
-    displacement[5] = work[21] * work[7] - work[22] * work[223] - 0.5 * work[33];
-    displacement[6] = work[21] * work[34] - work[22] * work[226] - 0.5 * work[35];
-    displacement[7] = work[21] * work[1] - work[22] * work[228] - 0.5 * work[36];
-    displacement[8] = work[21] * work[3] - work[22] * work[231] - 0.5 * work[37];
-    jacobian[0] = 1.0 + (coef[0] * (work[213] - work[22] * (work[214] + (work[20] * work[198]
-        - work[27] * work[129]))) + coef[1] * t22 - work[216]);
-    jacobian[60] = 1.0 - work[216];
-    jacobian[61] = work[218];
-    jacobian[1] = t36;
-    jacobian[62] = work[221];
-    jacobian[2] = work[221]
-        + (coef[0] * (work[219] - work[22] * (work[220] + (work[26] + (work[20] * work[208]
-        - work[27] * work[160]))) - work[195]) + coef[3] * t43);
-    jacobian[3] = coef[0] * t22 - (t47 * work[21] + work[22] * (work[4] * work[183] + work[6] * work[113]
-        + (work[20] * work[193] + work[27] * work[168]) - t47 * work[10]));
-    jacobian[4] = work[166] - work[22] * (work[167] + (work[4] * work[93] - work[6] * work[94]
-        + (work[20] * work[203] - work[27] * work[171]))) - work[165] + coef[0] * t35;
-    jacobian[5] = work[194] + (work[191] - work[22] * (work[192] - (work[6] * work[106] + work[4] * work[107]
-        + (work[27] * work[173] + work[20] * work[207])))) + coef[0] * t43;
-}
-
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 4) */
-satellite_APART static void satellite_linearise_part3(const double coef[7], const double y[9],
-    double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
-    double work[240])
+    double work[263])
 {
     (void)displacement, (void)increment, (void)increment_jacobian;
-    const double m1 = y[0], N1 = y[3], G1 = y[6], G2 = y[7], G3 = y[8];
-    const double t1 = work[86] * work[21], t2 = work[86] * work[10], t3 = work[12] * work[87];
-    const double t4 = work[0] * work[88], t5 = work[0] * work[27] + work[2] * work[20];
-    const double t6 = work[18] * t5, t7 = work[20] * work[86], t8 = t3 - t4 + (t6 - t7);
-    const double t9 = work[12] * work[18], t10 = work[89] + t9, t11 = t10 + t10;
-    const double t12 = work[2] * work[88] + work[12] * work[90] + (work[27] * work[86] + work[18] * t11);
-    const double t13 = 0.5 * work[0], t14 = 0.5 * G3, t15 = work[44] - work[61] - work[61];
-    const double t16 = work[91] - work[20] * t15, t17 = work[34] + (work[27] * t15 - work[92]);
-    const double t18 = t1 - work[22] * (t2 + (work[0] * work[93] - work[2] * work[94]
-        + (work[20] * t8 - work[27] * t12))) - t13
-        + coef[5] * (t14 + (t15 * work[21] - work[22] * (work[10] * t15 + (work[95] - work[96]
-        + (work[20] * t16 - work[27] * t17)))));
-    const double t19 = 0.5 * work[2], t20 = work[97] * work[21], t21 = work[97] * work[10];
-    const double t22 = work[2] * work[98], t23 = work[27] * work[97], t24 = t22 - t3 + (t23 - t6);
-    const double t25 = work[99] + t9, t26 = t25 + t25;
-    const double t27 = work[0] * work[98] + work[12] * work[70] + (work[20] * work[97] + work[18] * t26);
-    const double t28 = work[100] * work[21], t29 = work[100] * work[10];
-    const double t30 = work[101] - work[102] + (work[103] - work[104]);
-    const double t31 = work[62] - work[78] - work[78], t32 = work[105] - work[18] * t31;
-    work[232] = 0.5 * G2;
-    const double t33 = t19 + (t20 - work[22] * (t21 - (work[2] * work[106] + work[0] * work[107]
-        + (work[27] * t24 + work[20] * t27))))
-        + coef[6] * (t28 - work[22] * (t29 + (work[25] + (work[20] * t30 - work[27] * t32))) - work[232]);
-    const double t34 = work[108] - work[109];
-    const double t35 = work[110] + (work[111] - work[22] * (work[112] - (work[20] * t34
-        + work[18] * work[113])));
-    const double t36 = work[114] * work[21], t37 = work[114] * work[10], t38 = work[20] * work[114];
-    const double t39 = t38 - work[27] * work[115], t40 = work[20] * work[116];
-    work[230] = work[27] * work[117] + t40;
-    const double t41 = t38 + work[27] * work[118];
-    const double t42 = work[2] * work[117] + work[0] * work[116] + (work[4] * work[114] + work[6] * work[118]
-        + (work[20] * work[119] + work[27] * work[120]));
-    const double t43 = work[10] * work[119] + 2.0 * work[121] + (work[12] * work[122] - work[0] * work[230]
-        + (work[15] * work[123] - work[4] * t41 + (work[19] + work[18] * work[124] - work[20] * t42)));
-    const double t44 = work[21] * work[119] + 2.0 * (work[125] * work[11]) - (2.0 * (work[126] * work[127])
-        + work[22] * t43) - work[128];
-    const double t45 = work[131] * work[21], t46 = work[131] * work[10], t47 = work[20] * work[131];
-    const double t48 = work[27] * work[132], t49 = work[133] - work[134] + (t47 - t48);
-    const double t50 = work[20] * work[135], t51 = work[27] * work[136];
-    work[235] = t50 - (work[3] + t51);
-    const double t52 = t47 - (work[7] + t48);
-    const double t53 = work[0] * work[135] - work[2] * work[136] + (work[4] * work[131] - work[6] * work[132]
-        + (work[20] * work[137] - (work[24] + work[27] * work[138])));
-    const double t54 = work[10] * work[137] + 2.0 * (work[27] * work[11]) + (work[12] * work[139]
-        - work[0] * work[235] + (work[15] * work[140] - work[4] * t52 + (work[18] * work[141]
-        - work[20] * t53)));
-    const double t55 = work[21] * work[137] + 2.0 * (work[142] * work[11]) - (work[22] * t54
-        + 2.0 * (work[143] * work[127]));
-    const double t56 = work[27] * work[87] + work[20] * work[90];
-    const double t57 = work[90] * work[21] + work[22] * (work[18] * work[94] + work[20] * t56
-        - work[90] * work[10]);
-    const double t58 = work[87] * work[21], t59 = work[87] * work[10];
-    const double t60 = work[20] * work[87] + work[27] * work[70], t61 = 0.5 * work[18];
-    const double t62 = t58 - work[22] * (t59 + (work[18] * work[106] - work[20] * t60)) - t61;
-    const double t63 = 0.5 * N1, t64 = work[27] * work[145], t65 = work[5] + (work[20] * work[146] - t64);
-    const double t66 = 0.5 * m1, t67 = work[27] * work[147];
-    work[239] = work[1] - work[20] * work[148] - t67;
-    const double t68 = work[5] - work[20] * work[149] - t64;
-    const double t69 = work[11] - work[20] * work[150] - work[27] * work[151] - (work[6] * work[145]
-        + work[4] * work[149]) - (work[2] * work[147] + work[0] * work[148]);
-    const double t70 = 2.0 * work[8] - work[10] * work[150] + (work[12] * work[152] - work[0] * work[239]
-        + (work[15] * work[153] - work[4] * t68 + (work[18] * work[154] - (work[155] + work[20] * t69))));
-    const double t71 = t66 + (2.0 * (work[156] * work[11]) - work[21] * work[150] - (work[22] * t70
-        + 2.0 * (work[157] * work[127])));
-    const double t72 = t62 + (coef[0] * (t63 + (work[146] * work[21] - work[22] * (work[10] * work[146]
-        + (work[158] - work[159] + (work[18] * work[160] - work[20] * t65))))) + coef[3] * t71);
-    const double t73 = work[161] - work[162] + (work[163] - work[164]);
-    const double t74 = work[6] * work[87] + work[4] * work[90] + (work[27] * work[169]
-        + work[20] * work[170]);
-    const double t75 = work[169] * work[21], t76 = work[169] * work[10];
-    const double t77 = work[4] * work[87] + work[6] * work[70] + (work[20] * work[169]
-        + work[27] * work[172]);
-    const double t78 = 0.5 * work[15], t79 = t4 - t22 + (t7 - t23), t80 = work[116] * work[21];
-    const double t81 = work[10] * work[116], t82 = t40 - work[27] * work[174];
-    const double t83 = t13 + (t1 - work[22] * (t2 - (work[0] * t34 + work[12] * work[113] + (work[20] * t79
-        + work[18] * work[175]))))
-        + coef[4] * (t80 - work[22] * (t81 + (work[13] + (work[18] * work[176] - work[20] * t82))) - t14);
-    const double t84 = work[135] * work[21], t85 = work[135] * work[10];
-    const double t86 = work[177] - work[178] + (t50 - t51);
-    const double t87 = work[2] * work[87] + work[0] * work[90] + (work[27] * t5 + work[20] * t11);
-    const double t88 = coef[5] * (t84 - work[22] * (t85 + (work[18] * t17 - work[20] * t86)))
-        - (t11 * work[21] + work[22] * (work[12] * work[94] + work[0] * t56 + (work[18] * t12
-        + work[20] * t87) - t11 * work[10]));
-    const double t89 = t5 * work[21], t90 = t5 * work[10];
-    const double t91 = work[0] * work[87] + work[2] * work[70] + (work[20] * t5 + work[27] * t26);
-    const double t92 = 0.5 * work[12];
-    work[236] = 0.5 * G1;
-    const double t93 = work[1] + (work[20] * t31 - t67);
-    const double t94 = t89 - work[22] * (t90 + (work[12] * work[106] - work[0] * t60 + (work[18] * t24
-        - work[20] * t91))) - t92 + coef[6] * (work[236] + (t31 * work[21] - work[22] * (t31 * work[10]
-        + (work[179] - work[180] + (work[18] * t32 - work[20] * t93)))));
-    const double t95 = work[181] - work[22] * (work[182] + (work[27] * t34 - work[18] * work[183]))
-        - work[184];
-    const double t96 = 2.0 * work[185] - work[10] * work[120] + (work[2] * work[230] - work[12] * work[186]
-        + (work[6] * t41 - work[15] * work[187] + (work[27] * t42 - (work[28] + work[18] * work[188]))));
-    const double t97 = work[189] + (2.0 * (work[125] * work[24]) - work[21] * work[120]
-        - (2.0 * (work[126] * work[190]) + work[22] * t96));
-    const double t98 = t95 + (coef[0] * (work[195] + (work[115] * work[21] - work[22] * (work[115] * work[10]
-        + (work[196] - work[197] + (work[27] * t39 - work[18] * work[198]))))) + coef[1] * t97);
-    const double t99 = t61 + (t58 - work[22] * (t59 - (work[18] * work[93] + work[27] * t56)));
-    const double t100 = work[132] * work[21], t101 = work[10] * work[132];
-    const double t102 = work[10] * work[138] + 2.0 * work[9] + (work[2] * work[235] - work[12] * work[199]
-        + (work[6] * t52 - work[15] * work[200] + (work[155] + work[27] * t53 - work[18] * work[201])));
-    const double t103 = work[21] * work[138] + 2.0 * (work[142] * work[24]) - (2.0 * (work[143] * work[190])
-        + work[22] * t102) - t66;
-    const double t104 = work[145] * work[21], t105 = work[145] * work[10];
-    const double t106 = work[10] * work[151] + 2.0 * (work[20] * work[24]) + (work[2] * work[239]
-        - work[12] * work[204] + (work[6] * t68 - work[15] * work[205] + (work[27] * t69
-        - work[18] * work[206])));
-    const double t107 = work[21] * work[151] + 2.0 * (work[156] * work[24]) - (work[22] * t106
-        + 2.0 * (work[157] * work[190]));
-    const double t108 = work[70] * work[21] + work[22] * (work[18] * work[107] + work[27] * t60
-        - work[70] * work[10]);
-    const double t109 = t20 - work[22] * (t21 + (work[2] * t34 - work[12] * work[183] + (work[27] * t79
-        - work[18] * work[209]))) - t19 + coef[4] * (work[232] + (work[174] * work[21]
-        - work[22] * (work[10] * work[174] + (work[210] - work[211] + (work[27] * t82
-        - work[18] * work[212])))));
-    work[233] = work[136] * work[21];
-    work[234] = work[10] * work[136];
-    const double t110 = t92 + (t89 - work[22] * (t90 - (work[12] * work[93] + work[2] * t56
-        + (work[18] * t8 + work[27] * t87)))) + coef[5] * (work[233] - work[22] * (work[234]
-        + (work[14] + (work[27] * t86 - work[18] * t16))) - work[236]);
-    work[237] = work[147] * work[21];
-    work[238] = work[147] * work[10];
-    const double t111 = coef[6] * (work[237] - work[22] * (work[238] + (work[27] * t93 - work[18] * t30)))
-        - (t26 * work[21] + work[22] * (work[2] * t60 + work[12] * work[107] + (work[27] * t91
-        + work[18] * t27) - work[10] * t26));
-    const double t112 = work[213] + 2.0 * (work[30] * work[125])
-        - (work[22] * (work[214] + 2.0 * (work[18] * work[30]) + (work[20] * work[187]
-        - work[27] * work[123])) + 2.0 * (work[126] * work[215]));
-    const double t113 = 2.0 * (work[30] * work[142]) - work[217] * work[21]
-        - (work[22] * (2.0 * work[69] - work[217] * work[10] + (work[20] * work[200]
-        - (work[16] + work[27] * work[140]))) + 2.0 * (work[143] * work[215]));
-    const double t114 = work[130] + t113;
-    const double t115 = work[219] + 2.0 * (work[30] * work[156]) - (2.0 * (work[157] * work[215])
-        + work[22] * (work[220] + 2.0 * work[196] + (work[26] + work[20] * work[205]
-        - work[27] * work[153])));
-    const double t116 = t115 - work[195];
-    const double t117 = t36 + 2.0 * (work[5] * work[125]) - (work[22] * (t37 + 2.0 * work[68]
-        + (work[16] + work[18] * work[123] - work[20] * t41)) + 2.0 * (work[126] * work[222]));
-    const double t118 = t117 - work[130];
-    const double t119 = t45 + 2.0 * (work[5] * work[142]) - (work[22] * (t46 + 2.0 * (work[27] * work[5])
-        + (work[18] * work[140] - work[20] * t52)) + 2.0 * (work[143] * work[222]));
-    const double t120 = 2.0 * (work[5] * work[156]) - work[149] * work[21] - (2.0 * (work[157] * work[222])
-        + work[22] * (2.0 * work[159] - work[149] * work[10] + (work[18] * work[153]
-        - (work[17] + work[20] * t68))));
-    const double t121 = t63 + t120;
-    const double t122 = 2.0 * (work[7] * work[125]) - work[118] * work[21] - (2.0 * (work[126] * work[223])
-        + work[22] * (2.0 * work[197] - work[118] * work[10] + (work[27] * t41
-        - (work[26] + work[18] * work[187]))));
-    const double t123 = work[195] + t122;
-    const double t124 = t100 + 2.0 * (work[7] * work[142]) - (2.0 * (work[143] * work[223]) + work[22] * (t101
-        + 2.0 * work[158] + (work[17] + work[27] * t52 - work[18] * work[200])));
-    const double t125 = t124 - t63;
-    const double t126 = t104 + 2.0 * (work[7] * work[156]) - (work[22] * (t105 + 2.0 * (work[20] * work[7])
-        + (work[27] * t68 - work[18] * work[205])) + 2.0 * (work[157] * work[223]));
-    const double t127 = work[224] + 2.0 * (work[34] * work[125])
-        - (work[22] * (work[225] + 2.0 * (work[18] * work[34]) + (work[20] * work[186]
-        - work[27] * work[122])) + 2.0 * (work[126] * work[226]));
-    const double t128 = 2.0 * (work[34] * work[142]) - work[227] * work[21] - (2.0 * (work[143] * work[226])
-        + work[22] * (2.0 * work[96] - work[10] * work[227] + (work[20] * work[199]
-        - (work[13] + work[27] * work[139]))));
-    const double t129 = t14 + t128;
-    const double t130 = t28 + 2.0 * (work[34] * work[156]) - (2.0 * (work[157] * work[226]) + work[22] * (t29
-        + 2.0 * work[210] + (work[25] + work[20] * work[204] - work[27] * work[152])));
-    const double t131 = t130 - work[232];
-    const double t132 = t80 + 2.0 * (work[1] * work[125]) - (work[22] * (t81 + 2.0 * work[95]
-        + (work[13] + work[18] * work[122] - work[20] * work[230])) + 2.0 * (work[126] * work[228]));
-    const double t133 = t132 - t14;
-    const double t134 = t84 + 2.0 * (work[1] * work[142]) - (work[22] * (t85 + 2.0 * (work[27] * work[1])
-        + (work[18] * work[139] - work[20] * work[235])) + 2.0 * (work[143] * work[228]));
-    const double t135 = 2.0 * (work[1] * work[156]) - work[148] * work[21] - (2.0 * (work[157] * work[228])
-        + work[22] * (2.0 * work[180] - work[148] * work[10] + (work[18] * work[152]
-        - (work[14] + work[20] * work[239]))));
-    work[229] = work[236] + t135;
-    jacobian[6] = work[85];
-    jacobian[7] = t18;
-    jacobian[8] = t33;
-    jacobian[69] = t35;
-    jacobian[9] = t35
-        + (coef[0] * (t36 - work[22] * (t37 + (work[16] + (work[18] * work[129] - work[20] * t39)))
-        - work[130]) + coef[1] * t44);
-    jacobian[10] = 1.0 + (coef[0] * (t45 - work[22] * (t46 + (work[18] * work[144] - work[20] * t49)))
-        + coef[2] * t55 - t57);
-    jacobian[70] = 1.0 - t57;
-    jacobian[71] = t62;
-    jacobian[11] = t72;
-    jacobian[12] = work[165] + (work[166] - work[22] * (work[167] - (work[4] * t34 + work[15] * work[113]
-        + (work[20] * t73 + work[18] * work[168])))) + coef[0] * t44;
-    jacobian[13] = coef[0] * t55 - (work[170] * work[21] + work[22] * (work[4] * t56 + work[15] * work[94]
-        + (work[18] * work[171] + work[20] * t74) - work[10] * work[170]));
-    jacobian[14] = t75 - work[22] * (t76 + (work[15] * work[106] - work[4] * t60 + (work[18] * work[173]
-        - work[20] * t77))) - t78 + coef[0] * t71;
-    jacobian[15] = t83;
-    jacobian[16] = t88;
-    jacobian[17] = t94;
-    jacobian[78] = t95;
-    jacobian[21] = work[191] - work[22] * (work[192] + (work[6] * t34 - work[15] * work[183] + (work[27] * t73
-        - work[18] * work[193]))) - work[194] + coef[0] * t97;
-    jacobian[18] = t98;
-    jacobian[79] = t99;
-    jacobian[19] = t99
-        + (coef[0] * (t100 - work[22] * (t101 + (work[17] + (work[27] * t49 - work[18] * work[202]))) - t63)
-        + coef[2] * t103);
-    jacobian[22] = t78 + (t75 - work[22] * (t76 - (work[15] * work[93] + work[6] * t56 + (work[18] * work[203]
-        + work[27] * t74)))) + coef[0] * t103;
-    jacobian[23] = coef[0] * t107 - (work[172] * work[21] + work[22] * (work[15] * work[107] + work[6] * t60
-        + (work[18] * work[207] + work[27] * t77) - work[10] * work[172]));
-    jacobian[20] = 1.0 + (coef[0] * (t104 - work[22] * (t105 + (work[27] * t65 - work[18] * work[208])))
-        + coef[3] * t107 - t108);
-    jacobian[80] = 1.0 - t108;
-    jacobian[24] = t109;
-    jacobian[25] = t110;
-    jacobian[26] = t111;
-    jacobian[27] = coef[1] * t112;
-    jacobian[30] = 1.0 + (coef[0] * t112 - work[216]);
-    jacobian[28] = coef[2] * t114;
-    jacobian[31] = work[218] + coef[0] * t114;
-    jacobian[29] = coef[3] * t116;
-    jacobian[32] = work[221] + coef[0] * t116;
-    jacobian[36] = coef[1] * t118;
-    jacobian[39] = t35 + coef[0] * t118;
-    jacobian[37] = coef[2] * t119;
-    jacobian[40] = 1.0 + (coef[0] * t119 - t57);
-    jacobian[38] = coef[3] * t121;
-    jacobian[41] = t62 + coef[0] * t121;
-    jacobian[45] = coef[1] * t123;
-    jacobian[48] = t95 + coef[0] * t123;
-    jacobian[46] = coef[2] * t125;
-    jacobian[49] = t99 + coef[0] * t125;
-    jacobian[47] = coef[3] * t126;
-    jacobian[50] = 1.0 + (coef[0] * t126 - t108);
-    jacobian[54] = coef[1] * t127;
-    jacobian[57] = coef[0] * t127;
-    jacobian[55] = coef[2] * t129;
-    jacobian[58] = coef[0] * t129;
-    jacobian[56] = coef[3] * t131;
-    jacobian[59] = coef[0] * t131;
-    jacobian[63] = coef[1] * t133;
-    jacobian[66] = coef[0] * t133;
-    jacobian[64] = coef[2] * t134;
-    jacobian[67] = coef[0] * t134;
+    const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5], G1 = y[6], G2 = y[7],
+        G3 = y[8];
+    work[208] = work[0] - work[1] * work[2] - work[3];
+    work[113] = work[4] - (work[5] + work[6]);
+    work[207] = work[7] + (work[8] + (work[9] + work[10]));
+    work[209] = work[11] - work[1] * work[207] - work[12] * work[13] - (work[14] * work[15]
+        + work[16] * work[2]) - (work[17] * work[18] + work[19] * work[20]);
+    work[110] = work[21] - work[22] - work[23] - work[24];
+    work[115] = work[25] * work[18] - work[19] * work[26] + (work[27] * work[15] - work[16] * work[28]
+        + (work[29] * work[13] - (work[30] + work[1] * work[110])));
+    const double t1 = work[31] * work[13] + 2.0 * (work[1] * work[32]) + (work[17] * work[33]
+        - work[25] * work[34] + (work[14] * work[208] - work[27] * work[113] + (work[12] * work[209]
+        - work[29] * work[115])));
+    const double t2 = satellite_phi2(work[31]);
+    work[117] = work[1] * t2;
+    const double t3 = work[35] * work[13] + 2.0 * (work[36] * work[32])
+        - (work[37] * t1 + 2.0 * (work[117] * work[38]));
+    const double t4 = work[39] + work[40], t5 = work[12] * work[1];
+    work[204] = work[1] * t5 + work[12] * t4;
+    const double t6 = work[29] * work[1];
+    work[170] = work[1] * t6 + work[29] * t4;
+    work[247] = t4 * work[35] + work[37] * (work[12] * work[204] + work[29] * work[170] - t4 * work[31]);
+    const double t7 = t6 * work[35], t8 = t6 * work[31];
+    work[139] = work[12] * work[29];
+    const double t9 = work[1] * work[139], t10 = work[12] * t6;
+    work[219] = t9 - t10;
+    work[140] = work[45] + work[40];
+    work[141] = work[29] * t6 + work[1] * work[140];
+    const double t11 = 0.5 * work[12];
+    work[249] = t7 - work[37] * (t8 + (work[12] * work[219] - work[29] * work[141])) - t11;
+    work[125] = 0.5 * N3;
+    const double t12 = work[46] - work[47] - work[47];
+    work[127] = work[48] - work[49];
+    const double t13 = work[1] * work[127];
+    work[225] = t13 - work[12] * t12;
+    const double t14 = N1 * work[1];
+    work[126] = t14 + work[50];
+    const double t15 = work[1] * work[126];
+    work[142] = work[51] + (work[29] * t12 - t15);
+    work[119] = 0.5 * m3;
+    work[137] = work[29] * work[37];
+    const double t16 = work[52] + (work[53] + (work[54] + work[21]));
+    work[138] = work[29] * t2;
+    work[258] = work[55] + work[56];
+    work[131] = work[57] - work[58];
+    const double t17 = work[1] * work[131];
+    work[221] = work[12] * work[258] + t17;
+    const double t18 = G1 * work[1];
+    work[130] = work[59] + t18;
+    const double t19 = work[1] * work[130];
+    work[134] = work[60] - work[29] * work[258] - t19;
+    work[248] = work[47] + work[61];
+    work[222] = t13 + work[12] * work[248];
+    work[135] = work[51] - work[29] * work[248] - t15;
+    work[133] = work[62] - work[63] - work[64] - work[65];
+    work[223] = work[17] * work[258] + work[19] * work[131] + (work[16] * work[127] + work[14] * work[248]
+        + (work[1] * work[133] + work[12] * t16));
+    const double t20 = G1 * work[19], t21 = N1 * work[16], t22 = m1 * work[1];
+    work[132] = work[66] + t20 + (work[67] + t21 + (work[68] + t22));
+    work[136] = work[32] - work[29] * t16 - work[1] * work[132] - (work[16] * work[126]
+        + work[27] * work[248]) - (work[19] * work[130] + work[25] * work[258]);
+    const double t23 = 2.0 * work[69] - work[31] * t16 + (work[17] * work[221] - work[25] * work[134]
+        + (work[14] * work[222] - work[27] * work[135] + (work[12] * work[223]
+        - (work[70] + work[29] * work[136]))));
+    const double t24 = work[119] + (2.0 * (work[137] * work[32]) - work[35] * t16
+        - (2.0 * (work[138] * work[38]) + work[37] * t23));
+    const double t25 = work[249]
+        + (coef[0] * (work[125] + (t12 * work[35] - work[37] * (work[31] * t12 + (work[71] - work[72]
+        + (work[12] * work[225] - work[29] * work[142]))))) + coef[2] * t24);
+    work[205] = 0.5 * work[29];
+    work[202] = t5 * work[35];
+    work[203] = t5 * work[31];
+    const double t26 = work[29] * t5;
+    work[143] = t26 - t9;
+    work[230] = work[12] * t5 + work[1] * work[73];
+    work[252] = work[205] + (work[202] - work[37] * (work[203] - (work[29] * work[143]
+        + work[12] * work[230])));
+    const double t27 = work[74] - work[75];
+    work[250] = t27 * work[35];
+    work[251] = t27 * work[31];
+    work[144] = t14 + work[76];
+    const double t28 = work[1] * work[144], t29 = work[12] * t27;
+    work[232] = work[77] - work[78] + (t28 - t29);
+    const double t30 = work[29] * t27;
+    work[145] = work[49] - work[79] - work[79];
+    work[161] = t30 - work[1] * work[145];
+    work[216] = 0.5 * N2;
+    const double t31 = work[10] - work[80] - work[81] - work[82];
+    work[157] = work[12] * work[37];
+    work[158] = work[12] * t2;
+    work[146] = work[83] + t18;
+    const double t32 = work[1] * work[146], t33 = work[84] - work[85], t34 = work[12] * t33;
+    work[227] = t32 - (t34 + work[60]);
+    work[148] = work[86] + work[57];
+    const double t35 = work[29] * t33;
+    work[153] = work[1] * work[148] + t35;
+    work[228] = t28 - (work[51] + t29);
+    work[149] = work[79] + work[48];
+    work[154] = work[1] * work[149] + t30;
+    work[151] = t20 + work[87] + (t21 + work[88] + (work[89] + t22));
+    work[229] = work[19] * work[146] - work[17] * t33 + (work[16] * work[144] - work[14] * t27
+        + (work[1] * work[151] - (work[32] + work[12] * t31)));
+    work[150] = work[90] + (work[91] + (work[92] + work[62]));
+    work[155] = work[25] * t33 + work[19] * work[148] + (work[16] * work[149] + work[27] * t27
+        + (work[29] * t31 + work[1] * work[150]));
+    const double t36 = work[31] * t31 + 2.0 * work[93] + (work[17] * work[227] - work[25] * work[153]
+        + (work[14] * work[228] - work[27] * work[154] + (work[94] + work[12] * work[229]
+        - work[29] * work[155])));
+    work[210] = 0.5 * m2;
+    const double t37 = work[35] * t31 + 2.0 * (work[157] * work[32]) - (2.0 * (work[158] * work[38])
+        + work[37] * t36) - work[210];
+    const double t38 = work[27] * work[29], t39 = work[14] * work[12], t40 = t38 + t39, t41 = t40 + t40;
+    const double t42 = work[14] * work[1] + work[16] * work[12];
+    work[214] = work[16] * t5 + work[14] * t4 + (work[1] * t42 + work[12] * t41);
+    const double t43 = work[27] * work[1] + work[16] * work[29];
+    work[171] = work[16] * t6 + work[27] * t4 + (work[1] * t43 + work[29] * t41);
+    work[167] = t43 * work[35];
+    work[168] = t43 * work[31];
+    const double t44 = work[16] * work[139];
+    work[162] = work[14] * t6;
+    work[172] = work[14] * work[29] + work[27] * work[12];
+    const double t45 = work[1] * work[172];
+    work[164] = work[12] * t43;
+    work[226] = t44 - work[162] + (t45 - work[164]);
+    const double t46 = work[16] * work[1], t47 = t46 + t39;
+    work[173] = t47 + t47;
+    work[174] = work[27] * t6 + work[16] * work[140] + (work[29] * t43 + work[1] * work[173]);
+    work[166] = 0.5 * work[14];
+    work[215] = 0.5 * work[27];
+    work[212] = t42 * work[35];
+    work[213] = t42 * work[31];
+    work[163] = work[27] * t5;
+    work[165] = work[29] * t42;
+    work[176] = work[163] - t44 + (work[165] - t45);
+    const double t48 = t46 + t38;
+    work[175] = t48 + t48;
+    work[231] = work[14] * t5 + work[16] * work[73] + (work[12] * t42 + work[1] * work[175]);
+    work[255] = work[18] * work[35];
+    work[256] = work[18] * work[31];
+    work[182] = work[85] - work[96] - work[96];
+    work[240] = work[97] + (work[1] * work[182] - work[98]);
+    work[188] = work[99] - work[100] + (work[101] - work[102]);
+    const double t49 = work[17] * work[12], t50 = work[25] * work[29], t51 = t49 + t50, t52 = t51 + t51;
+    const double t53 = work[19] * work[12] + work[17] * work[1];
+    work[235] = work[19] * t5 + work[17] * t4 + (work[1] * t53 + work[12] * t52);
+    const double t54 = work[19] * work[29] + work[25] * work[1];
+    work[186] = work[19] * t6 + work[25] * t4 + (work[1] * t54 + work[29] * t52);
+    const double t55 = coef[4] * (work[255] - work[37] * (work[256] + (work[12] * work[240]
+        - work[29] * work[188]))) - (t52 * work[35] + work[37] * (work[25] * work[170] + work[17] * work[204]
+        + (work[12] * work[235] + work[29] * work[186]) - work[31] * t52));
+    work[184] = t54 * work[35];
+    work[185] = t54 * work[31];
+    const double t56 = work[19] * work[139];
+    work[177] = work[17] * t6;
+    work[192] = work[17] * work[29] + work[25] * work[12];
+    const double t57 = work[1] * work[192];
+    work[179] = work[12] * t54;
+    work[241] = t56 - work[177] + (t57 - work[179]);
+    const double t58 = work[19] * work[1], t59 = t49 + t58;
+    work[193] = t59 + t59;
+    work[195] = work[25] * t6 + work[19] * work[140] + (work[29] * t54 + work[1] * work[193]);
+    work[183] = 0.5 * work[17];
+    work[189] = 0.5 * G3;
+    const double t60 = work[103] - work[55] - work[55];
+    work[243] = t17 - work[12] * t60;
+    work[194] = work[60] + (work[29] * t60 - t19);
+    const double t61 = work[184] - work[37] * (work[185] + (work[17] * work[219] - work[25] * work[141]
+        + (work[12] * work[241] - work[29] * work[195]))) - work[183] + coef[5] * (work[189] + (t60 * work[35]
+        - work[37] * (work[31] * t60 + (work[104] - work[105] + (work[12] * work[243]
+        - work[29] * work[194])))));
+    work[236] = 0.5 * work[25];
+    work[233] = t53 * work[35];
+    work[234] = t53 * work[31];
+    work[178] = work[25] * t5;
+    work[180] = work[29] * t53;
+    work[198] = work[178] - t56 + (work[180] - t57);
+    const double t62 = t50 + t58;
+    work[196] = t62 + t62;
+    work[245] = work[17] * t5 + work[19] * work[73] + (work[12] * t53 + work[1] * work[196]);
+    work[259] = t33 * work[35];
+    work[260] = t33 * work[31];
+    work[244] = work[106] - work[107] + (t32 - t34);
+    work[197] = work[58] - work[86] - work[86];
+    work[201] = t35 - work[1] * work[197];
+    work[237] = 0.5 * G2;
+    const double t63 = work[236] + (work[233] - work[37] * (work[234] - (work[25] * work[143]
+        + work[17] * work[230] + (work[29] * work[198] + work[12] * work[245])))) + coef[6] * (work[259]
+        - work[37] * (work[260] + (work[108] + (work[12] * work[244] - work[29] * work[201]))) - work[237]);
+    work[169] = t10 - t26;
+    work[120] = t11 + (t7 - work[37] * (t8 - (work[12] * work[169] + work[1] * work[170])));
+    work[121] = work[28] * work[35];
+    work[122] = work[28] * work[31];
+    const double t64 = work[12] * work[28];
+    work[124] = t64 - work[29] * work[109];
+    work[181] = work[12] * work[26];
+    work[112] = work[29] * work[20] + work[181];
+    work[114] = t64 + work[29] * work[2];
+    work[116] = work[25] * work[20] + work[17] * work[26] + (work[14] * work[28] + work[27] * work[2]
+        + (work[12] * work[110] + work[29] * work[207]));
+    jacobian[0] = 1.0
+        + (coef[0] * (work[41] - work[37] * (work[42] + (work[12] * work[43] - work[29] * work[44])))
+        + coef[1] * t3 - work[247]);
+    jacobian[60] = 1.0 - work[247];
+    jacobian[61] = work[249];
+    jacobian[1] = t25;
+    jacobian[62] = work[252];
+    jacobian[2] = work[252]
+        + (coef[0] * (work[250] - work[37] * (work[251] + (work[95] + (work[12] * work[232]
+        - work[29] * work[161]))) - work[216]) + coef[3] * t37);
+    jacobian[3] = coef[0] * t3 - (t41 * work[35] + work[37] * (work[14] * work[204] + work[27] * work[170]
+        + (work[12] * work[214] + work[29] * work[171]) - t41 * work[31]));
+    jacobian[4] = work[167] - work[37] * (work[168] + (work[14] * work[219] - work[27] * work[141]
+        + (work[12] * work[226] - work[29] * work[174]))) - work[166] + coef[0] * t24;
+    jacobian[5] = work[215] + (work[212] - work[37] * (work[213] - (work[27] * work[143]
+        + work[14] * work[230] + (work[29] * work[176] + work[12] * work[231])))) + coef[0] * t37;
+    jacobian[6] = t55;
+    jacobian[7] = t61;
+    jacobian[8] = t63;
+    jacobian[69] = work[120];
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 4 of 4) */
-satellite_APART static void satellite_linearise_part4(const double coef[7], const double y[9],
+   increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
+satellite_APART static void satellite_linearise_part3(const double coef[7], const double y[9],
     double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
-    double work[240])
+    double work[263])
 {
     (void)displacement, (void)increment;
-    const double G1 = y[6], G2 = y[7], G3 = y[8];
-    const double t1 = 2.0 * (work[3] * work[125]) - work[117] * work[21]
-        - (work[22] * (2.0 * work[211] - work[117] * work[10] + (work[27] * work[230]
-        - (work[25] + work[18] * work[186]))) + 2.0 * (work[126] * work[231]));
-    const double t2 = work[232] + t1;
-    const double t3 = work[233] + 2.0 * (work[3] * work[142]) - (work[22] * (work[234] + 2.0 * work[179]
-        + (work[14] + work[27] * work[235] - work[18] * work[199])) + 2.0 * (work[143] * work[231]));
-    const double t4 = t3 - work[236];
-    const double t5 = work[237] + 2.0 * (work[3] * work[156])
-        - (work[22] * (work[238] + 2.0 * (work[20] * work[3]) + (work[27] * work[239] - work[18] * work[204]))
-        + 2.0 * (work[157] * work[231]));
-    const double t6 = G3 * coef[0], t7 = G2 * coef[0], t8 = G1 * coef[0];
-    jacobian[65] = coef[3] * work[229];
-    jacobian[68] = coef[0] * work[229];
-    jacobian[72] = coef[1] * t2;
-    jacobian[75] = coef[0] * t2;
-    jacobian[73] = coef[2] * t4;
-    jacobian[76] = coef[0] * t4;
-    jacobian[74] = coef[3] * t5;
-    jacobian[77] = coef[0] * t5;
-    increment_jacobian[58] = -t6;
-    increment_jacobian[66] = t6;
-    increment_jacobian[59] = t7;
-    increment_jacobian[75] = -t7;
-    increment_jacobian[68] = -t8;
-    increment_jacobian[76] = t8;
+    const double m1 = y[0], N1 = y[3], G1 = y[6], G2 = y[7], G3 = y[8];
+    const double t1 = work[31] * work[110] + 2.0 * work[111] + (work[19] * work[34] - work[17] * work[112]
+        + (work[16] * work[113] - work[14] * work[114] + (work[70] + work[1] * work[115]
+        - work[12] * work[116])));
+    const double t2 = work[35] * work[110] + 2.0 * (work[36] * work[30]) - (2.0 * (work[117] * work[118])
+        + work[37] * t1) - work[119];
+    const double t3 = work[126] * work[35], t4 = work[126] * work[31], t5 = work[12] * work[126];
+    const double t6 = work[29] * work[127], t7 = work[128] - work[129] + (t5 - t6);
+    const double t8 = work[12] * work[130], t9 = work[29] * work[131], t10 = t8 - (work[97] + t9);
+    const double t11 = t5 - (work[0] + t6);
+    const double t12 = work[17] * work[130] - work[25] * work[131] + (work[14] * work[126]
+        - work[27] * work[127] + (work[12] * work[132] - (work[11] + work[29] * work[133])));
+    const double t13 = work[31] * work[132] + 2.0 * (work[29] * work[30]) + (work[19] * work[134]
+        - work[17] * t10 + (work[16] * work[135] - work[14] * t11 + (work[1] * work[136] - work[12] * t12)));
+    const double t14 = work[35] * work[132] + 2.0 * (work[137] * work[30]) - (work[37] * t13
+        + 2.0 * (work[138] * work[118]));
+    const double t15 = work[29] * work[139] + work[12] * work[140];
+    const double t16 = work[140] * work[35] + work[37] * (work[1] * work[141] + work[12] * t15
+        - work[140] * work[31]);
+    const double t17 = work[139] * work[35], t18 = work[139] * work[31];
+    const double t19 = work[12] * work[139] + work[29] * work[73], t20 = 0.5 * work[1];
+    const double t21 = t17 - work[37] * (t18 + (work[1] * work[143] - work[12] * t19)) - t20;
+    const double t22 = 0.5 * N1, t23 = work[29] * work[144], t24 = work[5] + (work[12] * work[145] - t23);
+    const double t25 = 0.5 * m1, t26 = work[29] * work[146], t27 = work[147] - work[12] * work[148] - t26;
+    const double t28 = work[5] - work[12] * work[149] - t23;
+    const double t29 = work[30] - work[12] * work[150] - work[29] * work[151] - (work[27] * work[144]
+        + work[14] * work[149]) - (work[25] * work[146] + work[17] * work[148]);
+    const double t30 = 2.0 * work[152] - work[31] * work[150] + (work[19] * work[153] - work[17] * t27
+        + (work[16] * work[154] - work[14] * t28 + (work[1] * work[155] - (work[156] + work[12] * t29))));
+    const double t31 = t25 + (2.0 * (work[157] * work[30]) - work[35] * work[150] - (work[37] * t30
+        + 2.0 * (work[158] * work[118])));
+    const double t32 = t21 + (coef[0] * (t22 + (work[145] * work[35] - work[37] * (work[31] * work[145]
+        + (work[159] - work[160] + (work[1] * work[161] - work[12] * t24))))) + coef[3] * t31);
+    const double t33 = work[162] - work[163] + (work[164] - work[165]);
+    const double t34 = work[27] * work[139] + work[14] * work[140] + (work[29] * work[172]
+        + work[12] * work[173]);
+    const double t35 = work[172] * work[35], t36 = work[172] * work[31];
+    const double t37 = work[14] * work[139] + work[27] * work[73] + (work[12] * work[172]
+        + work[29] * work[175]);
+    const double t38 = 0.5 * work[16], t39 = work[177] - work[178] + (work[179] - work[180]);
+    const double t40 = work[26] * work[35], t41 = work[31] * work[26];
+    const double t42 = work[181] - work[29] * work[182];
+    const double t43 = work[183] + (work[184] - work[37] * (work[185] - (work[17] * work[169]
+        + work[19] * work[170] + (work[12] * t39 + work[1] * work[186]))))
+        + coef[4] * (t40 - work[37] * (t41 + (work[187] + (work[1] * work[188] - work[12] * t42)))
+        - work[189]);
+    const double t44 = work[130] * work[35], t45 = work[130] * work[31];
+    const double t46 = work[190] - work[191] + (t8 - t9);
+    const double t47 = work[25] * work[139] + work[17] * work[140] + (work[29] * work[192]
+        + work[12] * work[193]);
+    const double t48 = coef[5] * (t44 - work[37] * (t45 + (work[1] * work[194] - work[12] * t46)))
+        - (work[193] * work[35] + work[37] * (work[19] * work[141] + work[17] * t15 + (work[1] * work[195]
+        + work[12] * t47) - work[193] * work[31]));
+    const double t49 = work[192] * work[35], t50 = work[192] * work[31];
+    const double t51 = work[17] * work[139] + work[25] * work[73] + (work[12] * work[192]
+        + work[29] * work[196]);
+    const double t52 = 0.5 * work[19], t53 = 0.5 * G1, t54 = work[147] + (work[12] * work[197] - t26);
+    const double t55 = t49 - work[37] * (t50 + (work[19] * work[143] - work[17] * t19 + (work[1] * work[198]
+        - work[12] * t51))) - t52 + coef[6] * (t53 + (work[197] * work[35] - work[37] * (work[197] * work[31]
+        + (work[199] - work[200] + (work[1] * work[201] - work[12] * t54)))));
+    const double t56 = work[202] - work[37] * (work[203] + (work[29] * work[169] - work[1] * work[204]))
+        - work[205];
+    const double t57 = 2.0 * work[206] - work[31] * work[207] + (work[25] * work[112] - work[19] * work[33]
+        + (work[27] * work[114] - work[16] * work[208] + (work[29] * work[116]
+        - (work[94] + work[1] * work[209]))));
+    const double t58 = work[210] + (2.0 * (work[36] * work[11]) - work[35] * work[207]
+        - (2.0 * (work[117] * work[211]) + work[37] * t57));
+    const double t59 = t56 + (coef[0] * (work[216] + (work[109] * work[35] - work[37] * (work[109] * work[31]
+        + (work[217] - work[218] + (work[29] * work[124] - work[1] * work[43]))))) + coef[1] * t58);
+    const double t60 = t20 + (t17 - work[37] * (t18 - (work[1] * work[219] + work[29] * t15)));
+    const double t61 = work[127] * work[35], t62 = work[31] * work[127];
+    const double t63 = work[31] * work[133] + 2.0 * work[220] + (work[25] * t10 - work[19] * work[221]
+        + (work[27] * t11 - work[16] * work[222] + (work[156] + work[29] * t12 - work[1] * work[223])));
+    const double t64 = work[35] * work[133] + 2.0 * (work[137] * work[11]) - (2.0 * (work[138] * work[211])
+        + work[37] * t63) - t25;
+    const double t65 = work[144] * work[35], t66 = work[144] * work[31];
+    const double t67 = work[31] * work[151] + 2.0 * (work[12] * work[11]) + (work[25] * t27
+        - work[19] * work[227] + (work[27] * t28 - work[16] * work[228] + (work[29] * t29
+        - work[1] * work[229])));
+    const double t68 = work[35] * work[151] + 2.0 * (work[157] * work[11]) - (work[37] * t67
+        + 2.0 * (work[158] * work[211]));
+    const double t69 = work[73] * work[35] + work[37] * (work[1] * work[230] + work[29] * t19
+        - work[73] * work[31]);
+    const double t70 = work[233] - work[37] * (work[234] + (work[25] * work[169] - work[19] * work[204]
+        + (work[29] * t39 - work[1] * work[235]))) - work[236] + coef[4] * (work[237] + (work[182] * work[35]
+        - work[37] * (work[31] * work[182] + (work[238] - work[239] + (work[29] * t42
+        - work[1] * work[240])))));
+    const double t71 = work[131] * work[35], t72 = work[31] * work[131];
+    const double t73 = t52 + (t49 - work[37] * (t50 - (work[19] * work[219] + work[25] * t15
+        + (work[1] * work[241] + work[29] * t47))))
+        + coef[5] * (t71 - work[37] * (t72 + (work[242] + (work[29] * t46 - work[1] * work[243]))) - t53);
+    const double t74 = work[146] * work[35], t75 = work[146] * work[31];
+    const double t76 = coef[6] * (t74 - work[37] * (t75 + (work[29] * t54 - work[1] * work[244])))
+        - (work[196] * work[35] + work[37] * (work[25] * t19 + work[19] * work[230] + (work[29] * t51
+        + work[1] * work[245]) - work[31] * work[196]));
+    const double t77 = work[41] + 2.0 * (work[51] * work[36])
+        - (work[37] * (work[42] + 2.0 * (work[1] * work[51]) + (work[12] * work[208] - work[29] * work[113]))
+        + 2.0 * (work[117] * work[246]));
+    const double t78 = 2.0 * (work[51] * work[137]) - work[248] * work[35]
+        - (work[37] * (2.0 * work[72] - work[248] * work[31] + (work[12] * work[222]
+        - (work[123] + work[29] * work[135]))) + 2.0 * (work[138] * work[246]));
+    const double t79 = work[125] + t78;
+    const double t80 = work[250] + 2.0 * (work[51] * work[157]) - (2.0 * (work[158] * work[246])
+        + work[37] * (work[251] + 2.0 * work[217] + (work[95] + work[12] * work[228]
+        - work[29] * work[154])));
+    const double t81 = t80 - work[216];
+    const double t82 = work[121] + 2.0 * (work[5] * work[36]) - (work[37] * (work[122] + 2.0 * work[71]
+        + (work[123] + work[1] * work[113] - work[12] * work[114])) + 2.0 * (work[117] * work[253]));
+    const double t83 = t82 - work[125];
+    const double t84 = t3 + 2.0 * (work[5] * work[137]) - (work[37] * (t4 + 2.0 * (work[29] * work[5])
+        + (work[1] * work[135] - work[12] * t11)) + 2.0 * (work[138] * work[253]));
+    const double t85 = 2.0 * (work[5] * work[157]) - work[149] * work[35] - (2.0 * (work[158] * work[253])
+        + work[37] * (2.0 * work[160] - work[149] * work[31] + (work[1] * work[154]
+        - (work[224] + work[12] * t28))));
+    const double t86 = t22 + t85;
+    const double t87 = 2.0 * (work[0] * work[36]) - work[2] * work[35] - (2.0 * (work[117] * work[254])
+        + work[37] * (2.0 * work[218] - work[2] * work[31] + (work[29] * work[114]
+        - (work[95] + work[1] * work[208]))));
+    const double t88 = work[216] + t87;
+    const double t89 = t61 + 2.0 * (work[0] * work[137]) - (2.0 * (work[138] * work[254]) + work[37] * (t62
+        + 2.0 * work[159] + (work[224] + work[29] * t11 - work[1] * work[222])));
+    const double t90 = t89 - t22;
+    const double t91 = t65 + 2.0 * (work[0] * work[157]) - (work[37] * (t66 + 2.0 * (work[12] * work[0])
+        + (work[29] * t28 - work[1] * work[228])) + 2.0 * (work[158] * work[254]));
+    const double t92 = work[255] + 2.0 * (work[60] * work[36])
+        - (work[37] * (work[256] + 2.0 * (work[1] * work[60]) + (work[12] * work[33] - work[29] * work[34]))
+        + 2.0 * (work[117] * work[257]));
+    const double t93 = 2.0 * (work[60] * work[137]) - work[258] * work[35] - (2.0 * (work[138] * work[257])
+        + work[37] * (2.0 * work[105] - work[31] * work[258] + (work[12] * work[221]
+        - (work[187] + work[29] * work[134]))));
+    const double t94 = work[189] + t93;
+    const double t95 = work[259] + 2.0 * (work[60] * work[157]) - (2.0 * (work[158] * work[257])
+        + work[37] * (work[260] + 2.0 * work[238] + (work[108] + work[12] * work[227]
+        - work[29] * work[153])));
+    const double t96 = t95 - work[237];
+    const double t97 = t40 + 2.0 * (work[147] * work[36]) - (work[37] * (t41 + 2.0 * work[104]
+        + (work[187] + work[1] * work[34] - work[12] * work[112])) + 2.0 * (work[117] * work[261]));
+    const double t98 = t97 - work[189];
+    const double t99 = t44 + 2.0 * (work[147] * work[137]) - (work[37] * (t45 + 2.0 * (work[29] * work[147])
+        + (work[1] * work[134] - work[12] * t10)) + 2.0 * (work[138] * work[261]));
+    const double t100 = 2.0 * (work[147] * work[157]) - work[148] * work[35] - (2.0 * (work[158] * work[261])
+        + work[37] * (2.0 * work[200] - work[148] * work[31] + (work[1] * work[153]
+        - (work[242] + work[12] * t27))));
+    const double t101 = t53 + t100;
+    const double t102 = 2.0 * (work[97] * work[36]) - work[20] * work[35]
+        - (work[37] * (2.0 * work[239] - work[20] * work[31] + (work[29] * work[112]
+        - (work[108] + work[1] * work[33]))) + 2.0 * (work[117] * work[262]));
+    const double t103 = work[237] + t102;
+    const double t104 = t71 + 2.0 * (work[97] * work[137]) - (work[37] * (t72 + 2.0 * work[199]
+        + (work[242] + work[29] * t10 - work[1] * work[221])) + 2.0 * (work[138] * work[262]));
+    const double t105 = t104 - t53;
+    const double t106 = t74 + 2.0 * (work[97] * work[157]) - (work[37] * (t75 + 2.0 * (work[12] * work[97])
+        + (work[29] * t27 - work[1] * work[227])) + 2.0 * (work[158] * work[262]));
+    const double t107 = G3 * coef[0], t108 = G2 * coef[0], t109 = G1 * coef[0];
+    jacobian[9] = work[120]
+        + (coef[0] * (work[121] - work[37] * (work[122]
+        + (work[123] + (work[1] * work[44] - work[12] * work[124]))) - work[125]) + coef[1] * t2);
+    jacobian[10] = 1.0 + (coef[0] * (t3 - work[37] * (t4 + (work[1] * work[142] - work[12] * t7)))
+        + coef[2] * t14 - t16);
+    jacobian[70] = 1.0 - t16;
+    jacobian[71] = t21;
+    jacobian[11] = t32;
+    jacobian[12] = work[166] + (work[167] - work[37] * (work[168] - (work[14] * work[169]
+        + work[16] * work[170] + (work[12] * t33 + work[1] * work[171])))) + coef[0] * t2;
+    jacobian[13] = coef[0] * t14 - (work[173] * work[35] + work[37] * (work[14] * t15 + work[16] * work[141]
+        + (work[1] * work[174] + work[12] * t34) - work[31] * work[173]));
+    jacobian[14] = t35 - work[37] * (t36 + (work[16] * work[143] - work[14] * t19 + (work[1] * work[176]
+        - work[12] * t37))) - t38 + coef[0] * t31;
+    jacobian[15] = t43;
+    jacobian[16] = t48;
+    jacobian[17] = t55;
+    jacobian[78] = t56;
+    jacobian[21] = work[212] - work[37] * (work[213] + (work[27] * work[169] - work[16] * work[204]
+        + (work[29] * t33 - work[1] * work[214]))) - work[215] + coef[0] * t58;
+    jacobian[18] = t59;
+    jacobian[79] = t60;
+    jacobian[19] = t60
+        + (coef[0] * (t61 - work[37] * (t62 + (work[224] + (work[29] * t7 - work[1] * work[225]))) - t22)
+        + coef[2] * t64);
+    jacobian[22] = t38 + (t35 - work[37] * (t36 - (work[16] * work[219] + work[27] * t15
+        + (work[1] * work[226] + work[29] * t34)))) + coef[0] * t64;
+    jacobian[23] = coef[0] * t68 - (work[175] * work[35] + work[37] * (work[16] * work[230] + work[27] * t19
+        + (work[1] * work[231] + work[29] * t37) - work[31] * work[175]));
+    jacobian[20] = 1.0 + (coef[0] * (t65 - work[37] * (t66 + (work[29] * t24 - work[1] * work[232])))
+        + coef[3] * t68 - t69);
+    jacobian[80] = 1.0 - t69;
+    jacobian[24] = t70;
+    jacobian[25] = t73;
+    jacobian[26] = t76;
+    jacobian[27] = coef[1] * t77;
+    jacobian[30] = 1.0 + (coef[0] * t77 - work[247]);
+    jacobian[28] = coef[2] * t79;
+    jacobian[31] = work[249] + coef[0] * t79;
+    jacobian[29] = coef[3] * t81;
+    jacobian[32] = work[252] + coef[0] * t81;
+    jacobian[36] = coef[1] * t83;
+    jacobian[39] = work[120] + coef[0] * t83;
+    jacobian[37] = coef[2] * t84;
+    jacobian[40] = 1.0 + (coef[0] * t84 - t16);
+    jacobian[38] = coef[3] * t86;
+    jacobian[41] = t21 + coef[0] * t86;
+    jacobian[45] = coef[1] * t88;
+    jacobian[48] = t56 + coef[0] * t88;
+    jacobian[46] = coef[2] * t90;
+    jacobian[49] = t60 + coef[0] * t90;
+    jacobian[47] = coef[3] * t91;
+    jacobian[50] = 1.0 + (coef[0] * t91 - t69);
+    jacobian[54] = coef[1] * t92;
+    jacobian[57] = coef[0] * t92;
+    jacobian[55] = coef[2] * t94;
+    jacobian[58] = coef[0] * t94;
+    jacobian[56] = coef[3] * t96;
+    jacobian[59] = coef[0] * t96;
+    jacobian[63] = coef[1] * t98;
+    jacobian[66] = coef[0] * t98;
+    jacobian[64] = coef[2] * t99;
+    jacobian[67] = coef[0] * t99;
+    jacobian[65] = coef[3] * t101;
+    jacobian[68] = coef[0] * t101;
+    jacobian[72] = coef[1] * t103;
+    jacobian[75] = coef[0] * t103;
+    jacobian[73] = coef[2] * t105;
+    jacobian[76] = coef[0] * t105;
+    jacobian[74] = coef[3] * t106;
+    jacobian[77] = coef[0] * t106;
+    increment_jacobian[58] = -t107;
+    increment_jacobian[66] = t107;
+    increment_jacobian[59] = t108;
+    increment_jacobian[75] = -t108;
+    increment_jacobian[68] = -t109;
+    increment_jacobian[76] = t109;
 }
 
 /* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
@@ -871,11 +834,12 @@ satellite_APART static void satellite_linearise_part4(const double coef[7], cons
 static void satellite_linearise(const double coef[7], const double y[9], double displacement[9],
     double increment[9], double jacobian[81], double increment_jacobian[81])
 {
-    double work[240];
+    double work[263];
+    memset(jacobian, 0, 81 * sizeof jacobian[0]);
+    memset(increment_jacobian, 0, 81 * sizeof increment_jacobian[0]);
     satellite_linearise_part1(coef, y, displacement, increment, jacobian, increment_jacobian, work);
     satellite_linearise_part2(coef, y, displacement, increment, jacobian, increment_jacobian, work);
     satellite_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
-    satellite_linearise_part4(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
 /* what p = grad S_h(y) turns by, a quaternion less 1 */

@@ -20,7 +20,7 @@
  *   5. Between steps
  *   6. The solver
  *   7. Ensembles
- * body-sha256: ac8836297f48f1192dc52b9ed02b32a2f0702f8f9ceaa52dc83caa1b1b3e4b24
+ * body-sha256: d8bdd3c77907edf6460dea0b5ae1d522bcc3b66a0bafa0fa9fe0e3dc7869be8b
  */
 #include "sir_final_size.h"
 
@@ -61,14 +61,9 @@ static void sir_final_size_generate(const double coef[3], const double y[3], dou
     slope[1] = coef[0];
     slope[2] = coef[0];
     /* jacobian */
+    memset(jacobian, 0, 9 * sizeof jacobian[0]);
     jacobian[0] = 1.0;
-    jacobian[1] = 0.0;
-    jacobian[2] = 0.0;
-    jacobian[3] = 0.0;
     jacobian[4] = 1.0;
-    jacobian[5] = 0.0;
-    jacobian[6] = 0.0;
-    jacobian[7] = 0.0;
     jacobian[8] = 1.0;
 }
 

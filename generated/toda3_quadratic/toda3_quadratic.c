@@ -22,7 +22,7 @@
  *   7. The solver
  *   8. Members of an ensemble
  *   9. Ensembles
- * body-sha256: 61d269e69a54a81856c22a4bf13392137a2000626c480940738061dd6c1c4603
+ * body-sha256: f75909103e986671779ba2bf17d23eef2927fa4a49847c354ace0c68f604a867
  */
 #include "toda3_quadratic.h"
 
@@ -63,30 +63,11 @@ static void toda3_quadratic_generate(const double coef[1], const double y[5], do
     slope[3] = coef[0];
     slope[4] = coef[0];
     /* jacobian */
+    memset(jacobian, 0, 25 * sizeof jacobian[0]);
     jacobian[0] = 1.0;
-    jacobian[1] = 0.0;
-    jacobian[2] = 0.0;
-    jacobian[3] = 0.0;
-    jacobian[4] = 0.0;
-    jacobian[5] = 0.0;
     jacobian[6] = 1.0;
-    jacobian[7] = 0.0;
-    jacobian[8] = 0.0;
-    jacobian[9] = 0.0;
-    jacobian[10] = 0.0;
-    jacobian[11] = 0.0;
     jacobian[12] = 1.0;
-    jacobian[13] = 0.0;
-    jacobian[14] = 0.0;
-    jacobian[15] = 0.0;
-    jacobian[16] = 0.0;
-    jacobian[17] = 0.0;
     jacobian[18] = 1.0;
-    jacobian[19] = 0.0;
-    jacobian[20] = 0.0;
-    jacobian[21] = 0.0;
-    jacobian[22] = 0.0;
-    jacobian[23] = 0.0;
     jacobian[24] = 1.0;
 }
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import Assignment, assign, expand_powers
@@ -27,6 +28,7 @@ class Code:
     assignments: tuple[Assignment, ...]
     stores: tuple[Store, ...]
     used: frozenset[str]
+    cleared: tuple[tuple[str, int], ...] = ()  # arrays that are set to zero before, with their sizes
 
     @property
     def kept(self) -> list[int]:
@@ -46,6 +48,18 @@ def lower(kernel: Kernel) -> Code:
     stores = tuple(Store(a, i, t) for (a, i), t in zip(places, trees, strict=True))
     nodes = topological(expanded[: len(roots)])
     return Code(tuple(assignments), stores, frozenset(e.value for e in nodes if e.op == "symbol"))
+
+
+#: Entries of an array that are zero whatever the arguments, from which on it is cleared first.
+MANY_ZEROS = 6
+
+
+def with_zeros_first(code: Code) -> Code:
+    """The same, where arrays with many zeros are cleared, and only what is not zero is stored."""
+    zeros, sizes = Counter(s.array for s in code.stores if s.value.is_zero), Counter(s.array for s in code.stores)
+    cleared = {array: sizes[array] for array, count in zeros.items() if count >= MANY_ZEROS}
+    stores = tuple(s for s in code.stores if not (s.array in cleared and s.value.is_zero))
+    return replace(code, stores=stores, cleared=tuple(cleared.items()))
 
 
 def parts(code: Code, size: int) -> list[Code]:
@@ -70,7 +84,7 @@ def parts(code: Code, size: int) -> list[Code]:
         for n in _reads([s.value for s in chunk]):
             if n in home and home[n] != k and n not in crossing:
                 crossing[n] = Symbol(WORK, len(crossing))
-    return [_renamed(chunk, crossing) for chunk in chunks]
+    return [_renamed(chunk, crossing) for chunk in chunks]  # arrays are cleared before the first
 
 
 def _reads(values: Sequence[Expression]) -> list[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from phigen.scheme.kernel import SCALARS, Kernel
 from phigen.symbolic.symbols import Symbol
-from phigen.targets.code import lower
+from phigen.targets.code import lower, with_zeros_first
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
@@ -19,7 +19,8 @@ class Language:
 
     ``functions`` are the names of functions, or texts with ``{0}`` for the argument, those that a file defines itself
     among them. ``declare`` and ``assign`` are statements, ``subscript`` an entry of an array whose first index is
-    ``base``, ``parameter`` a parameter of the system. ``point`` follows whole numbers.
+    ``base``, ``parameter`` a parameter of the system. ``point`` follows whole numbers. ``clear`` sets the
+    first entries of an array to zero, so many of them; without it each is stored by itself.
     """
 
     reserved: Reserved
@@ -31,6 +32,7 @@ class Language:
     parameter: str
     base: int = 0
     point: str = ".0"
+    clear: str = ""
 
     def entry(self, array: str, index: int) -> str:
         """An entry of an array, counted from 0 here."""
@@ -42,7 +44,8 @@ class Language:
 
     def statements(self, kernel: Kernel, arrays: Mapping[str, str]) -> list[str]:
         """The body of a kernel: its arguments are called as ``arrays`` says, entries are read and stored."""
-        code, taken = lower(kernel), [*arrays.values(), *self.functions.values()]
+        code = with_zeros_first(lower(kernel)) if self.clear else lower(kernel)
+        taken = [*arrays.values(), *self.functions.values()]
         scope, lines = Scope(self.reserved | taken), list[str]()
         for argument, symbols in kernel.inputs.items():
             for i, s in enumerate(symbols):
@@ -58,6 +61,7 @@ class Language:
                     lines.append(self.declare.format(name=scope[s], value=self.entry(arrays[argument], i)))
         show = self.printer(scope)
         lines += [self.declare.format(name=scope[a.target], value=show(a.value)) for a in code.assignments]
+        lines += [self.clear.format(array=arrays[array], size=size) for array, size in code.cleared]
         places = [self.entry(arrays[s.array], s.index) for s in code.stores]
         return lines + [
             self.assign.format(place=p, value=show(s.value)) for p, s in zip(places, code.stores, strict=True)

@@ -14,7 +14,7 @@ from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.symbols import TEMPORARY, WORK, Symbol, kind_of
 from phigen.targets.c.layout import comment
-from phigen.targets.code import Code, Store, lower, parts
+from phigen.targets.code import Code, Store, lower, parts, with_zeros_first
 from phigen.targets.header import plain
 from phigen.targets.language import Language
 from phigen.targets.names import Scope, identifiers
@@ -91,7 +91,8 @@ def function(
     form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays))
     purpose = f"{program.name}_{kernel.name} in {'one lane' if single else 'all lanes'}" if lanes else kernel.purpose
     code = lower(kernel)
-    pieces = parts(code if lanes else _in_order(kernel, code), LONGEST_FUNCTION)
+    code = code if lanes else _in_order(kernel, with_zeros_first(code))
+    pieces = parts(code, LONGEST_FUNCTION)
     said = [] if exported else _comment(purpose, "")  # the header says it
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if len(pieces) == 1:
@@ -107,6 +108,7 @@ def function(
     if exported:
         arguments = arguments.replace(f", {kernel.outputs[0].name}, work", ", value, work")
         head += [f"    double value[{len(kernel.roots)}];", *_default_parameters(program, kernel, form)]
+    head += [_clear(array, size) for array, size in code.cleared]
     head += [f"    {own}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
     if exported:
         head.append("    return value[0];" if returning else "    memcpy(out, value, sizeof value);")
@@ -185,7 +187,8 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
     lines = [f"    const double {', '.join(declared)};"] if declared else []
     lines += _statements(kernel, form, code, stores, scope, show)
     unused = [i for i in kernel.inputs if i not in touched]
-    unused += [o.name for o in kernel.outputs if o.name not in {s.array for s in stores}]
+    written = {*(s.array for s in stores), *(array for array, _ in code.cleared)}
+    unused += [o.name for o in kernel.outputs if o.name not in written]
     if form.workspace and not any("work[" in line for line in lines):
         unused.append("work")
     if form.returning:
@@ -241,13 +244,19 @@ def _statements(
         groups.insert(0, ("", []))
     if not split:
         ends = [len(code.assignments)]
+        yield from (_clear(array, size) for array, size in code.cleared)
     for (heading, of), end in zip(groups, ends, strict=True):
         if heading:
             yield f"    /* {heading.replace('_', ' ')} */"
         yield from _declared((a.target, f"{scope[a.target]} = {show(a.value)}") for a in code.assignments[done:end])
         done = max(done, end)
+        yield from (_clear(array, size) for array, size in code.cleared if array == heading)
         for s in of:
             yield f"    {s.array}[{s.index}]{form.lane(s.array)} = {show(s.value)};"
+
+
+def _clear(array: str, size: int) -> str:
+    return f"    memset({array}, 0, {size} * sizeof {array}[0]);"
 
 
 def _declared(assignments: Iterable[tuple[str, str]]) -> Iterator[str]:

@@ -24,6 +24,7 @@ LANGUAGE = Language(
     subscript="{array}[{index}]",
     parameter="params.{name}",
     point="",
+    clear="{array}.fill(0, 0, {size});",
 )
 
 

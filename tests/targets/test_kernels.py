@@ -1,0 +1,49 @@
+"""Kernels as functions in C and JavaScript."""
+
+import re
+
+import pytest
+from systems import compiled
+
+from phigen.scheme.kernel import Kernel, Output
+from phigen.symbolic.expression import ZERO, symbol
+from phigen.targets.c import kernels
+from phigen.targets.js.printing import LANGUAGE as JAVASCRIPT
+
+PROGRAM = compiled("pendulum_euler").program
+x, y = symbol("x"), symbol("y")
+
+
+def kernel(*values):
+    """Of x and y, with the values as those of an array, and one value of another."""
+    return Kernel("k", "a kernel", {"at": ("x", "y")}, (Output("first", (x,)), Output("matrix", values)))
+
+
+def test_what_is_mostly_zero_is_cleared_and_the_rest_is_stored():
+    sparse = kernel(x, *[ZERO] * 7, x * y)
+    text = kernels.function(PROGRAM, sparse)
+    assert "= 0.0;" not in text
+    assert re.findall(r"memset.*|matrix\[\d\] =", text) == [
+        "memset(matrix, 0, 9 * sizeof matrix[0]);",
+        "matrix[0] =",
+        "matrix[8] =",
+    ]
+    lines = JAVASCRIPT.statements(sparse, {"at": "at", "first": "first", "matrix": "matrix"})
+    assert [line for line in lines if "matrix" in line] == [
+        "matrix.fill(0, 0, 9);",
+        "matrix[0] = x;",
+        "matrix[8] = x * y;",
+    ]
+
+
+def test_few_zeros_are_stored_like_all_else():
+    assert "memset" not in kernels.function(PROGRAM, kernel(x, ZERO, y))
+
+
+@pytest.mark.parametrize("size", [1, 3])
+def test_a_kernel_in_parts_is_cleared_before_the_first_of_them(size, monkeypatch):
+    monkeypatch.setattr(kernels, "LONGEST_FUNCTION", size)
+    text = kernels.function(PROGRAM, kernel(x, *[ZERO] * 20, x * y, x + y))
+    *parts, whole = text.split("\nstatic void ")
+    assert not any("memset" in part for part in parts)
+    assert whole.index("memset(matrix, 0, 23") < whole.index("_part1(")
