@@ -7,17 +7,17 @@ the first member, ``double x[DIM]``, is looked at; it is copied and stored as th
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phigen.runtime import cache
-from phigen.runtime.binding import bound
+from phigen.runtime.c_functions import functions_of
 from phigen.runtime.c_lattice import CLattice
+from phigen.runtime.c_session import Bytes, Cotangents, CSession, Real, aligned, aligned_copy
 from phigen.runtime.gradients import KEPT, Segment, segments
 from phigen.runtime.interface import (
     FIRST_DRAWS,
@@ -31,165 +31,6 @@ from phigen.runtime.interface import (
 )
 from phigen.runtime.members import Members, one_by_one, shared_out
 
-Bytes = NDArray[np.uint8]
-Real = Any  # np.float64, or np.float32 where the C computes in single precision
-
-# Between two calls Python can deliver a keyboard interrupt.
-_STEPS_PER_CALL = 1 << 16
-_ALIGNMENT = 64  # what the widest vector registers ask for
-
-_POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
-_SIGNATURES = {
-    "solver_size": (_SIZE, ()),
-    "solver_steps_done": (_SIZE, (_POINTER,)),
-    "init": (_INT, (_POINTER, _POINTER, _POINTER)),
-    "integrate": (_INT, (_POINTER, _DOUBLE, _SIZE)),
-    "hamiltonian": (_DOUBLE, (_POINTER, _POINTER)),
-    "casimirs": (None, (_POINTER, _POINTER, _POINTER)),
-    "vector_field": (None, (_POINTER, _POINTER, _POINTER)),
-}
-
-
-# Where there is a time, in place of those of the same name.
-_TIMED = {
-    "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
-    "ensemble_at": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _DOUBLE, _SIZE, _POINTER)),
-    "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
-    "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
-}
-
-# Where there is noise.
-_WORD, _LONG = ctypes.c_uint32, ctypes.c_uint64
-_NOISY = {
-    "set_noise": (_INT, (_POINTER, _LONG, _WORD, _LONG)),
-    "integrate_along": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER)),
-}
-
-# What is there only if it was asked for, or not left out.
-_EXTRAS = {
-    "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
-    "ensemble_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, _POINTER, _POINTER)),
-    "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
-    "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER, _POINTER, _POINTER, _POINTER)),
-    "trail_size": (_SIZE, ()),
-    "pullback_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, *(_POINTER,) * 6)),
-    "level_bar": (None, (_POINTER, _POINTER, _DOUBLE, _POINTER, _POINTER)),
-    "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),
-    "set_state": (_INT, (_POINTER, _POINTER)),
-    "kick": (_INT, (_POINTER, _POINTER)),
-    "solver_time": (_DOUBLE, (_POINTER,)),
-    "monitor": (_DOUBLE, (_POINTER, _POINTER)),
-    "attitude": (None, (_POINTER, _POINTER)),
-    "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
-    "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
-    "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
-}
-
-
-class Cotangents(NamedTuple):
-    """What is pulled back along a run: cotangents of the state, of the parameters, and of e."""
-
-    state: Floats
-    parameters: Floats
-    level: Floats
-
-
-class CSession:
-    """A struct NAME_solver; being a plain value, its bytes are all there is to know. See `Session`."""
-
-    def __init__(
-        self, functions: Any, struct: Bytes, dimension: int, element: int = 0, real: Real = np.float64
-    ) -> None:
-        self._c, self._struct, self._element, self._real = functions, struct, element, real
-        self.address = ctypes.c_void_p(struct.ctypes.data)
-        self._x = struct[: real().itemsize * dimension].view(real)
-
-    @property
-    def steps(self) -> int:
-        """See `Session`."""
-        return int(self._c.solver_steps_done(self.address))
-
-    def state(self) -> Floats:
-        """See `Session`."""
-        return self._x.astype(np.float64)
-
-    def time(self) -> float:
-        """See `Session`."""
-        return float(self._c.solver_time(self.address)) if hasattr(self._c, "solver_time") else math.nan
-
-    def advance(self, h: float, steps: int) -> None:
-        """See `Session`."""
-        while steps > 0:
-            chunk = min(steps, _STEPS_PER_CALL)
-            status = self._c.integrate(self.address, h, chunk)
-            if status:
-                raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
-            steps -= chunk
-
-    def advance_along(self, h: float, increments: Floats) -> None:
-        """See `Session`."""
-        given = np.ascontiguousarray(increments, dtype=self._real)
-        status = self._c.integrate_along(self.address, h, len(given), given.ctypes.data)
-        if status:
-            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
-
-    def advance_tangent(self, h: float) -> Floats:
-        """See `Session`."""
-        if not hasattr(self._c, "step_tangent"):
-            raise MissingExtraError("step_tangent")
-        tangent = np.empty((len(self._x), len(self._x)), dtype=self._real)
-        status = self._c.step_tangent(self.address, h, tangent.ctypes.data)
-        if status:
-            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
-        return tangent.astype(np.float64, copy=False)
-
-    def pull_back(self, h: float, segment: Segment, trail: Floats, bars: Floats, found: Cotangents) -> Floats:
-        """The rows (rows, DIM) of a segment whose start this is; ``found`` are the cotangents after it, then before."""
-        rows, level = np.empty_like(bars), (found.level.ctypes.data,) * hasattr(self._c, "level_bar")
-        out = (rows.ctypes.data, bars.ctypes.data, found.state.ctypes.data, found.parameters.ctypes.data)
-        counts = (segment.count, segment.stride)
-        status = self._c.pullback(self.address, h, *counts, *out, *level, trail.ctypes.data)
-        if status:
-            raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).astype(np.float64))
-        return rows
-
-    def branch(self) -> CSession:
-        """See `Session`."""
-        return CSession(self._c, _aligned_copy(self._struct), len(self._x), self._element, self._real)
-
-    def element(self) -> Floats:
-        """See `Session`."""
-        found = np.empty(self._element, dtype=self._real)
-        if self._element:
-            self._c.attitude(self.address, found.ctypes.data)
-        return found.astype(np.float64, copy=False)
-
-    def placed(self, x: Floats) -> CSession:
-        """See `Session`."""
-        copy = self.branch()
-        copy._x[:] = x
-        return copy
-
-    def place(self, x: Floats) -> None:
-        """See `Session`."""
-        self._moved("set_state", x)
-
-    def kick(self, change: Floats) -> None:
-        """See `Session`."""
-        self._moved("kick", change)
-
-    def _moved(self, function: str, by: Floats) -> None:
-        if not hasattr(self._c, function):
-            raise TypeError("the solver was compiled without kicks: its spec leaves them out")
-        given = np.ascontiguousarray(by, dtype=self._real)
-        status = getattr(self._c, function)(self.address, given.ctypes.data)
-        if status:
-            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
-
-    def saved(self) -> bytes:
-        """See `Session`."""
-        return self._struct.tobytes()
-
 
 class CSolver:
     """The back end over the shared library of generated files (name → text); it holds no state, so that threads may
@@ -201,22 +42,7 @@ class CSolver:
         self.interface = interface
         self._real: Real = np.float32 if interface.single else np.float64
         self._files, self._library, self._gauge = dict(files), cache.load(files), gauge
-        offered = {name: s for name, s in _EXTRAS.items() if hasattr(self._library, f"{interface.name}_{name}")}
-        own = _dated(offered, interface) | (_NOISY if interface.noise else {})
-        timed = _TIMED if interface.time else {}
-        if interface.time or "init_gauge" in offered:  # times, or a gauge of each
-            _, each = _EXTRAS["ensemble_each"]
-            offered |= {"ensemble_each": (_INT, (*each[:3], _POINTER, *each[3:]))} if "ensemble_each" in offered else {}
-            _, back = _EXTRAS["pullback_each"]
-            named = "pullback_each"
-            offered |= {named: (_INT, (*back[:3], _POINTER, *back[3:]))} if named in offered else {}
-        monitored = {"pullback": (_INT, (*_EXTRAS["pullback"][1], _POINTER))} if "level_bar" in offered else {}
-        self._c = bound(
-            self._library,
-            interface.name,
-            {**_SIGNATURES, **offered, **timed, **monitored, **own},
-            single=interface.single,
-        )
+        self._c = functions_of(self._library, interface)
 
     def __reduce__(self) -> tuple[type[CSolver], tuple[Any, ...]]:
         return CSolver, (self._files, self.interface, self._gauge)
@@ -240,7 +66,7 @@ class CSolver:
     ) -> CSession:
         """See `phigen.runtime.backend.Backend`."""
         interface = self.interface
-        session = CSession(self._c, _aligned(self._c.solver_size()), interface.dimension, interface.element, self._real)
+        session = CSession(self._c, aligned(self._c.solver_size()), interface.dimension, interface.element, self._real)
         packed, start = self._packed(parameters), self._own(x0)
         if interface.time:
             status = self._c.init_at(session.address, packed.ctypes.data, start.ctypes.data, t0)
@@ -263,7 +89,7 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`; the parameters are part of the bytes."""
         if len(saved) != self._c.solver_size():
             raise ValueError(f"{len(saved)} bytes are no {self.interface.name}_solver of this library")
-        struct, interface = _aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
+        struct, interface = aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 
     def ensemble(self, members: Members, threads: int | None = None) -> Floats:
@@ -300,7 +126,7 @@ class CSolver:
             return
         _, parameters, t0 = members.numbers(0)
         packed, zeros = self._packed(parameters), np.zeros(self.interface.dimension, self._real)
-        struct = _aligned(self._c.solver_size())
+        struct = aligned(self._c.solver_size())
         numbers = [struct.ctypes.data, packed.ctypes.data, zeros.ctypes.data]
         if hasattr(self._c, "init_gauge"):
             gauge = np.zeros(len(self.interface.casimirs), self._real)
@@ -467,13 +293,6 @@ class CSolver:
         return np.ascontiguousarray(values, dtype=self._real)
 
 
-def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """The signatures of noise with the time among their arguments, where there is one."""
-    places = {"noise_fields": 1, "ensemble_of": 3} if interface.time else {}
-    found = {name: (offered[name], at) for name, at in places.items() if name in offered}
-    return {name: (result, (*a[:at], _DOUBLE, *a[at:])) for name, ((result, a), at) in found.items()}
-
-
 def _times(t: Floats | None) -> list[list[float]]:
     """The times of rows, as the first of their arguments; none where there is no time."""
     return [] if t is None else [t.tolist()]
@@ -483,18 +302,6 @@ def _addresses(x: Floats) -> range:
     """The addresses of the rows of a contiguous array."""
     start, width = x.ctypes.data, math.prod(x.shape[1:]) * x.itemsize
     return range(start, start + len(x) * width, width)
-
-
-def _aligned(size: int) -> Bytes:
-    memory = np.zeros(size + _ALIGNMENT, dtype=np.uint8)
-    start = -memory.ctypes.data % _ALIGNMENT
-    return memory[start : start + size]
-
-
-def _aligned_copy(struct: Bytes) -> Bytes:
-    copy = _aligned(len(struct))
-    copy[:] = struct
-    return copy
 
 
 def load(files: Mapping[str, str], interface: Interface) -> CSolver | CLattice:

@@ -107,7 +107,7 @@ def test_no_crossings_at_rest_or_away_from_the_section():
 
 def test_steps_too_large_to_be_made_from_scratch_are_divided(monkeypatch):
     """A solver in the middle of a run knows where to look; one that starts anew may not converge."""
-    from phigen.runtime.c_solver import CSession
+    from phigen.runtime.c_session import CSession
     from phigen.runtime.interface import BackendError
 
     advance = CSession.advance

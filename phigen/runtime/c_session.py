@@ -1,0 +1,139 @@
+"""Trajectories in the structs of a generated C solver."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.runtime.gradients import Segment
+from phigen.runtime.interface import BackendError, Floats, MissingExtraError, status_name
+
+Bytes = NDArray[np.uint8]
+Real = Any  # np.float64, or np.float32 where the C computes in single precision
+
+# Between two calls Python can deliver a keyboard interrupt.
+_STEPS_PER_CALL = 1 << 16
+_ALIGNMENT = 64  # what the widest vector registers ask for
+
+
+class Cotangents(NamedTuple):
+    """What is pulled back along a run: cotangents of the state, of the parameters, and of e."""
+
+    state: Floats
+    parameters: Floats
+    level: Floats
+
+
+class CSession:
+    """A struct NAME_solver; being a plain value, its bytes are all there is to know. See `Session`."""
+
+    def __init__(
+        self, functions: Any, struct: Bytes, dimension: int, element: int = 0, real: Real = np.float64
+    ) -> None:
+        self._c, self._struct, self._element, self._real = functions, struct, element, real
+        self.address = ctypes.c_void_p(struct.ctypes.data)
+        self._x = struct[: real().itemsize * dimension].view(real)
+
+    @property
+    def steps(self) -> int:
+        """See `Session`."""
+        return int(self._c.solver_steps_done(self.address))
+
+    def state(self) -> Floats:
+        """See `Session`."""
+        return self._x.astype(np.float64)
+
+    def time(self) -> float:
+        """See `Session`."""
+        return float(self._c.solver_time(self.address)) if hasattr(self._c, "solver_time") else math.nan
+
+    def advance(self, h: float, steps: int) -> None:
+        """See `Session`."""
+        while steps > 0:
+            chunk = min(steps, _STEPS_PER_CALL)
+            status = self._c.integrate(self.address, h, chunk)
+            if status:
+                raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
+            steps -= chunk
+
+    def advance_along(self, h: float, increments: Floats) -> None:
+        """See `Session`."""
+        given = np.ascontiguousarray(increments, dtype=self._real)
+        status = self._c.integrate_along(self.address, h, len(given), given.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
+
+    def advance_tangent(self, h: float) -> Floats:
+        """See `Session`."""
+        if not hasattr(self._c, "step_tangent"):
+            raise MissingExtraError("step_tangent")
+        tangent = np.empty((len(self._x), len(self._x)), dtype=self._real)
+        status = self._c.step_tangent(self.address, h, tangent.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
+        return tangent.astype(np.float64, copy=False)
+
+    def pull_back(self, h: float, segment: Segment, trail: Floats, bars: Floats, found: Cotangents) -> Floats:
+        """The rows (rows, DIM) of a segment whose start this is; ``found`` are the cotangents after it, then before."""
+        rows, level = np.empty_like(bars), (found.level.ctypes.data,) * hasattr(self._c, "level_bar")
+        out = (rows.ctypes.data, bars.ctypes.data, found.state.ctypes.data, found.parameters.ctypes.data)
+        counts = (segment.count, segment.stride)
+        status = self._c.pullback(self.address, h, *counts, *out, *level, trail.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), segment.first, self._x.reshape(1, -1).astype(np.float64))
+        return rows
+
+    def branch(self) -> CSession:
+        """See `Session`."""
+        return CSession(self._c, aligned_copy(self._struct), len(self._x), self._element, self._real)
+
+    def element(self) -> Floats:
+        """See `Session`."""
+        found = np.empty(self._element, dtype=self._real)
+        if self._element:
+            self._c.attitude(self.address, found.ctypes.data)
+        return found.astype(np.float64, copy=False)
+
+    def placed(self, x: Floats) -> CSession:
+        """See `Session`."""
+        copy = self.branch()
+        copy._x[:] = x
+        return copy
+
+    def place(self, x: Floats) -> None:
+        """See `Session`."""
+        self._moved("set_state", x)
+
+    def kick(self, change: Floats) -> None:
+        """See `Session`."""
+        self._moved("kick", change)
+
+    def _moved(self, function: str, by: Floats) -> None:
+        if not hasattr(self._c, function):
+            raise TypeError("the solver was compiled without kicks: its spec leaves them out")
+        given = np.ascontiguousarray(by, dtype=self._real)
+        status = getattr(self._c, function)(self.address, given.ctypes.data)
+        if status:
+            raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))
+
+    def saved(self) -> bytes:
+        """See `Session`."""
+        return self._struct.tobytes()
+
+
+def aligned(size: int) -> Bytes:
+    """Room for a struct, of zeros, where vectors may lie."""
+    memory = np.zeros(size + _ALIGNMENT, dtype=np.uint8)
+    start = -memory.ctypes.data % _ALIGNMENT
+    return memory[start : start + size]
+
+
+def aligned_copy(struct: Bytes) -> Bytes:
+    """The bytes of a struct, again."""
+    copy = aligned(len(struct))
+    copy[:] = struct
+    return copy
