@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -11,12 +11,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import Console, heading, out, out_json, table
-from phigen.cli.run_summary import finite
+from phigen.cli.run_summary import described_spectrum, finite
 from phigen.errors import StepError
 
 if TYPE_CHECKING:
     from phigen.lattice.states import Start
+    from phigen.runtime.lattice import LatticeSolver
     from phigen.spec.model import Run, Spec
+    from phigen.study.lyapunov import Spectrum
 
 #: Options of ``phigen run`` that lattices do not have.
 _ABSENT = "phigen run has no {option} for lattices"
@@ -35,15 +37,20 @@ def run_lattice(
     plot: Path | None,
     resume: bool,
     as_json: bool,
+    lyapunov: bool,
 ) -> None:
-    """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end."""
+    """Integrate a run, and print what was conserved. Raises `StepError` after that if it did not come to its end.
+
+    ``lyapunov`` asks for the largest Lyapunov exponent besides, in a second pass with a tangent vector.
+    """
     from phigen.api import chosen_target, compilation_of, lattice_solver_of
     from phigen.lattice.observing import errors_of
     from phigen.lattice.states import start_of
 
     if output and output.suffix != ".npz":
         raise click.BadParameter("frames of lattices go to .npz files", param_hint="--output")
-    compilation = compilation_of(spec, order, scheme=scheme)
+    extras = replace(spec.extras, tangent=True) if lyapunov else None
+    compilation = compilation_of(spec, order, extras, scheme=scheme)
     assert compilation.cell is not None
     start = start_of(spec, run)
     parameters = _parameters(start, settings)
@@ -63,22 +70,42 @@ def run_lattice(
             failure, made = error, error.trajectory
     if output and not failure:
         console.note(f"wrote {output}")
+    spectrum = None
+    if lyapunov and not failure:
+        spectrum = exponents_of(console, spec, run, solver, start, start.arguments | parameters)
     errors = errors_of(compilation.cell, made)
     largest = {name: float(e.max()) for name, e in errors.items()}
     if as_json:
         sizes = {"sizes": list(start.sizes), "frames": len(made)}
         method = {"target": solver.target, "order": solver.order, "step": made.h, "steps": made.steps}
-        out_json(finite({"name": spec.name, "run": run.name, **sizes, **method, "errors": largest}))
+        told = {"name": spec.name, "run": run.name, **sizes, **method, "errors": largest}
+        out_json(finite(told | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
         _print(spec, run, start, f"{compilation.label}, order {solver.order}, target {solver.target}", made, largest)
+        if spectrum:
+            changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
+            out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")
     if plot:
         from phigen.drawing.figures import save
         from phigen.drawing.lattices import lattice_figure
 
-        save(lattice_figure(made, errors, f"{spec.name}, {run.name}"), plot)
+        save(lattice_figure(made, errors, f"{spec.name}, {run.name}", spectrum=spectrum), plot)
         console.note(f"wrote {plot}")
     if failure:
         raise failure
+
+
+def exponents_of(
+    console: Console, spec: Spec, run: Run, solver: LatticeSolver, start: Start, parameters: Mapping[str, Any]
+) -> Spectrum:
+    """The largest Lyapunov exponent of a run. Raises `StepError`."""
+    from phigen.study.lyapunov import lattice_spectrum
+
+    t0, draws = float(run.start) if spec.time else None, {"seed": run.seed} if spec.noise else {}
+    with console.progress(f"{spec.name} {run.name}, with a tangent vector", run.steps) as progress:
+        return lattice_spectrum(
+            solver, start.state, float(run.step), run.steps, 1, parameters, t0, progress=progress, **draws
+        )
 
 
 def changed(run: Run, step: float | None, steps: int | None) -> Run:

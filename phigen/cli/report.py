@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from phigen.cli.console import Console, out_document, pass_console, verbosity
-from phigen.cli.experiment import expect_system, prepared
+from phigen.cli.experiment import prepared
 from phigen.cli.sources import ORDER, expect_writable, load_one, one_spec, run_option, scheme_option
 from phigen.errors import CheckError
 from phigen.writing import write
@@ -53,9 +53,7 @@ def command(
     if output != "-":
         expect_writable(Path(target), "--output")
     if spec.lattice:
-        if lyapunov:
-            expect_system(spec)
-        report_lattice(console, spec, spec_file, output, target, name, order, scheme, quick)
+        report_lattice(console, spec, spec_file, output, target, name, order, scheme, lyapunov, quick)
         return
     experiment = prepared(spec, name) if spec.runs or name or lyapunov else None
     if experiment is None:

@@ -22,24 +22,27 @@ def report_lattice(
     name: str | None,
     order: int | None,
     scheme: str | None,
+    lyapunov: bool,
     quick: bool,
 ) -> None:
     """Write the page of a lattice. Raises what ended its run, or the `CheckError` of what fell short, after that."""
     from phigen.cli.report import command_of, write_page
+    from phigen.cli.verify import with_tangent
     from phigen.compiler import examine
     from phigen.proofs.examination import refutation
     from phigen.report.lattice import LatticeMaterial, lattice_document
 
-    found = examine(spec, order=order, scheme=scheme)
+    extras = with_tangent(spec) if lyapunov else None
+    found = examine(spec, order=order, scheme=scheme, extras=extras)
     if found.refuted:
         raise CheckError(refutation(found))
     if found.compilation is None:
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
-    written = command_of(spec_file, target, name, order, scheme, False, quick)
+    written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
     material, failure = LatticeMaterial(found, found.compilation, written), None
     if spec.runs or name:
-        material, failure = _measured(material, found.compilation, name, scheme, quick, console)
+        material, failure = _measured(material, found.compilation, name, scheme, lyapunov, quick, console)
     else:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
     write_page(lattice_document(material), material.trajectory is not None, output, target, console)
@@ -52,6 +55,7 @@ def _measured(
     compilation: Compilation,
     name: str | None,
     scheme: str | None,
+    lyapunov: bool,
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, PhigenError | None]:
@@ -63,6 +67,7 @@ def _measured(
     from phigen import registry
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.experiment import run_of
+    from phigen.cli.lattice_run import exponents_of
     from phigen.cli.verify import fallen_short, verified_lattice
     from phigen.lattice.observing import errors_of
     from phigen.lattice.states import start_of
@@ -102,6 +107,8 @@ def _measured(
     )  # fmt: skip
     if failure:
         return material, failure
+    if lyapunov:
+        material = replace(material, spectrum=exponents_of(console, spec, run, solver, start, start.arguments))
     console.note(f"{spec.name}: verifying")
     targets = spec.targets if toolchain.available() else (registry.automatic(compiler=False),)
     verification = verified_lattice(compilation, run.name, quick, console, targets)

@@ -48,7 +48,11 @@ _TABLES = (".csv", ".npz")
 @click.option(
     "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the run: FILE.png, FILE.svg or FILE.pdf."
 )
-@click.option("--lyapunov", is_flag=True, help="Lyapunov exponents, through the exact derivative of each step.")
+@click.option(
+    "--lyapunov",
+    is_flag=True,
+    help="Lyapunov exponents, through the exact derivative of each step; of a lattice the largest.",
+)
 @click.option("--resume", is_flag=True, help="Go on with an interrupted run that was writing the same files.")
 @click.option("--json", "as_json", is_flag=True, help="The summary for machines.")
 @verbosity
@@ -91,11 +95,11 @@ def command(
         require_matplotlib()
     spec = load_one(spec_file)
     if spec.lattice:
-        expect_no(section=section, lyapunov=lyapunov, until=until, every=every, at=at, extend=extend)
+        expect_no(section=section, until=until, every=every, at=at, extend=extend)
         expect_no(**{"from": source})
         chosen = changed(run_of(spec, name), step, steps)
         given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
-        run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json)
+        run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json, lyapunov=lyapunov)
         return
     _expect_together(
         {"--until": until, "--every": every, "--at": at, "--extend": extend},

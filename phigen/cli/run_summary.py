@@ -113,11 +113,12 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
     if recorder.finder:
         told["section"] = {"expression": recorder.section_text, "crossings": recorder.points.seen}
     if spectrum := recorder.spectrum:
-        told["lyapunov"] = _described_spectrum(spectrum)
+        told["lyapunov"] = described_spectrum(spectrum)
     return told
 
 
-def _described_spectrum(spectrum: Spectrum) -> dict[str, Any]:
+def described_spectrum(spectrum: Spectrum) -> dict[str, Any]:
+    """Lyapunov exponents as JSON has them."""
     return {
         "exponents": spectrum.exponents.tolist(),
         "largest": spectrum.largest,

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from phigen.drawing.exponents import draw_exponents
 from phigen.drawing.palette import SERIES, styled
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from phigen.study.lyapunov import Spectrum
 
 #: Most panels of coordinates, times in a diagram, and snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
@@ -21,18 +24,27 @@ LEVELS = 48
 
 
 @styled
-def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: str, dots: int = MOST_TIMES) -> Figure:
+def lattice_figure(
+    run: LatticeTrajectory,
+    errors: Mapping[str, Floats],
+    title: str,
+    dots: int = MOST_TIMES,
+    spectrum: Spectrum | None = None,
+) -> Figure:
     """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
+
+    Below are Lyapunov exponents, if there are any.
 
     A diagram has so many ``dots`` at most along the time.
     """
     from matplotlib.figure import Figure
 
     names = run.coordinates[:MOST_PANELS]
-    figure = Figure(figsize=(8.2, 2.2 * len(names) + 2.4), layout="constrained")
+    below = [1.8] if spectrum is None else [1.8, 1.8]
+    figure = Figure(figsize=(8.2, 2.2 * len(names) + 0.6 + sum(below)), layout="constrained")
     if title:
         figure.suptitle(title, fontsize=10)
-    heights = [2.2] * len(names) + [1.8]
+    heights = [2.2] * len(names) + below
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
     for part, name in zip(parts, names, strict=False):
         values = run.column(name)
@@ -40,7 +52,9 @@ def lattice_figure(run: LatticeTrajectory, errors: Mapping[str, Floats], title: 
             _draw_diagram(part, name, run, values, dots)
         else:
             _draw_snapshots(part, name, run, values)
-    _draw_errors(parts[-1].add_subplot(), run, errors)
+    _draw_errors(parts[len(names)].add_subplot(), run, errors)
+    if spectrum is not None:
+        draw_exponents(parts[-1].add_subplot(), spectrum)
     return figure
 
 

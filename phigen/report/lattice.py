@@ -22,6 +22,7 @@ from phigen.report.live_lattice import LatticeLive, lattice_live_section, lattic
 from phigen.report.material import Material
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.spec.model import Run
+from phigen.study.lyapunov import Spectrum
 from phigen.study.verification import Verification
 from phigen.symbolic.arrays import Floats
 
@@ -31,7 +32,7 @@ class LatticeMaterial:
     """What the page of a lattice is made of; without a run there is neither a trajectory nor a verification.
 
     ``errors`` (frames,) are those of what is conserved, by name; ``energies`` (frames, *sizes) those of the sites.
-    ``failure`` says why the run came to no end. ``live`` is the panel.
+    ``failure`` says why the run came to no end. ``live`` is the panel, ``spectrum`` are Lyapunov exponents.
     """
 
     examination: Examination
@@ -44,6 +45,7 @@ class LatticeMaterial:
     verification: Verification | None = None
     failure: str = ""
     live: LatticeLive | None = None
+    spectrum: Spectrum | None = None
 
 
 def lattice_document(material: LatticeMaterial) -> str:
@@ -107,10 +109,15 @@ def _run(material: LatticeMaterial, made: LatticeTrajectory) -> Iterator[Markup]
     yield page.facts(pairs)
     rows = [(name, [("number", page.scientific(float(e.max())))]) for name, e in material.errors.items()]
     yield page.table("Largest errors along the run", [("", "quantity"), ("number", "error")], rows)
+    if material.spectrum:
+        yield evidence.lyapunov_paragraph(material.spectrum)
     if not drawable():
         yield page.paragraph(NO_FIGURES, "note")
         return
-    from phigen.report.pictures import picture
+    from phigen.report.pictures import lyapunov_picture, picture
+
+    if material.spectrum:
+        yield lyapunov_picture(material.spectrum)
 
     flat = made.x.ndim == 3
     caption = "The fields over space, upwards, and time" if flat else "The fields at some times"

@@ -15,6 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from phigen.runtime.interface import Progress
+from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
@@ -61,22 +63,36 @@ class Spectrum:
 
 
 class FrameGrowth:
-    """The growth of a frame of tangent vectors, step by step; ``state`` is all there is, as arrays."""
+    """The growth of a frame of tangent vectors, step by step; ``state`` is all there is, as arrays.
 
-    def __init__(self, dimension: int, h: float) -> None:
+    It begins as all unit vectors, or as the columns of ``frame``.
+    """
+
+    def __init__(self, dimension: int, h: float, frame: Floats | None = None) -> None:
         self._h = h
+        begin = np.eye(dimension) if frame is None else frame
         self.state: dict[str, Any] = {
-            "frame": np.eye(dimension),
-            "logs": np.zeros(dimension),
+            "frame": begin,
+            "logs": np.zeros(begin.shape[1]),
             "steps": np.zeros((), dtype=np.int64),
             "times": np.empty(0),
-            "history": np.empty((0, dimension)),
+            "history": np.empty((0, begin.shape[1])),
         }
+
+    @property
+    def frame(self) -> Floats:
+        """The vectors, as orthonormal columns."""
+        found: Floats = self.state["frame"]
+        return found
 
     def see(self, tangent: Floats) -> None:
         """Carry the frame through one step of that derivative."""
+        self.take(tangent @ self.frame)
+
+    def take(self, carried: Floats) -> None:
+        """The columns of the frame after one step."""
         state = self.state
-        state["frame"], r = np.linalg.qr(tangent @ state["frame"])
+        state["frame"], r = np.linalg.qr(carried)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
         state["steps"] = state["steps"] + 1
         if state["steps"] >= _SPACING ** len(state["times"]):
@@ -114,4 +130,36 @@ def spectrum(
     growth = FrameGrowth(len(solver.coordinates), h)
     for _, tangent in solver.tangents(x0, h, steps, t0=t0, parameters=parameters):
         growth.see(tangent)
+    return growth.spectrum()
+
+
+def lattice_spectrum(
+    solver: LatticeSolver,
+    x0: ArrayLike,
+    h: float,
+    steps: int,
+    count: int = 1,
+    parameters: Mapping[str, Any] | None = None,
+    t0: float | None = None,
+    progress: Progress | None = None,
+    **draws: int | None,
+) -> Spectrum:
+    """The ``count`` largest Lyapunov exponents of a lattice along a run from ``x0`` (coordinates, *sizes).
+
+    The tangent vectors begin at random. ``solver`` must be compiled with ``tangent=True``, else `TypeError`. Raises
+    `StepError`, and `ValueError` for wrong arguments. ``draws`` are those of noise: seed, step0.
+    """
+    x = np.asarray(x0, dtype=float)
+    if not 1 <= count <= x.size:
+        raise ValueError(f"a lattice of these sizes has 1 to {x.size} exponents, not {count}")
+    frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
+    growth = FrameGrowth(x.size, h, frame)
+    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), t0=t0, parameters=parameters, **draws)
+    following: Floats | None = None
+    for done in range(1, steps + 1):
+        _, carried = carry.send(following)
+        growth.take(carried.reshape(count, -1).T)
+        following = growth.frame.T.reshape(carried.shape)
+        if progress and done % 64 == 0:
+            progress(done)
     return growth.spectrum()

@@ -42,9 +42,10 @@ def test_a_run_keeps_what_it_should(phigen, chain, tmp_path):
 
 def test_a_run_is_drawn_over_space_and_time(phigen, chain, tmp_path):
     pytest.importorskip("matplotlib")
-    done = phigen("run", chain, "-t", "numpy", "--plot", tmp_path / "wave.svg")
+    done = phigen("run", chain, "-t", "numpy", "--lyapunov", "--plot", tmp_path / "wave.svg")
     assert done.exit_code == 0
     assert "largest error" in done.stdout
+    assert "largest Lyapunov exponent after t = 2: 0." in done.stdout
     assert "<svg" in (tmp_path / "wave.svg").read_text(encoding="utf-8")
 
 
@@ -104,7 +105,7 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
 
 @pytest.mark.parametrize(
     "command",
-    [["verify", "--plot", "a.svg"], ["tune"], ["report", "--lyapunov"], ["run", "--lyapunov"]],
+    [["verify", "--plot", "a.svg"], ["tune"], ["run", "--until", "2"]],
 )
 def test_what_lattices_do_not_have_is_refused(phigen, chain, command):
     done = phigen(*command, chain)

@@ -5,7 +5,7 @@ import pytest
 from support import compiled
 
 from phigen import api, spec
-from phigen.study.lyapunov import spectrum
+from phigen.study.lyapunov import lattice_spectrum, spectrum
 
 #: H = a q1 p1 + b q2 p2: the exponents are ±a, ±b. The last coordinate is a Casimir.
 SADDLE = """
@@ -79,3 +79,25 @@ def test_growth_is_followed_along_the_trajectory_that_is_integrated():
 def test_a_solver_without_tangents_is_refused():
     with pytest.raises(TypeError, match="tangent=True"):
         spectrum(api.compile(spec.loads(SADDLE)), [0, 0, 0, 0, 1], 0.05, 10)
+
+
+#: A ring of pendulums upside down: a wave of number m has the exponents ± sqrt(1 - 0.8 sin²(πm/6)).
+UPSIDE_DOWN = """
+phigen: 1
+name: upside_down
+lattice: {axes: [i]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - q**2/2 + (q[i+1] - q)**2/10
+order: 6
+"""
+
+
+def test_a_lattice_has_the_exponents_of_its_waves():
+    found = lattice_spectrum(solver(spec.loads(UPSIDE_DOWN), "numpy"), np.zeros((2, 6)), 0.25, 400, 4)
+    grown = found.history * found.times[:, np.newaxis]
+    late = np.flatnonzero(found.times > 60)[0]  # by then the frame has turned
+    rates = (grown[-1] - grown[late]) / (found.t - found.times[late])
+    assert np.max(np.abs(rates - np.sqrt([1, 0.8, 0.8, 0.4]))) < 1e-4
+    with pytest.raises(ValueError, match="1 to 12 exponents, not 13"):
+        lattice_spectrum(solver(spec.loads(UPSIDE_DOWN), "numpy"), np.zeros((2, 6)), 0.1, 400, 13)
