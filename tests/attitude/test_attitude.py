@@ -350,6 +350,16 @@ def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
     assert np.abs((found.attitude**2).sum(axis=1) - 1).max() < 1e-15
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("case", ["body", "body, split"])
+def test_after_a_kick_a_body_turns_as_one_that_starts_there(case, target):
+    """By another rate of the Casimirs that are taken from H: an impulse along the momentum too changes it."""
+    session = solver(case, target, 6).session([0.3, 1.0, 0.2]).step(0.02, 10)
+    session.kick(0.5 * session.x)
+    fresh = session.solver.session(session.x, attitude0=session.attitude)
+    assert session.step(0.02, 40).attitude == pytest.approx(fresh.step(0.02, 40).attitude, abs=1e-10)
+
+
 ALL = ["body", "body by Cayley", "body along paths", "body, split", "momenta in space", "top", "so(4)", "sl(2)"]
 
 

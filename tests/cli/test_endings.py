@@ -124,6 +124,15 @@ def test_a_finished_run_is_extended_as_if_it_had_not_ended(phigen, write, text, 
     assert errors[1] == pytest.approx(errors[0], rel=0.3, abs=1e-14)
 
 
+def test_an_extension_holds_the_e_of_the_start(phigen, write):
+    """That of its own first state would be off by the error of the energy."""
+    spec = write("spec.yaml", BODY)
+    ran(phigen, spec, "--steps", 80, "-o", "a.csv")
+    ran(phigen, spec, "--steps", 40, "-o", "b.csv")
+    ran(phigen, spec, "--steps", 40, "--extend", "-o", "b.csv")
+    assert table("b.csv") == pytest.approx(table("a.csv"), abs=1e-13)
+
+
 def test_a_run_starts_where_another_ended(phigen, write):
     spec = write("spec.yaml", TURNING)
     ran(phigen, spec, "--until", 2, "-o", "a.npz")
