@@ -9,15 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from phigen.compiler import compile_spec
+from phigen import progress
+from phigen.compiler import compile_proved, compile_spec
 from phigen.errors import LimitError
+from phigen.realisations import sampled
 from phigen.scheme import discretisation
 from phigen.scheme.estimate import OperationCount, TooManyError
 from phigen.scheme.generating import collected_form, graph_form
 from phigen.scheme.lowering import cost
 from phigen.series.hamilton_jacobi import PolynomialSeries, polynomial_series
 from phigen.spec import limits, loads
-from phigen.symbolic import budgets
+from phigen.symbolic import budgets, expression
 from phigen.symbolic.expression import ONE, symbol, total_at
 from phigen.symbolic.symbols import STEP
 from phigen.symbolic.tower import Tower
@@ -173,6 +175,26 @@ def test_a_graph_whose_hessian_is_too_large_is_given_up_before_it_is_made(monkey
     h = loads(spec(names_, "brackets: {x1: {x2: 1}}", f"sin({'*'.join(names_)})")).hamiltonian
     with pytest.raises(OverflowError, match="a part of the Hessian"):
         graph_form([h], names_, [])
+
+
+def test_what_lasts_counts_how_much_of_it_is_done(monkeypatch):
+    """Within the stages of the compiler, so that the count of each comes to its total."""
+    monkeypatch.setattr(expression, "MANY", 20)
+    monkeypatch.setattr(sampled.limits, "PROOF_PRODUCTS", 0)
+    stages = {}
+    text = spec(names(4), "lie_algebra: {name: gl(2)}", "+".join(f"{i}*x{i}**2" for i in range(1, 5)))
+    text += "birealisation: cayley\n"
+    with progress.watched(lambda now: stages.update({id(now[-1]): now} if now else {})):
+        compile_proved(loads(text))
+        OperationCount(10**6, lambda name: False).matrix([{0: symbol("a")}], [{0: symbol("b")}])
+    counted = {now[-1].name for now in stages.values() if now[-1].total and now[-1].done == now[-1].total}
+    assert counted >= {
+        *(f"S_{i}" for i in (1, 2, 3)),
+        *(f"Hessian of the {form}" for form in ("graph", "polynomial")),
+        *("Newton matrix", "operations of the Newton matrix", "derivatives of α and β", "expressions"),
+    }
+    within = {outer.name for now in stages.values() for outer in now[:-1] if now[-1].total}
+    assert within >= {"proofs", "bi-realisation", "generating function", "program"}
 
 
 def test_products_of_matrices_are_counted_as_they_would_be_made():

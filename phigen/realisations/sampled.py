@@ -38,10 +38,14 @@ def is_large(system: System, realisation: BiRealisation) -> bool:
 
 def brackets_at_points(system: System, realisation: BiRealisation, titles: Sequence[str]) -> Iterator[Statement]:
     """The statements on {α_i, α_j}, {β_i, β_j} and {α_i, β_j}, with their titles."""
-    with progress.stage("derivatives of α and β"):
-        maps = realisation.alpha, realisation.beta
-        variables = [*system.coordinates, *covector_names(system.coordinates)]
-        slopes = tuple([gradient(e, variables) for e in half] for half in maps)
+    maps = realisation.alpha, realisation.beta
+    variables = [*system.coordinates, *covector_names(system.coordinates)]
+    slopes: tuple[list[list[Expression]], ...] = ([], [])
+    with progress.stage("derivatives of α and β", 2 * system.dimension) as running:
+        for half, rows in zip(maps, slopes, strict=True):
+            for e in half:
+                rows.append(gradient(e, variables))
+                running.done += 1
     names = symbols_of(*(e for half in maps for e in half), *(e for row in system.poisson for e in row))
     missing = [v for v in variables if v not in names]
     found: list[list[str]] = []

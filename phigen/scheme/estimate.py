@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 
+from phigen import progress
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
@@ -66,15 +67,20 @@ class OperationCount:
         before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
         columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
-        for row in left:
-            sums: dict[int, dict[int, int]] = {}
-            for k, e in row.items():
-                unit, factor = e.is_number and abs(e.value) == 1, self._leaves[id(e)]
-                for j, other in columns[k].items():
-                    sums.setdefault(j, {})[k] = other if unit else self._node(0, factor, other)
-            for terms in sums.values():
-                self._total(terms)
+        with progress.stage("operations of the Newton matrix", len(left)) as running:
+            for row in left:
+                self._row(row, columns)
+                running.done += 1
         return self.operations - before
+
+    def _row(self, row: SparseRow, columns: Sequence[Mapping[int, int]]) -> None:
+        sums: dict[int, dict[int, int]] = {}
+        for k, e in row.items():
+            unit, factor = e.is_number and abs(e.value) == 1, self._leaves[id(e)]
+            for j, other in columns[k].items():
+                sums.setdefault(j, {})[k] = other if unit else self._node(0, factor, other)
+        for terms in sums.values():
+            self._total(terms)
 
     @staticmethod
     def _different(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:

@@ -94,9 +94,12 @@ def collected_form(
         table = Coefficients(static, [*times, *increments])
         slope = tuple(ring.expression(g, table) for g in first)
         if entrywise:
-            hessian = _symmetric(
-                [[ring.expression(ring.derivative(first[i], j), table) for j in range(i, n)] for i in range(n)]
-            )
+            rows: list[list[Expression]] = []
+            with progress.stage("Hessian of the polynomial", n) as running:
+                for i in range(n):
+                    rows.append([ring.expression(ring.derivative(first[i], j), table) for j in range(i, n)])
+                    running.done = i + 1
+            hessian = _symmetric(rows)
         else:
             hessian = _differentiated(slope, coordinates)
         duration = ring.expression(elapsed[0], table) if elapsed else None

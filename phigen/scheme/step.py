@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
+from phigen import progress
 from phigen.scheme.generating import GeneratingFunction
 from phigen.symbolic.expression import (
     ONE,
@@ -69,7 +70,11 @@ def linearise(
     rest = iter(values[2 * n :])
     by_x, by_p = ([{j: next(rest) for j in row} for row in rows] for rows in (by_x, by_p))
     hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in generating.hessian]
-    jacobians = [_along(x_part, p_part, hessian) for x_part, p_part in zip(by_x, by_p, strict=True)]
+    jacobians = []
+    with progress.stage("Newton matrix", 2 * n) as running:
+        for x_part, p_part in zip(by_x, by_p, strict=True):
+            jacobians.append(_along(x_part, p_part, hessian))
+            running.done += 1
     jacobian = [[e + (ONE if i == j else ZERO) for j, e in enumerate(row)] for i, row in enumerate(jacobians[:n])]
     return Linearised(values[:n], values[n : 2 * n], jacobian, jacobians[n:])
 

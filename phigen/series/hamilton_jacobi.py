@@ -206,8 +206,8 @@ class _Recursion:
                 raise self._overflow
             self._expect_small(terms)
             try:
-                with progress.stage(f"S_{len(self._found) + 1}"):
-                    self._found.append(self._next())
+                with progress.stage(f"S_{len(self._found) + 1}", len(self._taylor.order)) as running:
+                    self._found.append(self._next(running))
             except OverflowError as error:
                 self._overflow = error
         return tuple(self._found[:terms])
@@ -222,13 +222,14 @@ class _Recursion:
         if size > MOST_SLOPES:
             raise OverflowError(f"the gradient of S_{terms} would have about {size:.0f} terms")
 
-    def _next(self) -> Any:
+    def _next(self, running: progress.Stage) -> Any:
         i, even = len(self._found), self._symmetric and len(self._found) % 2 == 1
         moves = i > 0 and not (self._symmetric and i % 2 == 0)
         slopes = self._slope(self._found[-1], self._coordinates) if moves else [self._zero] * len(self._momenta)
         if moves and self.ring.bytes_per_term:
             self._sizes[i] = max(1, sum(map(len, slopes)))
-        self._taylor.advance(dict(zip(self._momenta, slopes, strict=True)) | beginning(self.ring, self._times, i))
+        inputs = dict(zip(self._momenta, slopes, strict=True)) | beginning(self.ring, self._times, i)
+        self._taylor.advance(inputs, running)
         if i and isinstance(self._found[-1], Sized) and len(self._found[-1]) > limits.SERIES_TERMS:
             raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
         if even:

@@ -28,17 +28,21 @@ a colon (``p:x1``, ``h:``), which no name in a spec can; they never clash with n
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
 from functools import lru_cache, reduce
 from hashlib import blake2b
 from typing import Any, TypeVar
 from weakref import WeakValueDictionary
 
+from phigen import progress
 from phigen.symbolic.functions import FUNCTIONS
 
 _NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
+
+#: So many nodes take a tenth of a second or more to walk over.
+MANY = 10_000
 
 Number = int | Fraction
 T = TypeVar("T")
@@ -375,9 +379,23 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
     a shared node is visited once.
     """
     values: dict[int, T] = {}
-    for node in topological(roots):
+    for node in _counted(topological(roots)):
         values[id(node)] = visit(node, [values[id(a)] for a in node.args])
     return [values[id(r)] for r in roots]
+
+
+def _counted(order: Sequence[Expression]) -> Iterable[Expression]:
+    """The nodes in turn; of very many a stage says how many are done."""
+    if len(order) < MANY:
+        return order
+
+    def counted() -> Iterator[Expression]:
+        with progress.stage("expressions", len(order)) as running:
+            for node in order:
+                yield node
+                running.done += 1
+
+    return counted()
 
 
 _BUILDERS: dict[str, Callable[..., Expression]] = {"add": add, "sub": sub, "neg": neg, "mul": mul, "power": power}
@@ -457,7 +475,7 @@ def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> lis
     """The derivatives of each root that are not 0, by name: those of `derivatives`, in one sweep for all names."""
     wanted = frozenset(names)
     slopes: dict[int, dict[str, Expression]] = {}
-    for node in topological(roots):
+    for node in _counted(topological(roots)):
         if node.op == "symbol":
             slopes[id(node)] = {node.value: ONE} if node.value in wanted else {}
             continue

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any, Protocol
 
+from phigen import progress
 from phigen.symbolic import budgets
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.expression import (
@@ -131,13 +132,15 @@ class Taylor:
         """The coefficients of a node, as far as they are known."""
         return self.series[id(e)]
 
-    def advance(self, inputs: dict[str, Any]) -> None:
-        """Compute the next level of all nodes; ``inputs`` gives that of the moving symbols."""
-        for e in self.order:
+    def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
+        """Compute the next level of all nodes; ``inputs`` gives that of the moving symbols, ``running`` counts them."""
+        for done, e in enumerate(self.order, 1):
             own = self.series[id(e)]
             own.append(self._coefficient(e, len(own), inputs))
             if e.op in ("add", "sub", "neg"):  # sums of sums are kept too, and may be longer than all products
                 self._count(own[-1])
+            if running:
+                running.done = done
 
     def _product(self, a: Any, b: Any) -> Any:
         found = self.ring.product(a, b)

@@ -16,6 +16,7 @@ from typing import Any
 
 from flint import Ordering, fmpq, fmpq_mpoly_ctx
 
+from phigen import progress
 from phigen.symbolic import budgets
 from phigen.symbolic.arithmetic import Arithmetic
 from phigen.symbolic.entire import ENTIRE
@@ -84,11 +85,13 @@ class Tower(Arithmetic[Poly]):
         wanted = [e for e in topological(list(expressions)) if not _is_arithmetic(e)]
         self._set_context(spare=len(wanted))
         self._renamed = True
-        while self._renamed:
-            self._renamed = False
-            for e in wanted:
-                self._absorb(e)
-            self._close()
+        with progress.stage("functions") as running:
+            while self._renamed:
+                self._renamed, running.done = False, 0
+                for e in wanted:
+                    self._absorb(e)
+                    running.done += 1
+                self._close(running)
         if self._room > len(self._index):
             self._set_context()
 
@@ -174,7 +177,7 @@ class Tower(Arithmetic[Poly]):
             {m + (0,) * (size - len(m)) if len(m) < size else m[:size]: c for m, c in element.to_dict().items()}
         )
 
-    def _close(self) -> None:
+    def _close(self, running: progress.Stage) -> None:
         """Add generators until the derivative of each is in the ring."""
         done = size = 0
         while done < len(self.generators):
@@ -187,6 +190,7 @@ class Tower(Arithmetic[Poly]):
                     if size > budgets.PRODUCT_BYTES:
                         raise OverflowError("derivatives with too many terms, of functions inside functions")
             done += 1
+            running.done += 1
 
     # -- conversion -------------------------------------------------------------------------------
 
