@@ -168,7 +168,9 @@ def timed(experiment: Experiment, solver: Solver, every: float | None, at: str |
         beyond = [t for t in times if (t - begin) * sign < 0 or (t - end) * sign > 1e-9 * abs(end - begin)]
         if beyond:
             raise click.BadParameter(f"{beyond[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
-        return replace(experiment, times=tuple(sorted({t for t in times if t != begin}, reverse=sign < 0)))
+        times = sorted({t for t in times if t != begin}, reverse=sign < 0)
+        _expect_whole(experiment, solver, times, "--at")
+        return replace(experiment, times=tuple(times))
     assert every is not None
     if not every > 0 or not math.isfinite(every):
         raise click.BadParameter("the time between states must be positive", param_hint="--every")
@@ -176,7 +178,17 @@ def timed(experiment: Experiment, solver: Solver, every: float | None, at: str |
     if count > _MOST_TIMES:
         raise click.BadParameter(f"that would be {count:.3g} states", param_hint="--every")
     times = [experiment.t0 + sign * every * k for k in range(1, int(count) + 1)]
+    _expect_whole(experiment, solver, times, "--every")
     return replace(experiment, times=tuple(t for t in times if (t - begin) * sign > 0))
+
+
+def _expect_whole(experiment: Experiment, solver: Solver, times: Sequence[float], option: str) -> None:
+    """That a path of the noise is known at these times: at the ends of its steps, and nowhere between."""
+    for time in times if solver.interface.noise else ():
+        steps = (time - experiment.begin) / experiment.h
+        if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):
+            message = f"with noise states are known after whole steps of {abs(experiment.h)!r}, and {time!r} is not"
+            raise click.BadParameter(f"{message} at the end of one", param_hint=option)
 
 
 def _listed(at: str) -> list[float]:

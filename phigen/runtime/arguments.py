@@ -95,6 +95,18 @@ def expect_no_noise(what: str, interface: Interface) -> None:
         raise TypeError(f"{what} is not offered with noise: parts of a step are not on the same path")
 
 
+def rows_at(t: Floats, x: Floats, wanted: Floats) -> Floats:
+    """The rows of ``x`` (rows, DIM) at some of the times ``t``, where others are not on the path: `ValueError`."""
+    nearest = np.argmin(np.abs(t[:, np.newaxis] - wanted), axis=0)
+    apart = np.abs(t[nearest] - wanted)
+    if (apart > 1e-9 * np.ptp(t)).any():
+        between = float(wanted[int(np.argmax(apart))])
+        message = f"with noise only states that are stored can be asked for: {between!r} is between two of them"
+        raise ValueError(f"{message}, where the path is not known; stride=1 stores all steps")
+    found: Floats = x[nearest]
+    return found
+
+
 def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], more: dict[str, Any]) -> Floats | None:
     """The times of states of a ``shape``, one row; None where there is no time, and t may be a parameter."""
     if not interface.time:

@@ -186,7 +186,8 @@ class Solver(Named[Backend, Interface]):
 
     def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
         """The states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
-        arguments.expect_no_noise("Trajectory.at", self.interface)
+        if self.interface.noise:
+            return arguments.rows_at(trajectory.t, trajectory.x, times)
         values, h = dict(trajectory.parameters), trajectory.h
         first = self._started(trajectory.x[0], h, values, float(trajectory.t[0]) if self.interface.time else 0.0)
 

@@ -103,7 +103,8 @@ class Trajectory:
         """The states (times, DIM) at given times, by steps of the same method from the nearest row.
 
         No interpolation: each state is one further step, of the size that takes the rest of the time, so it lies on the
-        leaf. Raises `ValueError` for times out of the range of t, and `StepError`.
+        leaf. With noise only times of rows can be asked for. Raises `ValueError` for other times, and for those out of
+        the range of t, and `StepError`.
         """
         if self.solver is None:
             raise TypeError("this trajectory was not made by a solver of phigen")

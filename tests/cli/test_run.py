@@ -252,3 +252,18 @@ def test_figures_without_matplotlib_are_refused_before_the_work(phigen, write, m
     assert done.exit_code == 2
     assert "pip install matplotlib" in done.stderr
     assert not Path("a.csv").exists()
+
+
+def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
+    """A part of a step has other random numbers than the whole, so its end is not on the path."""
+
+    def made(name, *options):
+        path = tmp_path / name
+        done = phigen("run", "double_well", "-t", "numpy", "--steps", "8", *options, "-o", path)
+        return done, path.read_text().splitlines() if done.exit_code == 0 else []
+
+    (_, every), (_, some) = made("a.csv", "--every", "0.1"), made("b.csv", "--at", "0.1,0.3")
+    assert some[2:4] == [every[2], every[4]]
+    part, _ = made("c.csv", "--at", "0.12")
+    assert part.exit_code == 2
+    assert "0.12 is not at the end of one" in part.stderr

@@ -467,3 +467,12 @@ def test_arguments_of_noise_are_checked():
         quiet.integrate([0, 0, 1], 0.1, 3, seed=1)
     with pytest.raises(TypeError, match="section is not offered with noise"):
         noisy.section([0, 0, 1], 0.1, 3, lambda x: x[:, 0])
+
+
+def test_states_at_times_are_those_after_whole_steps():
+    """A part of a step has other random numbers than the whole: its end is not on the path."""
+    found = solver(made("thermal"), "numpy").integrate([0, 0, 1], 0.1, 6, 2, seed=3)
+    assert found.at([0.4, 0.2]).tolist() == [found.x[2].tolist(), found.x[1].tolist()]
+    for between in (0.1, 0.25):
+        with pytest.raises(ValueError, match=f"{between} is between two of them"):
+            found.at([0.2, between])
