@@ -104,7 +104,7 @@ def exponents_of(
     t0, draws = float(run.start) if spec.time else None, {"seed": run.seed} if spec.noise else {}
     with console.progress(f"{spec.name} {run.name}, with a tangent vector", run.steps) as progress:
         return lattice_spectrum(
-            solver, start.state, float(run.step), run.steps, 1, parameters, t0, progress=progress, **draws
+            solver, start.state, float(run.step), run.steps, 1, parameters, t0=t0, progress=progress, **draws
         )
 
 

@@ -50,7 +50,7 @@ _NOISY = {**_PASSED, "set_noise": (_INT, (_POINTER, ctypes.c_uint64, ctypes.c_ui
 #: What splittings have, and steps by hand where they are offered.
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "tangent_size": (_SIZE, (_POINTER, _SIZE)),
-    "step_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _POINTER, _POINTER)),
+    "integrate_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER)),
     "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
     "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE)),
     "stages": (_SIZE, ()),
@@ -137,15 +137,17 @@ class CLatticeSession:
                 raise BackendError(status_name(status), self.steps, self.state()[None])
             steps -= now
 
-    def advance_tangent(self, h: float, vectors: Floats) -> Floats:
-        """Make one step, which carries vectors along."""
-        if not hasattr(self._c, "step_tangent"):
+    def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
+        """Make so many steps, which carry vectors along."""
+        if not hasattr(self._c, "integrate_tangent"):
             raise MissingExtraError("step_tangent")
         carried = np.array(vectors, dtype=self._real, order="C")
         needed = self._c.tangent_size(self._address, len(carried))
         if len(self._beside) < needed:
             self._beside = np.zeros(needed, dtype=np.uint8)
-        status = self._c.step_tangent(self._address, h, len(carried), carried.ctypes.data, self._beside.ctypes.data)
+        status = self._c.integrate_tangent(
+            self._address, h, steps, len(carried), carried.ctypes.data, self._beside.ctypes.data
+        )
         if status:
             raise BackendError(status_name(status), self.steps, self.state()[None])
         return np.asarray(carried, dtype=np.float64)

@@ -47,8 +47,8 @@ class LatticeSession(Protocol):
         """Make so many steps."""
         ...
 
-    def advance_tangent(self, h: float, vectors: Floats) -> Floats:
-        """Make one step; where its derivative carries ``vectors`` (count, coordinates, *sizes).
+    def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
+        """Make so many steps; where their derivatives carry ``vectors`` (count, coordinates, *sizes).
 
         Raises `MissingExtraError` without the extra ``tangent``.
         """
@@ -299,6 +299,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         h: float,
         steps: int,
         vectors: ArrayLike,
+        stride: int = 1,
         *,
         t0: float | None = None,
         seed: int | None = None,
@@ -306,7 +307,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Generator[tuple[Floats, Floats], Floats | None, None]:
-        """After each step of a trajectory, its state and where its derivative carries ``vectors``.
+        """After every ``stride`` steps of a trajectory, and the last: the state, and where ``vectors`` are carried.
 
         These have the shape (count, coordinates, *sizes). They go on as they are, unless others are sent in their
         place. Raises what `step_tangent` does.
@@ -320,9 +321,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             shape = ", ".join(map(str, start.shape))
             raise ValueError(f"tangent vectors must be finite and have shape (count, {shape}), not {carried.shape}")
         session = self.started(start, h, values, begin, draws)
-        for _ in range(steps):
+        for count in np.diff(row_steps(steps, arguments.count(stride, "stride", 1))).tolist():
             try:
-                carried = session.advance_tangent(h, carried)
+                carried = session.advance_tangent(h, carried, count)
             except MissingExtraError:
                 hint = "compile it with tangent=True, or say tangent: true in the spec"
                 raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None

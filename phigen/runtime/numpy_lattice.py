@@ -65,25 +65,24 @@ class NumpyLatticeSession:
                 self.steps += 1
                 self._tell_time()
 
-    def advance_tangent(self, h: float, vectors: Floats) -> Floats:
-        """Make one step, which carries vectors along."""
+    def advance_tangent(self, h: float, vectors: Floats, steps: int = 1) -> Floats:
+        """Make so many steps, which carry vectors along."""
         if not hasattr(self._module, "step_tangent"):
             raise MissingExtraError("step_tangent")
         self._set_step(h)
-        carried = list(vectors)
+        carried, past = list(vectors), dict[Any, Any]()
         with np.errstate(all="ignore"):
-            try:
+            for _ in range(steps):
+                try:
+                    self._x = self._module._advance(self._sites, self._rows, self._x, past, carried)
+                    self._module._finite(np.array(carried))
+                except self._module.FailedError as failed:
+                    raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
+                finally:
+                    self._tell_time()
+                self.steps += 1
                 self._tell_time()
-                after = self._module._advance(self._sites, self._rows, self._x, {}, carried)
-                found = self._module._finite(np.array(carried).reshape(vectors.shape))
-            except self._module.FailedError as failed:
-                raise BackendError(str(failed), self.steps, self._x[None].copy()) from None
-            finally:
-                self._tell_time()
-        self._x = after
-        self.steps += 1
-        self._tell_time()
-        return np.asarray(found)
+        return np.array(carried).reshape(vectors.shape)
 
     def _set_step(self, h: float) -> None:
         if h != self._h:

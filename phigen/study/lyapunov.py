@@ -89,12 +89,12 @@ class FrameGrowth:
         """Carry the frame through one step of that derivative."""
         self.take(tangent @ self.frame)
 
-    def take(self, carried: Floats) -> None:
-        """The columns of the frame after one step."""
+    def take(self, carried: Floats, steps: int = 1) -> None:
+        """The columns of the frame after some steps."""
         state = self.state
         state["frame"], r = np.linalg.qr(carried)
         state["logs"] = state["logs"] + np.log(np.abs(np.diagonal(r)))
-        state["steps"] = state["steps"] + 1
+        state["steps"] = state["steps"] + steps
         if state["steps"] >= _SPACING ** len(state["times"]):
             state["times"], state["history"] = self._noted()
 
@@ -140,26 +140,30 @@ def lattice_spectrum(
     steps: int,
     count: int = 1,
     parameters: Mapping[str, Any] | None = None,
+    every: int = 10,
     t0: float | None = None,
     progress: Progress | None = None,
     **draws: int | None,
 ) -> Spectrum:
     """The ``count`` largest Lyapunov exponents of a lattice along a run from ``x0`` (coordinates, *sizes).
 
-    The tangent vectors begin at random. ``solver`` must be compiled with ``tangent=True``, else `TypeError`. Raises
-    `StepError`, and `ValueError` for wrong arguments. ``draws`` are those of noise: seed, step0.
+    The tangent vectors begin at random, and are made orthonormal ``every`` so many steps. ``solver`` must be compiled
+    with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong arguments. ``draws`` are
+    those of noise: seed, step0.
     """
     x = np.asarray(x0, dtype=float)
     if not 1 <= count <= x.size:
         raise ValueError(f"a lattice of these sizes has 1 to {x.size} exponents, not {count}")
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)
-    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), t0=t0, parameters=parameters, **draws)
-    following: Floats | None = None
-    for done in range(1, steps + 1):
+    given: Any = {"t0": t0, "parameters": parameters, **draws}
+    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), every, **given)
+    following, done = None, 0
+    while done < steps:
         _, carried = carry.send(following)
-        growth.take(carried.reshape(count, -1).T)
-        following = growth.frame.T.reshape(carried.shape)
-        if progress and done % 64 == 0:
+        made = min(every, steps - done)
+        growth.take(carried.reshape(count, -1).T, made)
+        following, done = growth.frame.T.reshape(carried.shape), done + made
+        if progress:
             progress(done)
     return growth.spectrum()

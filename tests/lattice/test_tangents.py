@@ -92,8 +92,11 @@ def test_steps_with_tangent_vectors_are_those_without_on_any_number_of_threads(n
     vectors = np.random.default_rng(4).normal(size=(2, *x.shape))
 
     def made() -> np.ndarray:
-        states = [state for state, _ in found.tangents(x, 0.05, 3, vectors)]
-        return np.concatenate([states[-1][None], found.step_tangent(x, 0.05, vectors)[1]])
+        *_, (state, carried) = found.tangents(x, 0.05, 3, vectors)
+        *_, (again, in_pieces) = found.tangents(x, 0.05, 3, vectors, 2)
+        np.testing.assert_allclose(again, state, rtol=0, atol=2e-14)
+        np.testing.assert_allclose(in_pieces, carried, rtol=0, atol=2e-14)
+        return np.concatenate([state[None], carried])
 
     first, *others = with_threads(made)
     assert all(np.array_equal(first, other) for other in others)

@@ -153,10 +153,11 @@ phi_status phi_step(phi_solver *s, double h);
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
 #if PHI_TANGENT
-/* One step, and where its derivative carries so many tangent vectors v[vector][field][site], which are overwritten: exact to
-   round-off. It needs phi_tangent_size(s, count) bytes of memory besides. If it fails, v is as before. */
+/* Steps, and where their derivatives carry so many tangent vectors v[vector][field][site], which are overwritten: exact to
+   round-off. They need phi_tangent_size(s, count) bytes of memory besides. If a step fails, v is as before all of them. */
 size_t phi_tangent_size(const phi_solver *s, size_t count);
 phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work);
+phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t count, double *v, void *work);
 
 #endif
 /* The state x[field][site]. */

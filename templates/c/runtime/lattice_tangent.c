@@ -31,7 +31,7 @@ static phi_status phi_carry(phi_solver *s)
 }
 #endif
 
-phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work)
+phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t count, double *v, void *work)
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || v == NULL || work == NULL || !phi_finite(v, count * PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
@@ -41,31 +41,35 @@ phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, vo
         phi_vector(s, k, fields);
         for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, fields[f], v + (k * PHI_DIM + f) * s->sites);
     }
-    phi_copy(s->before, s->x, s);
     s->vectors = count;
-    status = phi_carry(s);
+    for (; steps > 0 && status == PHI_OK; --steps) {
+        phi_copy(s->before, s->x, s);
+        status = phi_carry(s);
+        s->steps += status == PHI_OK;
+#if PHI_TIMED
+        s->t = s->now = phi_time_after(s, s->steps);
+#else
+        s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#endif
+    }
     s->vectors = 0;
+    if (status != PHI_OK) phi_copy(s->x, s->before, s);
+#if PHI_SERIES
+    if (status != PHI_OK) phi_forget(s);
+#endif
     for (size_t k = 0; k < count && status == PHI_OK; ++k) {
         phi_vector(s, k, fields);
         if (!phi_all_hold(s, fields)) status = PHI_NOT_FINITE;
     }
-    if (status != PHI_OK) {
-        phi_copy(s->x, s->before, s);
-#if PHI_SERIES
-        phi_forget(s);
-#endif
-        return status;
-    }
-    for (size_t k = 0; k < count; ++k) {
+    for (size_t k = 0; k < count && status == PHI_OK; ++k) {
         phi_vector(s, k, fields);
         phi_take(s, fields, v + k * PHI_DIM * s->sites);
     }
-    ++s->steps;
-#if PHI_TIMED
-    s->t = s->now = phi_time_after(s, s->steps);
-#else
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
-#endif
-    return PHI_OK;
+    return status;
+}
+
+phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work)
+{
+    return phi_integrate_tangent(s, h, 1, count, v, work);
 }
 #endif
