@@ -215,7 +215,10 @@ if (document.getElementById("live-panel")) {
     const { dataset } = at("panel");
     dataset.settings = JSON.stringify(settings);
     if (!race) return;
-    for (const side of sides) dataset[side] = JSON.stringify({ steps: race[side].steps, t: race[side].t, x: [...race[side].x] });
+    for (const side of sides) {
+      const { steps, t, x, histories } = race[side];
+      dataset[side] = JSON.stringify({ steps, t, x: [...x], errors: histories.map(({ last }) => last) });
+    }
   }
 
   function rest() {

@@ -225,6 +225,12 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
     expected = solver.integrate(begin, 0.05, 4, **start.arguments).x[-1]
     assert told(browser, "ours")["x"] == pytest.approx(expected.ravel(), rel=1e-12, abs=1e-14)
     assert told(browser, "theirs")["x"] == pytest.approx(x.ravel(), rel=1e-12, abs=1e-14)
+    energy, size = solver.hamiltonian(begin, **start.arguments), np.abs(solver.density(begin, **start.arguments)).sum()
+    errors = [abs(solver.hamiltonian(x, **start.arguments) - energy) / size]
+    if "spins" in name:
+        first, last = ((s**2).sum(axis=0) for s in (begin, x))
+        errors.append(np.abs(last - first).max() / first.mean())
+    assert told(browser, "theirs")["errors"] == pytest.approx(errors, rel=1e-6, abs=1e-15)
     assert browser.value(COLOURS) > 8
     assert browser.complaints == []
 
