@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: a998b54b6074e89fc1250c6a64b275bf79dea6c78608e1ded9c3a9fa70944aa4
+ * body-sha256: 9e9ab9b6b5820241fc48cc4a5eebf061bd3eb4deb95f2a1a10e4e514fdc3419e
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -309,9 +309,9 @@ export class Solver {
   }
 
   /** The Hamiltonian, of x or of another state. */
-  hamiltonian(x = this.x) {
+  hamiltonian(...at) {
     let sum = 0, rest = 0;
-    for (const value of this.density(x)) { // compensated, after A. Neumaier
+    for (const value of this.density(...at)) { // compensated, after A. Neumaier
       const total = sum + value;
       rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
       sum = total;
@@ -329,8 +329,9 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x), laid out as x, into an array if one is given. */
-  vectorField(x = this.x, out = new Float64Array(x.length)) {
+  /** The right-hand side pi(x) grad H(x), laid out as x. */
+  vectorField(x = this.x) {
+    const out = new Float64Array(x.length);
     vectorField(this.params, x, this.sites, out);
     return out;
   }

@@ -29,6 +29,8 @@ HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and âˆ
 are interpolated. It begins with a step that is large for RK4, if there is one that phigen takes well; with smaller
 ones both come closer to the truth."""
 
+NOTHING = "Time or forces act on this system, so nothing is conserved that errors could be counted in."
+
 _COMMENT = re.compile(r"^[ \t]*(/\*.*?\*/|//[^\n]*)[ \t]*\n", re.MULTILINE | re.DOTALL)
 _PRIVATE = Extras(without=frozenset({"ensemble"}))
 
@@ -212,7 +214,7 @@ def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool)
     elif len(conserved) > len(kept):
         kept.append("keeps its Casimirs")
     if not kept:
-        return f"{said}Time or forces act on this system, so nothing is conserved that errors could be counted in."
+        return f"{said}{NOTHING}"
     return f"{said}The true motion {' and '.join(kept)}. Watch which of the two does."
 
 

@@ -15,7 +15,7 @@ from phigen.compilation import Compilation
 from phigen.lattice.cell import PAIRS
 from phigen.lattice.states import Start
 from phigen.report import page
-from phigen.report.live import FEW, ORDERS, Live, Slider, general, script, sides, slid, slider_of, solvers
+from phigen.report.live import FEW, NOTHING, ORDERS, Live, Slider, general, script, sides, slid, slider_of, solvers
 from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import LieAlgebraForm, Parameter, Run, Spec, Values
 from phigen.symbolic.expression import Expression, symbols_of
@@ -73,7 +73,7 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
         "axes": list(cell.axes),
         "coordinates": list(spec.coordinates),
         "start": [],
-        "t0": 0,
+        "t0": float(run.start),
         "step": float(run.step),
         "order": compilation.order.order,
         "orders": list(live.solvers),
@@ -234,17 +234,19 @@ def _sign(spec: Spec, start: Start) -> str:
 
 
 def _quantities(compilation: Compilation) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = [{"name": "its energy", "casimirs": None}]
-    names = list(compilation.cell.casimirs) if compilation.cell else []
-    if names:
-        said = f"its Casimir{'s' * (len(names) > 1)} {', '.join(names)}"
-        found.append({"name": said, "casimirs": list(range(len(names)))})
+    """What is conserved: the energy, unless time or forces act, and the Casimirs that they leave as one."""
+    cell, pushed = compilation.cell, compilation.program.pushed
+    assert cell is not None
+    found: list[dict[str, Any]] = [] if cell.driven else [{"name": "its energy", "casimirs": None}]
+    kept = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
+    if kept:
+        found.append({"name": f"its Casimir{'s' * (len(kept) > 1)} {', '.join(kept)}", "casimirs": [*kept.values()]})
     return found
 
 
 def _say(compilation: Compilation) -> str:
-    kept = "keeps its energy" + (" and its Casimirs" if len(_quantities(compilation)) > 1 else "")
-    return (
-        f"Two solvers take the same steps from the same start, in your browser, now. The true motion {kept}. "
-        "Watch which of the two does."
-    )
+    said = "Two solvers take the same steps from the same start, in your browser, now. "
+    kept = " and ".join("its Casimirs" if q["casimirs"] else "its energy" for q in _quantities(compilation))
+    if not kept:
+        return f"{said}{NOTHING}"
+    return f"{said}The true motion keeps {kept}. Watch which of the two does."

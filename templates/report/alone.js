@@ -1,6 +1,6 @@
 // A panel inside another page: it says how high it is, and follows the theme of that page.
 if (parent !== window) {
-  document.documentElement.style.overflow = "hidden";
+  document.documentElement.classList.add("framed");
   new ResizeObserver(() => {
     parent.postMessage({ phigenPanel: document.documentElement.getBoundingClientRect().height }, "*");
   }).observe(document.body);

@@ -65,9 +65,9 @@ function makeView(panel) {
     for (const [name, values] of Object.entries(data.arrays)) {
       params[name] = valuesOf(values, name, sizes, values.at === "bonds" ? data.bonds.length / 2 : count);
     }
-    const solver = new Solver({ x0: startOf(data, sizes, count), sizes, params, bonds: data.bonds });
-    const groups = data.quantities.map(({ name, casimirs }) => ({ name, error: (casimirs ? offCasimirs : offEnergy)(solver) }));
-    const field = (x) => ({ x: solver.vectorField(x), t: 1 }), chosen = data.groups[given.group];
+    const solver = new Solver({ x0: startOf(data, sizes, count), t0: data.t0, sizes, params, bonds: data.bonds });
+    const groups = data.quantities.map(({ name, casimirs }) => ({ name, error: casimirs ? offCasimirs(solver, casimirs) : offEnergy(solver) }));
+    const field = (x, t) => ({ x: solver.vectorField(x, t), t: 1 }), chosen = data.groups[given.group];
     return new Race(solver, { h: given.h, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
 
@@ -78,20 +78,20 @@ function makeView(panel) {
   }
 
   // Off the Casimir that is farthest off: of sites by the worst site, of sums in magnitudes of their terms.
-  function offCasimirs(solver) {
+  function offCasimirs(solver, chosen) {
     const first = solver.casimirs(), { count } = solver.sites, kinds = solver.constructor.CASIMIR_KINDS;
     const units = kinds.map((_, k) => first.subarray(k * count, (k + 1) * count).reduce((sum, v) => sum + Math.abs(v), 0) || 1);
     return (x) => {
       const now = solver.casimirs(x);
-      return Math.max(...kinds.map((kind, k) => {
+      return Math.max(...chosen.map((k) => {
         let sum = 0, product = 1, most = 0;
         for (let i = k * count; i < (k + 1) * count; i++) {
           sum += now[i] - first[i];
           product *= now[i] / first[i];
           most = Math.max(most, Math.abs(now[i] - first[i]));
         }
-        if (kind === "product") return Math.abs(product - 1);
-        return (kind === "sum" ? Math.abs(sum) : most * count) / units[k];
+        if (kinds[k] === "product") return Math.abs(product - 1);
+        return (kinds[k] === "sum" ? Math.abs(sum) : most * count) / units[k];
       }));
     };
   }

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lattice import test_acting, test_time
 from lattice.lattices import LATTICES
 from tools import tool
 
@@ -19,7 +20,7 @@ from phigen import resources
 from phigen import spec as specs
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
-from phigen.lattice.states import start_of
+from phigen.lattice.states import Start, start_of
 from phigen.runtime.modules import load_module
 from phigen.spec.model import Spec
 
@@ -68,27 +69,46 @@ VARIANTS: dict[str, Callable[[], Spec]] = {
     "kicks": lambda: replace(specs.loads(LATTICES["fput_open"]), composition="force-gradient"),
     "colours": lambda: replace(specs.loads(LATTICES["volterra"].replace("[5]", "[6]")), order=6),
 }
-CASES = [*CORPUS, *VARIANTS]
-STEPS = 8
+#: Lattices with a time, and with forces.
+DRIVEN = {f"{name}, in time": (test_time, name) for name in test_time.TEXTS}
+DRIVEN |= {f"{name}, forced": (test_acting, name) for name in test_acting.FORCED}
+CASES = [*CORPUS, *VARIANTS, *DRIVEN]
+STEPS, T0 = 8, 0.7
 
 
 @cache
 def compiled(case: str) -> Compilation:
+    if case in DRIVEN:
+        module, name = DRIVEN[case]
+        return module.compiled(name, 2)
     return compile_spec(specs.load(CORPUS[case]) if case in CORPUS else VARIANTS[case]())
+
+
+@cache
+def begun(case: str) -> tuple[Start, float]:
+    """Where a case starts, and its step."""
+    if case in DRIVEN:
+        module, name = DRIVEN[case]
+        x, values = module.given(name)
+        graph = "bonds" in values
+        return Start(x.shape[1:], x, values, values.pop("bonds", np.zeros((0, 2), dtype=int)), graph), 0.05
+    spec = compiled(case).spec
+    run = next(iter(spec.runs.values()))
+    return start_of(spec, run), float(run.step)
 
 
 def job(folder: Path, case: str, **more: Any) -> dict[str, Any]:
     """The first run of a case, in JavaScript."""
     compilation = compiled(case)
-    run = next(iter(compilation.spec.runs.values()))
-    start = start_of(compilation.spec, run)
+    start, h = begun(case)
     (text,) = emit(compilation.program, "js", "phigen").values()
     path = folder / f"{case.replace(' ', '_')}.mjs"
     path.write_text(text, encoding="utf-8")
-    params = {name: np.ravel(v).tolist() if np.ndim(v) else v for name, v in start.parameters.items()}
+    params = {name: np.ravel(v).tolist() if np.ndim(v) else float(v) for name, v in start.parameters.items()}
     options = {"x0": start.state.ravel().tolist(), "sizes": start.sizes, "params": params}
     options |= {"bonds": start.bonds.ravel().tolist()} if start.graph else {}
-    return {"module": path.as_uri(), "options": {**options, **more}, "h": float(run.step), "steps": STEPS}
+    options |= {"t0": T0} if compilation.program.time else {}
+    return {"module": path.as_uri(), "options": {**options, **more}, "h": h, "steps": STEPS}
 
 
 def node(folder: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
@@ -110,21 +130,22 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any
 def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answers: dict[str, dict[str, Any]]) -> None:
     compilation, found = compiled(case), answers[case]
     name = compilation.program.name
-    run = next(iter(compilation.spec.runs.values()))
-    start = start_of(compilation.spec, run)
+    (start, h), dated = begun(case), bool(compilation.program.time)
     module = load_module(emit(compilation.program, "numpy", "phigen")[f"{name}.py"], name)
-    x = module.integrate(start.state, float(run.step), STEPS, stride=STEPS, **start.arguments)[-1]
-    size = np.abs(x).max()
+    since = {"t0": T0} if dated else {}
+    x = module.integrate(start.state, h, STEPS, stride=STEPS, **since, **start.arguments)[-1]
+    size, end = np.abs(x).max(), T0 * dated + STEPS * h
+    then = {**start.arguments, **({"t": end} if dated else {})}
 
     def agrees(mine: list[float], theirs: np.ndarray, part: float = 1e-13) -> None:
         np.testing.assert_allclose(np.reshape(mine, theirs.shape), theirs, rtol=part, atol=part * np.abs(theirs).max())
 
     assert found["done"] == {"value": STEPS}
-    assert found["t"] == pytest.approx(STEPS * float(run.step), rel=1e-14)
+    assert found["t"] == pytest.approx(end, rel=1e-14)
     np.testing.assert_allclose(np.reshape(found["x"], x.shape), x, rtol=0, atol=1e-13 * size)
-    assert found["energy"] == pytest.approx(module.hamiltonian(x, **start.arguments), rel=1e-12)
-    agrees(found["density"], module.density(x, **start.arguments), 1e-11)
-    agrees(found["field"], module.vector_field(x, **start.arguments), 1e-11)
+    assert found["energy"] == pytest.approx(module.hamiltonian(x, **then), rel=1e-12)
+    agrees(found["density"], module.density(x, **then), 1e-11)
+    agrees(found["field"], module.vector_field(x, **then), 1e-11)
     if compilation.program.casimirs:
         agrees(found["casimirs"], module.casimirs(x, **start.arguments))
     assert found["first"] == found["x"][: len(found["first"])]

@@ -13,8 +13,7 @@ from scipy.integrate import solve_ivp
 from phigen import spec as specs
 from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
-from phigen.compiler import compile_spec, emit
-from phigen.errors import SpecError
+from phigen.compiler import compile_spec
 from phigen.geometry.system import system_from_spec
 from phigen.lattice.balance import Power, integral
 from phigen.lattice.expansion import expand
@@ -184,11 +183,6 @@ def test_verification_judges_the_balance_of_energy() -> None:
     assert found.failures == []
     assert rows["energy balance: largest error"].value < 1e-5
     assert rows["invariant F: largest error"].value < 1e-13
-
-
-def test_javascript_refuses_lattices_in_time() -> None:
-    with pytest.raises(SpecError, match="a lattice that depends on the time"):
-        emit(compiled("driven").program, "js", "")
 
 
 def test_the_time_is_asked_for() -> None:

@@ -41,14 +41,15 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for adjoints, and lattices that are driven."""
+    """The file name and its contents. Raises `SpecError` for adjoints, and for noise and tangents of lattices."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
-    if isinstance(program.step, Sweeps) and (program.time or program.noise):
-        what = "depends on the time" if program.time else "has noise"
-        message = f"{program.name} is a lattice that {what}, which is not offered in JavaScript"
-        raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
+    if isinstance(program.step, Sweeps) and (program.noise or program.extras.tangent):
+        message = (
+            f"{program.name} is a lattice {'with noise' if program.noise else 'whose steps carry tangent vectors'}"
+        )
+        raise SpecError([Diagnostic(f"{message}, which is not offered in JavaScript", hint="c and numpy have it")])
     body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
     head = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
     return {f"{program.name}.mjs": f"/*\n{head}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
@@ -56,9 +57,10 @@ def emit(program: Program, command: str) -> dict[str, str]:
 
 def _lattice(program: Program, step: Sweeps) -> str:
     """The body of the module of a lattice."""
-    pieces = [lattice.tables(program, step), _function(step.prepare), *_functions(program)]
+    early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
+    pieces = [lattice.tables(program, step), *early, *_functions(program)]
     model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
-    return f"{model}\n\n{assembled(lattice.modules(step), lattice.switches(step))}\n"
+    return f"{model}\n\n{assembled(lattice.modules(step), lattice.switches(program, step))}\n"
 
 
 def _system_of_coordinates(program: Program) -> str:

@@ -36,9 +36,11 @@ def modules(step: Sweeps) -> list[str]:
     return [*MODULES, "sweeps", "krylov"]
 
 
-def switches(step: Sweeps) -> dict[str, bool]:
+def switches(program: Program, step: Sweeps) -> dict[str, bool]:
     """The switches of the runtime."""
     return {
+        "TIMED": bool(program.time),
+        "RENEWED": step.refresh is not None,
         "KICKS": bool(step.schedule.multiples),
         "COLOURS": step.sites.colours > 1,
         "GATHER": step.partners is not None,
@@ -50,10 +52,9 @@ def switches(step: Sweeps) -> dict[str, bool]:
 
 def tables(program: Program, step: Sweeps) -> str:
     """What is printed of the system beside its kernels."""
-    listed = [
-        render("js", "lattice.mjs", _facts(program, step)),
-        render("js", "lattice_tables.mjs", _tables(program, step)),
-    ]
+    found = _tables(program, step)
+    listed = [render("js", "lattice.mjs", _facts(program, step))]
+    listed += [render("js", f"{part}.mjs", found) for part in ("lattice_tables", "lattice_schedule")]
     lines = "\n".join(listed).splitlines()
     broken = [wrapped(line, "") if line.startswith("const") else [line] for line in lines]
     return "\n".join(part for parts in broken for part in parts).replace(_FIXED, " ")
@@ -94,6 +95,8 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "weights": json.dumps(sites.weights),
         "gathered": _most_sums(step),
         "coefficients": step.row,
+        "prepared": step.prepared if step.refresh else "",
+        "moments": _moments(program, step),
         "times": json.dumps(schedule.times),
         "unit": "stages" if step.equation else "flows",
         "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
@@ -103,6 +106,11 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "flows": f"[{', '.join(map(_listed, step.parts))}]",
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
+
+
+def _moments(program: Program, step: Sweeps) -> str:
+    """At which fraction of the step the time of each row stands still; nothing where there is no time."""
+    return json.dumps(program.midpoints if step.equation else step.schedule.moments) if program.time else ""
 
 
 def kernels(program: Program, step: Sweeps) -> Iterator[str]:
@@ -150,7 +158,13 @@ def _pairs(weight: Symbol) -> list[tuple[int, int]]:
 
 def _contents(program: Program, step: Sweeps) -> list[str]:
     sizes = ", ".join(f"N_{axis}" for axis in step.sites.axes)
-    given = ["x0: [...]", f"sizes: [{sizes}]", *(["bonds: [...]"] if _partners(step).graph else []), "params: { ... }"]
+    given = [
+        "x0: [...]",
+        *(["t0"] if program.time else []),
+        f"sizes: [{sizes}]",
+        *(["bonds: [...]"] if _partners(step).graph else []),
+        "params: { ... }",
+    ]
     how = "stages, each solved by sweeps over the sites" if step.equation else "flows of parts of H"
     return [
         f"import {{ Solver, StepError }} from './{program.name}.mjs';",
@@ -291,9 +305,11 @@ class _Body:
         self.first: list[str] = []
         self.lines: list[str] = []
         self._bound: dict[str, str] = {}
-        used = (s for symbols in kernel.inputs.values() for s in symbols if s in self.code.used)
-        for s in used:
-            if isinstance(s, Symbol):
+        used = ((array, s) for array, symbols in kernel.inputs.items() for s in symbols if s in self.code.used)
+        for array, s in used:
+            if array == "t":
+                self.first.append(f"const {self.scope[s]} = sites.t;")
+            elif isinstance(s, Symbol):
                 self._bind(s, list(sums))
             else:
                 self._read(s)

@@ -5,6 +5,9 @@ import { casimirs, energy, prepare, vectorField } from "./model.mjs";
 // #if KICKS
 import { MULTIPLES } from "./model.mjs";
 // #endif
+// #if RENEWED
+import { MOMENTS, PREPARED, refresh } from "./model.mjs";
+// #endif
 import { Sites } from "./sites.mjs";
 import { makeStep } from "./flows.mjs";
 
@@ -35,8 +38,13 @@ export class Solver {
 
   /** The state, one field after the other, in each the sites, the last axis fastest; to be read only. */
   x;
+  // #if TIMED
+  /** The time of x. */
+  t;
+  // #else
   /** Time since the start. */
   t = 0;
+  // #endif
   /** Good steps since the start. */
   steps = 0;
   /** The last step size. */
@@ -60,6 +68,9 @@ export class Solver {
    * @param {ArrayLike<number>} options.x0 one field after the other, in the order of COORDINATES
    * @param {number[]} [options.sizes] sites along each axis; with one axis those of x0 by default
    * @param {object} [options.params] those at sites and at bonds are arrays, or one number for all
+   * #if TIMED
+   * @param {number} [options.t0] the time of x0, 0 by default
+   * #endif
    * #if GRAPH
    * @param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …
    * #endif
@@ -70,6 +81,9 @@ export class Solver {
     this.sites = new Sites(sizes, options);
     this.x = finite(x0, DIM * this.sites.count, "x0");
     this.before = Float64Array.from(this.x);
+    // #if TIMED
+    [this.t] = finite([options.t0 ?? 0], 1, "t0");
+    // #endif
     const rows = prepareStep(this.sites.params, 1e-100, this.rows);
     if (!rows.every((row) => row.every(Number.isFinite))) {
       throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
@@ -113,6 +127,12 @@ export class Solver {
   step(h) {
     this.#setStep(h);
     this.before.set(this.x);
+    // #if TIMED
+    this.sites.t = this.t;
+    // #endif
+    // #if RENEWED
+    this.rows.forEach((row, k) => refresh(row, this.t + MOMENTS[k] * h, row.subarray(PREPARED)));
+    // #endif
     const status = makeStep(this);
     if (status !== "OK") {
       this.x.set(this.before);
@@ -139,17 +159,27 @@ export class Solver {
     return this;
   }
 
+  // #if TIMED
+  /** The density of the Hamiltonian at each site, of x and its time or of others. */
+  density(x = this.x, t = this.t) {
+    const out = new Float64Array(this.sites.count);
+    this.sites.t = t;
+    energy(this.params, x, this.sites, out);
+    return out;
+  }
+  // #else
   /** The density of the Hamiltonian at each site, of x or of another state. */
   density(x = this.x) {
     const out = new Float64Array(this.sites.count);
     energy(this.params, x, this.sites, out);
     return out;
   }
+  // #endif
 
   /** The Hamiltonian, of x or of another state. */
-  hamiltonian(x = this.x) {
+  hamiltonian(...at) {
     let sum = 0, rest = 0;
-    for (const value of this.density(x)) { // compensated, after A. Neumaier
+    for (const value of this.density(...at)) { // compensated, after A. Neumaier
       const total = sum + value;
       rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
       sum = total;
@@ -167,9 +197,20 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x), laid out as x, into an array if one is given. */
-  vectorField(x = this.x, out = new Float64Array(x.length)) {
+  // #if TIMED
+  /** The right-hand side pi(x) grad H(t, x), laid out as x. */
+  vectorField(x = this.x, t = this.t) {
+    const out = new Float64Array(x.length);
+    this.sites.t = t;
     vectorField(this.params, x, this.sites, out);
     return out;
   }
+  // #else
+  /** The right-hand side pi(x) grad H(x), laid out as x. */
+  vectorField(x = this.x) {
+    const out = new Float64Array(x.length);
+    vectorField(this.params, x, this.sites, out);
+    return out;
+  }
+  // #endif
 }

@@ -56,6 +56,9 @@ export class Sites {
     const flows = BY_COLOUR.flatMap((many, part) => {
       return Array.from({ length: many ? this.colourCount : 1 }, (_, colour) => [part, colour]);
     });
+    // #if TIMED
+    flows.push(null); // the time advances in the place of a last flow
+    // #endif
     const kinds = [flows.slice(0, 1), flows.slice(1, -1), flows.slice(-1), flows.slice(1, -1).reverse()];
     /** The flows of a step: a part of H, a row of coefficients, a colour. */
     this.flows = SCHEDULE.flatMap(([kind, row]) => kinds[kind].map(([part, colour]) => [part, row, colour]));

@@ -84,6 +84,9 @@ export function makeStep(solver) {
   const change = new Float64Array(x.length);
   for (const [stage, [, row]] of SCHEDULE.entries()) {
     const [coef, own] = [rows[row], past.stages[stage]];
+    // #if TIMED
+    sites.t = solver.t + MOMENTS[stage] * solver.h;
+    // #endif
     const guess = Float64Array.from(x);
     for (const difference of own.differences.slice(0, own.order)) {
       for (let k = 0; k < guess.length; k++) guess[k] += difference[k];
