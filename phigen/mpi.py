@@ -18,7 +18,7 @@ import json
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,7 @@ import numpy as np
 from phigen.errors import MissingPackageError, StepError
 from phigen.runtime import arguments
 from phigen.runtime.c_lattice import CLattice, CLatticeSession, Stage
-from phigen.runtime.interface import Floats, row_steps
+from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.writing import replacing
 
@@ -85,6 +85,9 @@ class DistributedLattice:
         stride: int = 1,
         *,
         t0: float | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
         sizes: Sequence[int] | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
@@ -108,10 +111,11 @@ class DistributedLattice:
             arguments.count(stride, "stride", 1),
         )
         begin = arguments.start_time(t0, self.solver.interface, more)
-        domain = _Domain(self, whole, x0, h, {**(parameters or {}), **more}, begin)
+        draws = arguments.draws(self.solver.interface, more, seed=seed, member=member, step0=step0)
+        domain = _Domain(self, whole, x0, h, {**(parameters or {}), **more}, begin, draws)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *whole)
-        kept = _Kept(domain, Path(checkpoints), [h, steps, stride, begin]) if checkpoints else None
+        kept = _Kept(domain, Path(checkpoints), [h, steps, stride, begin, *astuple(draws)]) if checkpoints else None
         energy = kept.restored() if kept else []
         frames = _Frames(domain, Path(output) if output else None, shape, new=not energy)
         try:
@@ -143,6 +147,7 @@ class _Domain:
         h: float,
         parameters: Mapping[str, Any],
         t0: float,
+        draws: Draws,
     ) -> None:
         self.lattice, self.comm, self.sizes, self.h = lattice, lattice.comm, sizes, h
         self.stages: list[Stage] = lattice.stages
@@ -160,9 +165,13 @@ class _Domain:
         self.values = {name: self._local(value, *around, name) for name, value in parameters.items()}
         start = self._cut(x0, *around, axis=1)
         checked = lattice.solver.state(start, "x0")
-        session = lattice.solver.started(checked, h, lattice.solver.values(self.values, {}, checked.shape[1:]), t0)
+        values = lattice.solver.values(self.values, {}, checked.shape[1:])
+        session = lattice.solver.started(checked, h, values, t0, draws)
         assert isinstance(session, CLatticeSession)
         self.session = session
+        self.noisy = bool(lattice.solver.interface.noise)
+        if self.noisy:  # each site has the random numbers that it has in the whole
+            session.set_planes((self.planes[0] - ghosts[0]) % sizes[0], sizes[0])
         self.session.begin(h)
         self.fields = len(lattice.solver.coordinates)
         self.dirty = 0
@@ -229,20 +238,24 @@ class _Domain:
         self._tell_time(self.steps)
 
     def _tell_time(self, steps: int) -> None:
-        if self.lattice.solver.interface.time:
+        if self.lattice.solver.interface.time or self.noisy:
             self.session.passed(self.h, steps)
 
     def _tried(self, steps: int) -> bool:
         """Some steps; if they lead to what is not finite, none."""
         for step in range(steps):
             self._tell_time(self.steps + step)
+            if self.noisy:  # the flows of two steps are not joined
+                for stage in range(self.joined):
+                    self._stage(stage)
+                continue
             self._stage(self.joined if self.last > 1 and (self.open or step) else 0)
             for stage in range(1, self.last):
                 self._stage(stage)
         if not self._holds():
             self._put_all(self.saved)
             return False
-        self.open = self.joined > 1
+        self.open = self.joined > 1 and not self.noisy
         self.steps += steps
         self.far = max(0, self.far - steps)
         self.saved = self._all()

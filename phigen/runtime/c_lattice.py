@@ -209,6 +209,10 @@ class CLatticeSession:
 
     # --- steps by hand: see NAME.h
 
+    def set_planes(self, first: int, planes: int) -> None:
+        """Say that the first plane here is that number of so many; of lattices with noise."""
+        self._expect_done(self._c.set_planes(self._address, first, planes))
+
     def begin(self, h: float) -> None:
         """Set the step size."""
         self._expect_done(self._c.begin(self._address, h))

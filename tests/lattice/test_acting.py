@@ -63,9 +63,14 @@ LANGEVIN = (
     f"noise: {{w: {{hamiltonian: q, amplitude: sqrt(2*g*T)}}}}\n{CANONICAL}"
     'hamiltonian: "p**2/2 + (q[i+1] - q)**2/2 + q**2/2"'
 )
-TEXTS = {**FORCED, **NOISY, "langevin": LANGEVIN}
+#: Noise before and after the flows of three parts, on a plane.
+HOT = (
+    f"lattice: {{axes: [i, j], boundary: [periodic, open]}}\nscheme: splitting\n{HEAT}{BATH}{SPINS}"
+    'hamiltonian: "-(x*x[i+1] + y*y[i+1] + z*z[i+1] + x*x[j+1] + y*y[j+1] + z*z[j+1])"'
+)
+TEXTS = {**FORCED, **NOISY, "langevin": LANGEVIN, "hot": HOT}
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4]])
-SIZES = {"web": (5,), "warm": (5,), "bath": (3, 2)}
+SIZES = {"web": (5,), "warm": (5,), "bath": (3, 2), "hot": (3, 2)}
 
 
 @cache

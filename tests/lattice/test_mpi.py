@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from lattice import test_acting as acting
 from lattice.test_sweeps import disorder, solver, start
 
 from phigen.runtime import toolchain
@@ -21,6 +22,8 @@ MPIRUN = shutil.which("mpirun", path=f"{Path(sys.executable).parent}{os.pathsep}
 SCRIPT = Path(__file__).with_name("on_processes.py")
 #: Chains, one with colours, which is interrupted and gone on with; a box with open ends, given by its planes.
 SIZES = {"xxz": (37,), "volterra": (34,), "cube": (9, 3, 4)}
+#: And a plane with noise at every site.
+NAMES = (*SIZES, "hot")
 
 
 @pytest.fixture(scope="module")
@@ -36,6 +39,11 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
         # steps so large that some need the functions for large arguments
         run = found.integrate(x, 0.2, 50, 20, **values)
         np.savez(folder / f"{name}_alone.npz", x=run.x, energy=run.energy)
+    found, x = acting.solver("hot", 2, "c"), np.random.default_rng(1).normal(size=(3, 9, 5))
+    with (folder / "hot.pickle").open("wb") as file:
+        pickle.dump((found, x, {"T": 0.3}), file)
+    run = found.integrate(x, 0.2, 50, 20, seed=7, T=0.3)
+    np.savez(folder / "hot_alone.npz", x=run.x, energy=run.energy)
     return folder
 
 
@@ -43,11 +51,11 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_any_number_of_processes_makes_the_bits_of_one(given: Path, processes: int) -> None:
     assert MPIRUN, "mpi4py is there, but no mpirun"
     allowed = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMP_NUM_THREADS": "1"}
-    command = [MPIRUN, "--oversubscribe", "-n", str(processes), sys.executable, str(SCRIPT), str(given), *SIZES]
+    command = [MPIRUN, "--oversubscribe", "-n", str(processes), sys.executable, str(SCRIPT), str(given), *NAMES]
     environment = {**os.environ, **allowed}
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
-    for name in SIZES:
+    for name in NAMES:
         with np.load(given / f"{name}_alone.npz") as alone:
             assert np.load(given / f"{name}_{processes}.npy").tobytes() == alone["x"].tobytes(), name
             energy = np.load(given / f"{name}_{processes}_energy.npy")
