@@ -177,7 +177,8 @@ def lattice_facts(name: str) -> dict[str, Any]:
     assert compilation.cell is not None
     solver, run = lattice_solver_of(compilation), longest_run(found)
     start = start_of_lattice(found, run)
-    made = solver.integrate(start.state, float(run.step), run.steps, run.stride, parameters=start.arguments)
+    about: dict[str, Any] = {"seed": seed_of(found, run), "t0": float(run.start) if found.time else None}
+    made = solver.integrate(start.state, float(run.step), run.steps, run.stride, parameters=start.arguments, **about)
     errors = errors_of(compilation.cell, made)
     thin = max(1, len(made) // FRAMES)
     few = replace(made, t=made.t[::thin], x=made.x[::thin], energy=made.energy[::thin])

@@ -16,6 +16,7 @@ from phigen.lattice.cell import GRAPH, PERIODIC, Cell
 from phigen.lattice.expansion import expand
 from phigen.lattice.parts import CellFlow, Colouring, NoPartError, PartSearch, SiteFields, SiteMotion, own_ring
 from phigen.scheme.choosing import Host
+from phigen.spec.grammar import names_in
 from phigen.spec.model import NO_FORCES, MatrixForm, Parameter
 from phigen.splitting.flow import solved
 from phigen.splitting.ring import TIME
@@ -156,8 +157,11 @@ def noise_statements(cell: Cell) -> Iterator[Statement]:
             time=cell.time, forces=cell.forces, noise=cell.noise,
         )  # fmt: skip
         where = "at every site, whatever H is"
+    varying = [p.name for p in cell.parameters if p.at == "sites"]
     for statement in checks.noise_statements(system):
-        yield replace(statement, detail="; ".join(filter(None, [statement.detail, where])))
+        theta = statement.name.partition("θ = ")[2]
+        alike = "where θ is the same at all sites" if any(n in names_in(theta) for n in varying) else ""
+        yield replace(statement, detail="; ".join(filter(None, [statement.detail, where, alike])))
 
 
 def _acting(cell: Cell) -> list[Expression]:

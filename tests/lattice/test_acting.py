@@ -148,6 +148,8 @@ def test_what_is_claimed_is_proved(name: str) -> None:
     titles = [s.name for s in groups.get("Noise", ())]
     stationary = [t for t in titles if t.startswith("the density exp(−H/θ) on the leaves is stationary, with θ = T")]
     assert len(stationary) == (name in ("bath", "warm", "langevin"))
+    alike = [s for s in groups.get("Noise", ()) if "where θ is the same at all sites" in s.detail]
+    assert len(alike) == (name in ("bath", "warm"))  # T is a parameter at sites
 
 
 def increments(name: str, h: float, steps: int, draws: dict[str, int]) -> np.ndarray:

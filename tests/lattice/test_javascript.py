@@ -24,7 +24,12 @@ from phigen.lattice.states import Start, start_of
 from phigen.runtime.modules import load_module
 from phigen.spec.model import Spec
 
-CORPUS = {f.stem: f for f in sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))}
+#: Those with noise are refused.
+CORPUS = {
+    f.stem: f
+    for f in sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))
+    if "noise:" not in f.read_text(encoding="utf-8")
+}
 
 STIFF = """\
 phigen: 1
