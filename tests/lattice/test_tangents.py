@@ -23,6 +23,7 @@ from lattice.test_sweeps import (
     start,
 )
 
+from phigen import spec as specs
 from phigen.api import lattice_solver_of, solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec
@@ -115,3 +116,30 @@ def test_a_step_that_cannot_be_made_is_told() -> None:
     x, found = np.array([[0.0, 9.0, 0.0, -9.0, 3.0]] * 2), solver("charges", "c")
     with pytest.raises(StepError):
         found.step_tangent(np.concatenate([x, 1e200 * x]), 1e300, np.ones((1, 4, 5)))
+
+
+PUSHED = """\
+phigen: 1
+name: pushed
+lattice: {axes: [i]}
+coordinates: [q, p]
+time: t
+parameters: {g: 0.1, T: 0.3, F: {value: 0.2, at: sites}}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1]-q)**2/2 + q**4/4 - F*q**2*cos(t)
+forces: {vector: {p: -g*p}}
+noise: {w: {hamiltonian: T*q**2/2}}
+"""
+
+
+def test_tangent_vectors_go_with_time_forces_and_noise() -> None:
+    """The increments of the noise belong to the step: they are the same in both targets, and for all states."""
+    found = compile_spec(specs.loads(PUSHED), extras=Extras(tangent=True))
+    x, draws = start("fput", (6,)), {"t0": 0.3, "seed": 3, "step0": 5}
+    vectors, h, e = np.random.default_rng(0).normal(size=(2, 2, 6)), 0.1, 1e-5
+    for target in ("c", "numpy"):
+        made = lattice_solver_of(found, target)
+        ahead, behind = (made.step(x + d * vectors[0], h, **draws) for d in (e, -e))
+        after, carried = made.step_tangent(x, h, vectors, **draws)
+        np.testing.assert_allclose(after, made.step(x, h, **draws), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(carried[0], (ahead - behind) / (2 * e), rtol=0, atol=1e-9)
