@@ -119,7 +119,5 @@ def _expect_sense(
         _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, limit=True)
     if "crossings" in found.keep and run is not None and run.section is None:
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared)
-    if "lyapunov" in found.keep and declared.lattice:
-        _fail((*place, "keep"), "lyapunov: not for lattices", declared)
     if "energy_error" in found.keep and declared.time:
         _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared)

@@ -144,8 +144,6 @@ def _sweep_of(
         raise ValueError(f"crossings: the run {run.name} has no section")
     if "energy_error" in found.keep and spec.time:
         raise ValueError("energy_error: H depends on the time, so energy is not conserved")
-    if "lyapunov" in found.keep and spec.lattice:
-        raise ValueError("lyapunov: not for lattices")
     drawn = [axis.name for axis in found.over if not axis.size]
     if drawn and not found.random and not any(axis.name == "seed" for axis in found.over):
         raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")

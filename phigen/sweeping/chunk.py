@@ -37,10 +37,8 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     region = plan.region(number)
     varied = plan.varied(region, {name: job.root[name][region] for name in plan.listed})
     count = prod(part.stop - part.start for part in region)
-    if isinstance(solver, LatticeSolver):
-        found = lattices.measured(job, solver, varied, count)
-    else:
-        found = _measured(job, solver, varied, plan.first(region) + np.arange(count))
+    measured: Any = lattices.measured if isinstance(solver, LatticeSolver) else _measured
+    found = measured(job, solver, varied, plan.first(region) + np.arange(count))
     found |= {axis.name: varied[axis.name] for axis in plan.drawn}
     sizes = tuple(part.stop - part.start for part in region)
     for name, values in found.items():

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from phigen.errors import StepError
 from phigen.lattice.states import Start, start_of
-from phigen.runtime.interface import STATUSES, BackendError, Floats, LatticeInterface, row_steps
+from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.lattice import LatticeSolver, reduced
 from phigen.spec.model import Run, Spec, Values
 from phigen.sweeping.plan import Plan
@@ -19,6 +20,9 @@ from phigen.sweeping.store import Job
 
 #: Seconds of a trial.
 _TRIAL = 0.3
+
+#: Steps after which a vector that is carried along gets the length 1 again.
+_CARRIED = 50
 
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
@@ -52,9 +56,9 @@ def _start(job: Job, draw: int) -> Start:
     return begun(spec, spec.runs[about["run"]], draw)
 
 
-def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], count: int) -> dict[str, Any]:
-    """What is kept of so many members, and their statuses."""
-    plan, shape = job.plan, (len(job.plan.coordinates), *job.plan.sizes)
+def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Any]:
+    """What is kept of the members of these numbers, and their statuses. With noise, each has its own."""
+    plan, count, shape = job.plan, len(numbers), (len(job.plan.coordinates), *job.plan.sizes)
     found: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
     found |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
     if "final" in plan.keep:
@@ -63,7 +67,7 @@ def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], coun
         found["frames"] = np.full((count, len(plan.rows), *shape), np.nan)
     for m in range(count):
         own = {name: float(values[m]) for name, values in varied.items()}
-        member = _Member(job.plan, solver, _start(job, int(own.pop("seed", 0))), own)
+        member = _Member(job.plan, solver, _start(job, int(own.pop("seed", 0))), own, int(numbers[m]))
         found["status"][m] = member.status
         for name, value in member.kept.items():
             found[name][m] = value
@@ -73,7 +77,7 @@ def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], coun
 class _Member:
     """One lattice, made: its status, and what is kept of it if that is 0."""
 
-    def __init__(self, plan: Plan, solver: LatticeSolver, start: Start, own: dict[str, float]) -> None:
+    def __init__(self, plan: Plan, solver: LatticeSolver, start: Start, own: dict[str, float], number: int) -> None:
         self.plan, self.solver, self.kept = plan, solver, dict[str, Any]()
         h, t0 = own.pop("step", plan.h), own.pop("start", plan.t0)
         numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
@@ -83,9 +87,14 @@ class _Member:
             return
         try:
             values = solver.values(given, {}, start.sizes)
-            self.session = solver.backend.start(start.state, values, t0)
+            draws = (Draws(plan.seed, number),) if solver.interface.noise else ()
+            self.session = solver.backend.start(start.state, values, t0, *draws)
             self.status, kept = 0, self._made(start.state, h)
+            if "lyapunov" in plan.keep:
+                kept["lyapunov"] = exponent(solver, start.state, h, plan.steps, t0, given)
         except BackendError as error:
+            self.status = STATUSES.index(error.status)
+        except StepError as error:
             self.status = STATUSES.index(error.status)
         except ValueError:  # numbers that are refused
             self.status = _REFUSED
@@ -118,6 +127,20 @@ class _Member:
         energy, casimirs = self._seen()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
+
+
+def exponent(solver: LatticeSolver, x: Floats, h: float, steps: int, t0: float, parameters: Mapping[str, Any]) -> float:
+    """The largest Lyapunov exponent, by a vector that the derivatives of all steps carry along. Raises `StepError`."""
+    vector = np.random.default_rng(0).normal(size=(1, *x.shape))
+    vector, grown = vector / np.linalg.norm(vector), 0.0
+    for done in range(0, steps, _CARRIED):
+        begin, ahead = t0 + done * h if solver.interface.time else None, min(_CARRIED, steps - done)
+        for state, carried in solver.tangents(x, h, ahead, vector, t0=begin, parameters=parameters):
+            x, vector = state, carried
+        size = float(np.linalg.norm(vector))
+        grown += float(np.log(size))
+        vector = vector / size
+    return grown / (steps * abs(h))
 
 
 def seconds_of_a_member(job: Job) -> float:

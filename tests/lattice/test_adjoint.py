@@ -165,7 +165,7 @@ def test_what_cannot_be_pulled_back_is_told():
         phigen.compile("fput", target="numpy").pullback(x, H, STEPS, x)
     with pytest.raises(SpecError, match="adjoint is not offered for the series on graphs and pairs"):
         made("point_vortices")
-    with pytest.raises(SpecError, match="adjoint is not offered for lattices whose H depends on the time"):
+    with pytest.raises(SpecError, match="adjoint is not offered for lattices with a time, forces or noise"):
         phigen.compile(phigen.spec.loads(SHAKEN), target="numpy")
     with pytest.raises(SpecError, match="not offered in C"):
         made("fput", "c")

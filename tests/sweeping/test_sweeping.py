@@ -258,7 +258,7 @@ runs:
   hot:
     {sizes: [8], initial: {random: sphere, seed: 3}, parameters: {B: {random: uniform, seed: 7}}, step: 0.05, steps: 40}
 sweeps:
-  disorder: {over: {W: [0.0, 2.0], seed: {count: 2}}, keep: [final, energy_error, casimir_error], frames: 15}
+  disorder: {over: {W: [0.0, 2.0], seed: {count: 2}}, keep: [final, energy_error, casimir_error, lyapunov], frames: 15}
 """
 
 
@@ -281,13 +281,18 @@ def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path):
             np.testing.assert_allclose(member.energy_error, np.abs(alone.energy - alone.energy[0]).max(), atol=1e-13)
             assert 0 < member.casimir_error < 1e-14
     assert data.W.values.tolist() == [0.0, 2.0]
+    assert np.isfinite(data.lyapunov).all()
     assert np.ptp(data.final.values, axis=1).min() > 0
 
 
 def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path):
     from phigen.cli import group
 
-    changed = CHAIN.replace("W: [0.0, 2.0], seed: {count: 2}", "J: [1, 2], step: [0.05, 0]").replace("final, ", "")
+    changed = (
+        CHAIN.replace("W: [0.0, 2.0], seed: {count: 2}", "J: [1, 2], step: [0.05, 0]")
+        .replace("final, ", "")
+        .replace(", lyapunov", "")
+    )
     (tmp_path / "s.yaml").write_text(changed)
     arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "--plot", str(tmp_path / "s.svg")]
     done = CliRunner().invoke(group, [*arguments, "-t", "numpy", "--scheduler", cluster.scheduler_address])
@@ -297,9 +302,22 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
     assert (np.isnan(data.energy_error) == [[False, True]] * 2).all()
     with pytest.raises(ValueError, match="'x' is not a parameter"):
         phigen.sweep(specs.loads(CHAIN), over={"x": [1.0]})
-    with pytest.raises(ValueError, match="lyapunov: not for lattices"):
-        phigen.sweep(specs.loads(CHAIN), keep=["lyapunov"])
     with pytest.raises(ValueError, match="a run of the spec is needed"):
         phigen.sweep(specs.loads(CHAIN), initial=[1, 0, 0])
-    with pytest.raises(phigen.SpecError, match="lyapunov: not for lattices"):
-        specs.loads(CHAIN.replace("keep: [final", "keep: [lyapunov"))
+    with pytest.raises(phigen.SpecError, match="crossings: the run hot has no section"):
+        specs.loads(CHAIN.replace("keep: [final", "keep: [crossings"))
+
+
+def test_exponents_of_lattices_are_the_growth_of_a_vector():
+    """Whatever length it gets on its way."""
+    from phigen.sweeping.lattices import exponent
+
+    ring = CHAIN.partition("sweeps:")[0]
+    solver, rng = phigen.compile(specs.loads(ring + "tangent: true\n"), target="numpy"), np.random.default_rng(4)
+    x, given = rng.normal(size=(3, 4)), {"B": rng.normal(size=4), "W": 1.0}
+    found = exponent(solver, x, 0.05, 130, 0.0, given)
+    vector, grown = np.random.default_rng(0).normal(size=(1, 3, 4)), 0.0
+    start = np.linalg.norm(vector)
+    for _, carried in solver.tangents(x, 0.05, 130, vector, parameters=given):
+        grown = np.log(np.linalg.norm(carried) / start) / (130 * 0.05)
+    assert found == pytest.approx(grown, rel=1e-12)
