@@ -185,13 +185,7 @@ def _compiled(
     spec: Spec, source: System, order: int | None, scheme: str | None, extras: Extras, profile: str, clock: _Clock
 ) -> Compilation:
     """Compile a system, by the series or to a splitting."""
-    described: dict[str, Any] = {
-        "title": spec.title,
-        "licence": spec.license,
-        "spec_sha256": spec.source_sha256,
-        "extras": extras,
-        "profile": profile,
-    }
+    described = _described(spec, extras, profile)
     if (scheme or spec.scheme) == "splitting":
         return _split(spec, source, order, described, clock)
     choice = replace(spec.birealisation, order=order) if order else spec.birealisation
@@ -242,17 +236,16 @@ def _swept(
     asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
     asked |= {"order": order or spec.wanted_order, "extras": extras}
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec=spec, **asked))
-    described: dict[str, Any] = {
-        "title": spec.title,
-        "licence": spec.license,
-        "spec_sha256": spec.source_sha256,
-        "extras": extras,
-        "profile": profile,
-        "lanes": spec.solver.lanes,
-    }
+    described = _described(spec, extras, profile) | {"lanes": spec.solver.lanes}
     program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
     nothing: Any = NoSystem(spec)
     return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
+
+
+def _described(spec: Spec, extras: Extras, profile: str) -> dict[str, Any]:
+    """What programs of every kind are told of their spec."""
+    about = {"title": spec.title, "licence": spec.license, "spec_sha256": spec.source_sha256}
+    return about | {"extras": extras, "profile": profile}
 
 
 @contextmanager
