@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 86884b1c089037a662b05b308bfb4f407373dea80106a3d0f6e406b1b31261b4
+ * body-sha256: aec7e43f07b2470b652b10f7e994c7f20da3332ae772405d0386d472f78e3cbe
  */
 #include "kowalevski_top.h"
 
@@ -3109,6 +3109,14 @@ static kowalevski_top_status kowalevski_top_begin_member(const kowalevski_top_me
     return status == kowalevski_top_OK ? kowalevski_top_set_step(s, all->h[m * all->own]) : status;
 }
 
+/* The same at the state that the ensemble has for it, which is x then. */
+static kowalevski_top_status kowalevski_top_take_member(const kowalevski_top_members *all, size_t m,
+    double x[kowalevski_top_DIM], kowalevski_top_solver *s)
+{
+    for (size_t i = 0; i < kowalevski_top_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return kowalevski_top_begin_member(all, m, x, s);
+}
+
 /* How many steps there are to the next frame, or to the end. */
 static size_t kowalevski_top_to_frame(const kowalevski_top_members *all, size_t done)
 {
@@ -3448,8 +3456,7 @@ static kowalevski_top_status kowalevski_top_group_join(kowalevski_top_group *gro
 {
     kowalevski_top_solver s;
     double x[kowalevski_top_DIM];
-    for (size_t i = 0; i < kowalevski_top_DIM; ++i) x[i] = all->x[i * all->members + m];
-    const kowalevski_top_status status = kowalevski_top_begin_member(all, m, x, &s);
+    const kowalevski_top_status status = kowalevski_top_take_member(all, m, x, &s);
     for (int i = 0; i < kowalevski_top_DIM; ++i) group->x[i][lane] = x[i];
     if (status != kowalevski_top_OK) return status;
     for (int k = 0; k < kowalevski_top_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];

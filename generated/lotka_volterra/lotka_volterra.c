@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 2f8c9758855abafae5fc5e8a8f7bb7129078e013931e93e3fcea7ea0878383b7
+ * body-sha256: 54347fcd250f117f6781cbfab737a822b269e9e4201c4fdd922e953b80b8c911
  */
 #include "lotka_volterra.h"
 
@@ -1235,6 +1235,14 @@ static lotka_volterra_status lotka_volterra_begin_member(const lotka_volterra_me
     return status == lotka_volterra_OK ? lotka_volterra_set_step(s, all->h[m * all->own]) : status;
 }
 
+/* The same at the state that the ensemble has for it, which is x then. */
+static lotka_volterra_status lotka_volterra_take_member(const lotka_volterra_members *all, size_t m,
+    double x[lotka_volterra_DIM], lotka_volterra_solver *s)
+{
+    for (size_t i = 0; i < lotka_volterra_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return lotka_volterra_begin_member(all, m, x, s);
+}
+
 /* How many steps there are to the next frame, or to the end. */
 static size_t lotka_volterra_to_frame(const lotka_volterra_members *all, size_t done)
 {
@@ -1574,8 +1582,7 @@ static lotka_volterra_status lotka_volterra_group_join(lotka_volterra_group *gro
 {
     lotka_volterra_solver s;
     double x[lotka_volterra_DIM];
-    for (size_t i = 0; i < lotka_volterra_DIM; ++i) x[i] = all->x[i * all->members + m];
-    const lotka_volterra_status status = lotka_volterra_begin_member(all, m, x, &s);
+    const lotka_volterra_status status = lotka_volterra_take_member(all, m, x, &s);
     for (int i = 0; i < lotka_volterra_DIM; ++i) group->x[i][lane] = x[i];
     if (status != lotka_volterra_OK) return status;
     for (int k = 0; k < lotka_volterra_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];

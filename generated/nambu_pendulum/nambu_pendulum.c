@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: 64a04515e57d31d59f566b7342ed90d9614d9446a5103930b0d22ac7c9d6822a
+ * body-sha256: 8a74ae4ecf34771c494bbea9ce26b739b2a2515398131e247ee81e1ed55d223a
  */
 #include "nambu_pendulum.h"
 
@@ -1980,6 +1980,14 @@ static nambu_pendulum_status nambu_pendulum_begin_member(const nambu_pendulum_me
     return status == nambu_pendulum_OK ? nambu_pendulum_set_step(s, all->h[m * all->own]) : status;
 }
 
+/* The same at the state that the ensemble has for it, which is x then. */
+static nambu_pendulum_status nambu_pendulum_take_member(const nambu_pendulum_members *all, size_t m,
+    double x[nambu_pendulum_DIM], nambu_pendulum_solver *s)
+{
+    for (size_t i = 0; i < nambu_pendulum_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return nambu_pendulum_begin_member(all, m, x, s);
+}
+
 /* How many steps there are to the next frame, or to the end. */
 static size_t nambu_pendulum_to_frame(const nambu_pendulum_members *all, size_t done)
 {
@@ -2319,8 +2327,7 @@ static nambu_pendulum_status nambu_pendulum_group_join(nambu_pendulum_group *gro
 {
     nambu_pendulum_solver s;
     double x[nambu_pendulum_DIM];
-    for (size_t i = 0; i < nambu_pendulum_DIM; ++i) x[i] = all->x[i * all->members + m];
-    const nambu_pendulum_status status = nambu_pendulum_begin_member(all, m, x, &s);
+    const nambu_pendulum_status status = nambu_pendulum_take_member(all, m, x, &s);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) group->x[i][lane] = x[i];
     if (status != nambu_pendulum_OK) return status;
     for (int k = 0; k < nambu_pendulum_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];

@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: f4c9c440043a27b94021f1be63bb558170ff1e67a4c05d02f963e853deaa5c10
+ * body-sha256: c7edc79e1481f941df7fb1a0a4f66289ec7910bb786fd7efcac6192f069e5413
  */
 #include "rigid_body.h"
 
@@ -1613,6 +1613,15 @@ static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, 
     return status == rigid_body_OK ? rigid_body_set_step(s, all->h[m * all->own]) : status;
 }
 
+/* The same at the state that the ensemble has for it, which is x then. */
+static rigid_body_status rigid_body_take_member(const rigid_body_members *all, size_t m,
+    double x[rigid_body_DIM], rigid_body_solver *s)
+{
+    for (size_t i = 0; i < rigid_body_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return rigid_body_begin_member(all, m, x, all->gauge != NULL ? all->gauge + m * rigid_body_GAUGES : NULL,
+        s);
+}
+
 /* How many steps there are to the next frame, or to the end. */
 static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
 {
@@ -1943,9 +1952,7 @@ static rigid_body_status rigid_body_group_join(rigid_body_group *group, int lane
 {
     rigid_body_solver s;
     double x[rigid_body_DIM];
-    for (size_t i = 0; i < rigid_body_DIM; ++i) x[i] = all->x[i * all->members + m];
-    const double *gauge = all->gauge != NULL ? all->gauge + m * rigid_body_GAUGES : NULL;
-    const rigid_body_status status = rigid_body_begin_member(all, m, x, gauge, &s);
+    const rigid_body_status status = rigid_body_take_member(all, m, x, &s);
     for (int i = 0; i < rigid_body_DIM; ++i) group->x[i][lane] = x[i];
     if (status != rigid_body_OK) return status;
     for (int k = 0; k < rigid_body_COEFFICIENTS; ++k) group->coef[k][lane] = s.coef[k];

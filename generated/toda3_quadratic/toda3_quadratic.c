@@ -22,7 +22,7 @@
  *   7. The solver
  *   8. Members of an ensemble
  *   9. Ensembles
- * body-sha256: f75909103e986671779ba2bf17d23eef2927fa4a49847c354ace0c68f604a867
+ * body-sha256: 8ab3e6ab82bc9acd81336d5a9172f46c1c511de189f10a648033e8b20d73db99
  */
 #include "toda3_quadratic.h"
 
@@ -864,6 +864,14 @@ static toda3_quadratic_status toda3_quadratic_begin_member(const toda3_quadratic
     return status == toda3_quadratic_OK ? toda3_quadratic_set_step(s, all->h[m * all->own]) : status;
 }
 
+/* The same at the state that the ensemble has for it, which is x then. */
+static toda3_quadratic_status toda3_quadratic_take_member(const toda3_quadratic_members *all, size_t m,
+    double x[toda3_quadratic_DIM], toda3_quadratic_solver *s)
+{
+    for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return toda3_quadratic_begin_member(all, m, x, s);
+}
+
 /* How many steps there are to the next frame, or to the end. */
 static size_t toda3_quadratic_to_frame(const toda3_quadratic_members *all, size_t done)
 {
@@ -910,8 +918,7 @@ static toda3_quadratic_status toda3_quadratic_run(const toda3_quadratic_members 
     for (size_t m = 0; m < all->members; ++m) {
         toda3_quadratic_solver s;
         double x[toda3_quadratic_DIM];
-        for (size_t i = 0; i < toda3_quadratic_DIM; ++i) x[i] = all->x[i * all->members + m];
-        const toda3_quadratic_status begun = toda3_quadratic_begin_member(all, m, x, &s);
+        const toda3_quadratic_status begun = toda3_quadratic_take_member(all, m, x, &s);
         const toda3_quadratic_status status = toda3_quadratic_end_member(all, m, 0, &s, begun);
         toda3_quadratic_put_member(all, m, begun == toda3_quadratic_OK ? s.x : x, status);
         if (worst == toda3_quadratic_OK) worst = status;

@@ -45,13 +45,7 @@ static phi_status phi_run(const phi_members *all)
     for (size_t m = 0; m < all->members; ++m) {
         phi_solver s;
         double x[PHI_DIM];
-        for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
-#if PHI_GAUGE
-        const double *gauge = all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL;
-        const phi_status begun = phi_begin_member(all, m, x, gauge, &s);
-#else
-        const phi_status begun = phi_begin_member(all, m, x, &s);
-#endif
+        const phi_status begun = phi_take_member(all, m, x, &s);
         const phi_status status = phi_end_member(all, m, 0, &s, begun);
         phi_put_member(all, m, begun == PHI_OK ? s.x : x, status);
         if (worst == PHI_OK) worst = status;

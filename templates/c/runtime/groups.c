@@ -298,13 +298,7 @@ static phi_status phi_group_join(phi_group *group, int lane, const phi_members *
 {
     phi_solver s;
     double x[PHI_DIM];
-    for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
-#if PHI_GAUGE
-    const double *gauge = all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL;
-    const phi_status status = phi_begin_member(all, m, x, gauge, &s);
-#else
-    const phi_status status = phi_begin_member(all, m, x, &s);
-#endif
+    const phi_status status = phi_take_member(all, m, x, &s);
     for (int i = 0; i < PHI_DIM; ++i) group->x[i][lane] = x[i];
     if (status != PHI_OK) return status;
     for (int stage = 0; stage < PHI_STAGES; ++stage)

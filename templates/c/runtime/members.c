@@ -48,6 +48,17 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
     return status == PHI_OK ? phi_set_step(s, all->h[m * all->own]) : status;
 }
 
+/* The same at the state that the ensemble has for it, which is x then. */
+static phi_status phi_take_member(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
+{
+    for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
+#if PHI_GAUGE
+    return phi_begin_member(all, m, x, all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL, s);
+#else
+    return phi_begin_member(all, m, x, s);
+#endif
+}
+
 /* How many steps there are to the next frame, or to the end. */
 static size_t phi_to_frame(const phi_members *all, size_t done)
 {

@@ -178,10 +178,9 @@ static phi_status phi_group_join(phi_group *group, int m, const phi_members *all
     double x[PHI_DIM];
     phi_pack *pack = &group->pack[m / PHI_LANES];
     const int lane = m % PHI_LANES, from = all->own ? lane : 0, to = all->own ? lane + 1 : PHI_LANES;
-    for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + first + (size_t)m];
+    const phi_status status = phi_take_member(all, first + (size_t)m, x, &s);
     for (int i = 0; i < PHI_DIM; ++i) pack->x[i][lane] = x[i];
     group->steps_left[m] = all->steps;
-    const phi_status status = phi_begin_member(all, first + (size_t)m, x, &s);
     if (status != PHI_OK) return status;
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         for (int k = 0; k < PHI_COEFFICIENTS; ++k)
