@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 4ac76abbcf84aa85d7ae5f4d6bca73591a1ebe8dcba021cdcfcd77fa88d65950
+ * body-sha256: 4f61284aae65510e4844d3e65ab0ff5898e8f9924a0c8f9ab46f55724109966c
  */
 #include "ablowitz_ladik.h"
 
@@ -470,8 +470,8 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) ablowitz_ladik_find_lines(s, r, s->lines + r * ablowitz_ladik_LINES);
     for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
+        s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k) * block;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) ablowitz_ladik_put(s, s->x[k], x0 + k * sites);
     return ablowitz_ladik_OK;
 }

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 377fe664c6e999d4e059732308407b74ed7d15b54e731d547d08bded10359776
+ * body-sha256: 32b864c90732d258507a12d9d066f2e54116dc4837e444a77545de9e20d1bcc9
  */
 #include "chiral_magnet.h"
 
@@ -927,8 +927,8 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) chiral_magnet_find_lines(s, r, s->lines + r * chiral_magnet_LINES);
     for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < chiral_magnet_DIM; ++k) s->before[k] = aligned + (chiral_magnet_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
+        s->before[k] = aligned + (chiral_magnet_ARRAYS + k) * block;
     for (size_t k = 0; k < chiral_magnet_GATHERED; ++k)
         s->gathered[k] = aligned + (chiral_magnet_ARRAYS + chiral_magnet_DIM + k) * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->x[k], x0 + k * sites);

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 163af8ae55009d830700d95cbd72d1af3dd2c72e97d3aebec1abab5e804a7b40
+ * body-sha256: 62e6d90d34e6d287c636ba4c774920e013175949e9fe2b709c8270220fcc188c
  */
 #include "dnls_disorder.h"
 
@@ -485,8 +485,8 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) dnls_disorder_find_lines(s, r, s->lines + r * dnls_disorder_LINES);
     for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < dnls_disorder_DIM; ++k) s->before[k] = aligned + (dnls_disorder_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < dnls_disorder_DIM; ++k)
+        s->before[k] = aligned + (dnls_disorder_ARRAYS + k) * block;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_put(s, s->x[k], x0 + k * sites);
     dnls_disorder_put_parameters(s, &own);
     return dnls_disorder_OK;

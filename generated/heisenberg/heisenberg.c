@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: ebd680d19a1e19e30ee1c75fee751df97c7d60573364555f2877c60856d31416
+ * body-sha256: 11bdc96b36a67329e9b49d769600109c9c8635dc79e5e5c8840880cd2a1ff4fb
  */
 #include "heisenberg.h"
 
@@ -211,10 +211,10 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict x_row4 = row->x[0] + row->at[4];
-    const double *restrict x_row1 = row->x[0] + row->at[1];
-    const double *restrict x_row3 = row->x[0] + row->at[3];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
+    const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
+    const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
+    const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
+    const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
     const double *restrict x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
@@ -237,10 +237,10 @@ static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_ro
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict x_row4 = row->x[0] + row->at[4];
-    const double *restrict x_row1 = row->x[0] + row->at[1];
-    const double *restrict x_row3 = row->x[0] + row->at[3];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
+    const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
+    const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
+    const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
+    const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
     const double *restrict x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
@@ -264,10 +264,10 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
 {
     const double c0 = coef[0];
     double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row4 = row->x[1] + row->at[4];
-    const double *restrict y_row1 = row->x[1] + row->at[1];
-    const double *restrict y_row3 = row->x[1] + row->at[3];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
+    const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
+    const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
+    const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
+    const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
@@ -290,10 +290,10 @@ static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_ro
 {
     const double c0 = coef[0];
     double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row4 = row->x[1] + row->at[4];
-    const double *restrict y_row1 = row->x[1] + row->at[1];
-    const double *restrict y_row3 = row->x[1] + row->at[3];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
+    const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
+    const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
+    const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
+    const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
@@ -318,10 +318,10 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     const double *restrict B_row = row->x[3] + row->at[0];
     double *x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0];
-    const double *restrict z_row4 = row->x[2] + row->at[4];
-    const double *restrict z_row1 = row->x[2] + row->at[1];
-    const double *restrict z_row3 = row->x[2] + row->at[3];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
+    const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
+    const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
+    const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
+    const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
@@ -345,10 +345,10 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
     const double *restrict B_row = row->x[3] + row->at[0];
     double *x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0];
-    const double *restrict z_row4 = row->x[2] + row->at[4];
-    const double *restrict z_row1 = row->x[2] + row->at[1];
-    const double *restrict z_row3 = row->x[2] + row->at[3];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
+    const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
+    const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
+    const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
+    const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
@@ -407,14 +407,14 @@ static void heisenberg_energy_row(const heisenberg_params *params, const heisenb
     const double J = params->J;
     const double *restrict B_row = row->x[3] + row->at[0];
     const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict x_row4 = row->x[0] + row->at[4];
-    const double *restrict x_row3 = row->x[0] + row->at[3];
+    const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
+    const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict y_row4 = row->x[1] + row->at[4];
-    const double *restrict y_row3 = row->x[1] + row->at[3];
+    const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
+    const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
-    const double *restrict z_row4 = row->x[2] + row->at[4];
-    const double *restrict z_row3 = row->x[2] + row->at[3];
+    const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
+    const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
@@ -447,20 +447,20 @@ static void heisenberg_vector_field_row(const heisenberg_params *params, const h
     const double J = params->J;
     const double *restrict B_row = row->x[3] + row->at[0];
     const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict x_row4 = row->x[0] + row->at[4];
-    const double *restrict x_row1 = row->x[0] + row->at[1];
-    const double *restrict x_row3 = row->x[0] + row->at[3];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
+    const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
+    const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
+    const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
+    const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict y_row4 = row->x[1] + row->at[4];
-    const double *restrict y_row1 = row->x[1] + row->at[1];
-    const double *restrict y_row3 = row->x[1] + row->at[3];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
+    const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
+    const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
+    const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
+    const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
-    const double *restrict z_row4 = row->x[2] + row->at[4];
-    const double *restrict z_row1 = row->x[2] + row->at[1];
-    const double *restrict z_row3 = row->x[2] + row->at[3];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
+    const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
+    const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
+    const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
+    const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3ef4e667067a4cab0a21750a4ff3b1e0769a8110bc4bbd9141b5db1c28ffc688
+ * body-sha256: 2d08bc826979658c4a8c136aa3731a9a07b1aacbdc2edac2abd6ccf4cfa7120a
  */
 #include "heisenberg_plane.h"
 
@@ -218,8 +218,8 @@ static inline void heisenberg_plane_sweep1(const double *coef, const heisenberg_
     ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
-    const double *restrict x_row1 = row->x[0] + row->at[1];
+    const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
+    const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
     const double *restrict x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
@@ -245,8 +245,8 @@ static inline void heisenberg_plane_sweep2(const double *coef, const heisenberg_
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
     double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
-    const double *restrict y_row1 = row->x[1] + row->at[1];
+    const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
+    const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
     double *z_row = row->x[2] + row->at[0];
     heisenberg_plane_EACH_SITE
@@ -272,8 +272,8 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     const double c1 = coef[1], w2 = row->present[2], w3 = row->present[3];
     double *x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
-    const double *restrict z_row1 = row->x[2] + row->at[1];
+    const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
+    const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
@@ -331,11 +331,11 @@ static void heisenberg_plane_energy_row(const heisenberg_plane_params *params,
     (void)apart;
     const double J = params->J, delta = params->delta, w2 = row->present[2];
     const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
+    const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
+    const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
+    const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -368,14 +368,14 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
 {
     const double J = params->J, delta = params->delta, w2 = row->present[2], w3 = row->present[3];
     const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict x_row2 = row->x[0] + row->at[2];
-    const double *restrict x_row1 = row->x[0] + row->at[1];
+    const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
+    const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
     const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict y_row2 = row->x[1] + row->at[2];
-    const double *restrict y_row1 = row->x[1] + row->at[1];
+    const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
+    const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
     const double *restrict z_row = row->x[2] + row->at[0];
-    const double *restrict z_row2 = row->x[2] + row->at[2];
-    const double *restrict z_row1 = row->x[2] + row->at[1];
+    const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
+    const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -514,8 +514,8 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     for (size_t r = 0; r < rows; ++r)
         heisenberg_plane_find_lines(s, r, s->lines + r * heisenberg_plane_LINES);
     for (size_t k = 0; k < heisenberg_plane_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < heisenberg_plane_DIM; ++k) s->before[k] = aligned + (heisenberg_plane_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
+        s->before[k] = aligned + (heisenberg_plane_ARRAYS + k) * block;
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k) heisenberg_plane_put(s, s->x[k], x0 + k * sites);
     return heisenberg_plane_OK;
 }

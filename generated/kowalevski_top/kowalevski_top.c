@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: aec7e43f07b2470b652b10f7e994c7f20da3332ae772405d0386d472f78e3cbe
+ * body-sha256: 1fb140364e6381b4db055b662229c7946dc1e9d01a75e118a2ff6bfa1079c6b1
  */
 #include "kowalevski_top.h"
 
@@ -3229,8 +3229,8 @@ static double kowalevski_top_group_sum(const kowalevski_top_group *group,
 {
     double sum = 0.0;
     for (int i = 0; i < kowalevski_top_DIM; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
-            : 0.0;
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+            sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
     return sum;
 }
 

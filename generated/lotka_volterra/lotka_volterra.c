@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 54347fcd250f117f6781cbfab737a822b269e9e4201c4fdd922e953b80b8c911
+ * body-sha256: 548d103c985279095d8ced6b25f7e47364c78de95b4ac35169197102a06988cd
  */
 #include "lotka_volterra.h"
 
@@ -1355,8 +1355,8 @@ static double lotka_volterra_group_sum(const lotka_volterra_group *group,
 {
     double sum = 0.0;
     for (int i = 0; i < lotka_volterra_DIM; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
-            : 0.0;
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+            sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
     return sum;
 }
 

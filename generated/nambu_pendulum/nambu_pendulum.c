@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: 8a74ae4ecf34771c494bbea9ce26b739b2a2515398131e247ee81e1ed55d223a
+ * body-sha256: acf37441402f29910d2233345c985dd57e55209d33ac33c55d3ea7ff5ab4f7ff
  */
 #include "nambu_pendulum.h"
 
@@ -1394,8 +1394,8 @@ static void nambu_pendulum_check_end(nambu_pendulum_lanes coef[restrict], nambu_
     nambu_pendulum_values_lanes(coef, e->p, m, value, fixed);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) scale[lane] += fabs(m[i][lane])
-            + fabs(slope[i][lane]);
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            scale[lane] += fabs(m[i][lane]) + fabs(slope[i][lane]);
     }
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
@@ -2100,8 +2100,8 @@ static double nambu_pendulum_group_sum(const nambu_pendulum_group *group,
 {
     double sum = 0.0;
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
-            : 0.0;
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
     return sum;
 }
 

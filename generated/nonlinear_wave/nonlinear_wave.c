@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3e8449fe3b89545f0400f91361ea391044b758be0b08df5a1c8b4cc570b0fdb1
+ * body-sha256: 3ca426921abc6897ef951cc367da7e3673698af9614f84bc24bfb3b69c5edab0
  */
 #include "nonlinear_wave.h"
 
@@ -379,8 +379,8 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) nonlinear_wave_find_lines(s, r, s->lines + r * nonlinear_wave_LINES);
     for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < nonlinear_wave_DIM; ++k) s->before[k] = aligned + (nonlinear_wave_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
+        s->before[k] = aligned + (nonlinear_wave_ARRAYS + k) * block;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k) nonlinear_wave_put(s, s->x[k], x0 + k * sites);
     return nonlinear_wave_OK;
 }

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: e58e144722b145fd432f00c49804f91639ae8e8378769a65eeb73ba3a458ca36
+ * body-sha256: ccc3db1c79d393ff9d73d90e73ab3ddbba6e4befba72b03c41321bb5c1ed7964
  */
 #include "outer_planets.h"
 
@@ -499,8 +499,8 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) outer_planets_find_lines(s, r, s->lines + r * outer_planets_LINES);
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < outer_planets_DIM; ++k) s->before[k] = aligned + (outer_planets_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < outer_planets_DIM; ++k)
+        s->before[k] = aligned + (outer_planets_ARRAYS + k) * block;
     for (size_t k = 0; k < outer_planets_GATHERED; ++k)
         s->gathered[k] = aligned + (outer_planets_ARRAYS + outer_planets_DIM + k) * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k) outer_planets_put(s, s->x[k], x0 + k * sites);

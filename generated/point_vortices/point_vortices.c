@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 1c643f7ca7fc98e655252484c71f55cb9ec78b39ad0163f8f0b70e1b3d23d6a1
+ * body-sha256: 4931d1eec2d42606250560c3a972c92fba1d90d493b73f18803ab68884d086c4
  */
 #include "point_vortices.h"
 
@@ -611,8 +611,8 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) point_vortices_find_lines(s, r, s->lines + r * point_vortices_LINES);
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < point_vortices_DIM; ++k) s->before[k] = aligned + (point_vortices_ARRAYS + k)
-        * block;
+    for (size_t k = 0; k < point_vortices_DIM; ++k)
+        s->before[k] = aligned + (point_vortices_ARRAYS + k) * block;
     for (size_t k = 0; k < point_vortices_GATHERED; ++k)
         s->gathered[k] = aligned + (point_vortices_ARRAYS + point_vortices_DIM + k) * block;
     point_vortices_place_middle(s, aligned + (point_vortices_RESERVED - point_vortices_IMPLICIT) * block,

@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: c7edc79e1481f941df7fb1a0a4f66289ec7910bb786fd7efcac6192f069e5413
+ * body-sha256: ec0140ff9dc0e78871a448413295abfbd531fbb3fbe4d74f37def59e7f0dd364
  */
 #include "rigid_body.h"
 
@@ -1730,8 +1730,8 @@ static double rigid_body_group_sum(const rigid_body_group *group, rigid_body_lan
 {
     double sum = 0.0;
     for (int i = 0; i < rigid_body_DIM; ++i)
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) sum += group->active[lane] ? fabs(y[i][lane])
-            : 0.0;
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            sum += group->active[lane] ? fabs(y[i][lane]) : 0.0;
     return sum;
 }
 

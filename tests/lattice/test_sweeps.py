@@ -332,6 +332,11 @@ def test_code_does_not_grow_with_the_lattice() -> None:
         assert lines < 825 + 120 * graph + (425 + 110 * graph) * series, (name, lines)
 
 
+def test_loops_say_which_rows_they_read() -> None:
+    text = emit(compiled("sheet").program, "c", "phigen")["sheet.c"]
+    assert set(re.findall(r"row->at\[[1-9]\];(.*)", text)) == {" /* i - 1 */", " /* i + 1 */"}
+
+
 def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None:
     text = emit(compiled("magnet").program, "c", "phigen")["magnet.c"]
     found = re.findall(

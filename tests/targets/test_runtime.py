@@ -161,6 +161,11 @@ def test_lines_are_broken_before_what_binds_least():
     ]
 
 
+def test_loops_are_broken_behind_their_heads():
+    head = "    for (size_t k = 0; k < count; ++k)"
+    assert fitted(f"{head} place[k] = first + ({'a' * 45} + k) * block;").split("\n")[0] == head
+
+
 def test_a_function_on_a_line_that_is_too_long_gets_lines_of_its_own():
     head = f"static int {'f' * 60}(const double *{'x' * 20})"
     assert fitted(f"{head} {{ return *{'x' * 20} > 0.0; }}").split("\n") == [

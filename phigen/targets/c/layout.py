@@ -117,6 +117,7 @@ def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
         if c != " " or k <= least:
             continue
         after_loop = head is not None and depth == 0 and line[k - 1] == ")"
+        head = None if after_loop else head
         operator = re.match(r" ([-+*/?:<>]|&&|\|\||[<>=!]=) ", line[k:])
         label = line[k - 1] == ":" and line.lstrip().startswith("case ")
         if line[k - 1] in ",;=" or operator or after_loop or label:

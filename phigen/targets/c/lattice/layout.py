@@ -34,6 +34,11 @@ class Layout:
         """The line of a neighbour."""
         return self.lines.index(tuple(offset[:-1]))
 
+    def place(self, line: int) -> str:
+        """Where a line is, beside the row that is worked at."""
+        axes = zip(self.step.sites.axes, self.lines[line], strict=False)
+        return ", ".join(f"{axis} {offset:+d}".replace("+", "+ ").replace("-", "- ") for axis, offset in axes if offset)
+
     @property
     def colour_step(self) -> int:
         """The distance in a row from a site to the next of its colour."""

@@ -139,7 +139,8 @@ class SiteNames:
             constant = "" if mine else "const "
             alone = "" if base in self.moved else "restrict "
             place = self.layout.arrays.index(base)
-            lines.append(f"{constant}double *{alone}{named} = row->x[{place}] + row->at[{line}];")
+            said = f" /* {self.layout.place(line)} */" if line else ""
+            lines.append(f"{constant}double *{alone}{named} = row->x[{place}] + row->at[{line}];{said}")
         return lines
 
 
