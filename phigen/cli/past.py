@@ -62,7 +62,8 @@ def past_of(path: Path, names: Interface, option: str) -> Past:
         if len(rows):
             return past
     except (OSError, ValueError, KeyError, IndexError) as error:
-        raise click.BadParameter(f"{path} is no file of a run of {names.name}: {error}", param_hint=option) from None
+        why = f"it has no column {error}" if isinstance(error, KeyError) else str(error)
+        raise click.BadParameter(f"{path} is no file of a run of {names.name}: {why}", param_hint=option) from None
     raise click.BadParameter(f"{path} has no rows", param_hint=option)
 
 

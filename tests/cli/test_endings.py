@@ -168,7 +168,7 @@ def test_what_does_not_fit_is_told(phigen, write):
         ((swing, "--extend"), "name its file by --output"),
         ((swing, "--extend", "-o", "a.csv", "--set", "q=2"), "of another run"),
         ((swing, "--extend", "-o", "a.csv", "--until", 5), "never reached from 6.0"),
-        ((swing, "--from", "words.csv"), "no file of a run of swing"),
+        ((swing, "--from", "words.csv"), "no file of a run of swing: it has no column 't'"),
         ((body, "--every", 0.5, "--steps", 10), "say where the run ends in time"),
     ):
         done = phigen("run", *args, "-t", "numpy")
