@@ -13,7 +13,6 @@ from lattice.test_sweeps import (
     FEW,
     REAL_ONLY,
     SERIES,
-    TEXTS,
     compiled,
     disorder,
     expansion,
@@ -55,7 +54,7 @@ def derivative(name: str, target: str, x: np.ndarray, parameters: dict[str, Any]
 IN_C = ("xxz_open", "sheet", "charges", "magnet", "volterra", "dragged", "tangle", "vortices")
 
 
-@pytest.mark.parametrize("name", TEXTS)
+@pytest.mark.parametrize("name", [*IN_C, "fput", "ablowitz_ladik", "toda", "web", "network", "pond"])
 def test_tangent_vectors_are_carried_by_the_derivative_of_a_step(name: str) -> None:
     x = start(name, FEW.get(name))
     parameters = disorder(name, x)
