@@ -42,6 +42,12 @@ class Target:
         options = {"single_file": True} if single_file and self.single_file else {}
         return cast(dict[str, str], import_module(self.emitter).emit(program, command, **options))
 
+    def expect_offered(self, program: Program) -> None:
+        """Raise the `SpecError` with which ``emit`` would refuse a program, without emitting it."""
+        refuse = getattr(import_module(self.emitter), "expect_offered", None)
+        if refuse is not None:
+            refuse(program)
+
     def load(self, files: Mapping[str, str], interface: Interface) -> Backend:
         """The back end of generated files. Raises `ToolchainError`."""
         return cast("Backend", import_module(self.loader).load(files, interface))

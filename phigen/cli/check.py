@@ -10,11 +10,13 @@ import click
 from phigen.cli.console import Console, heading, out, out_json, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
-from phigen.errors import CheckError
+from phigen.errors import CheckError, SpecError
 
 if TYPE_CHECKING:
+    from phigen.compilation import Compilation
     from phigen.proofs.examination import Examination
     from phigen.proofs.independent import Comparison
+    from phigen.spec.model import Spec
     from phigen.symbolic.verdict import Statement
 
 _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow", "undecided": "yellow"}
@@ -119,6 +121,20 @@ def _collect(examination: Examination, collector: Collector, console: Console) -
         collector.errors.append(CheckError(f"{examination.spec.file}: refuted: {'; '.join(mistakes)}"))
     elif examination.obstacle:
         collector.errors.append(examination.obstacle)
+    elif examination.compilation:
+        _expect_targets(examination.spec, examination.compilation, collector)
+
+
+def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:
+    """What the targets that the spec asks for refuse."""
+    from phigen import registry
+
+    for name in spec.targets:
+        try:
+            registry.find(name).expect_offered(compilation.program)
+        except SpecError as error:
+            hints = [spec.diagnostic(("targets",), d.message, d.hint) for d in error.diagnostics]
+            collector.errors.append(SpecError(hints))
 
 
 def _print(examination: Examination) -> None:

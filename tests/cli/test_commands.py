@@ -316,3 +316,14 @@ def test_demo_keeps_the_casimir_at_roundoff_up_to_the_singularity(phigen, target
     x2, x8, x_rk, c2, c8, c_rk = map(float, cells[2:])
     assert max(c2, c8) < 1e-13 < 1e-6 < c_rk
     assert x8 < 1e-8 < x2 < x_rk
+
+
+def test_check_tells_what_a_target_of_the_spec_refuses(phigen, in_tmp):
+    """As build does: of each target that the spec asks for, at its place."""
+    text = (SPECS / "pendulum_euler.yaml").read_text(encoding="utf-8")
+    kept = "\n".join(line for line in text.splitlines() if not line.startswith(("targets", "adjoint")))
+    Path("p.yaml").write_text(kept + "\nadjoint: true\ntargets: [c, js]\n", encoding="utf-8")
+    done = phigen("check", "p.yaml")
+    assert done.exit_code == 1
+    assert "not offered in JavaScript" in done.stderr
+    assert "p.yaml:" in done.stderr

@@ -41,7 +41,15 @@ PATH_SYNTAX = Syntax(
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
-    """The file name and its contents. Raises `SpecError` for adjoints, and for noise and tangents of lattices."""
+    """The file name and its contents. Raises `SpecError` as `expect_offered` does."""
+    expect_offered(program)
+    body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
+    head = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
+    return {f"{program.name}.mjs": f"/*\n{head}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
+
+
+def expect_offered(program: Program) -> None:
+    """Raise `SpecError` for adjoints, and for noise and tangents of lattices."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
@@ -50,9 +58,6 @@ def emit(program: Program, command: str) -> dict[str, str]:
             f"{program.name} is a lattice {'with noise' if program.noise else 'whose steps carry tangent vectors'}"
         )
         raise SpecError([Diagnostic(f"{message}, which is not offered in JavaScript", hint="c and numpy have it")])
-    body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
-    head = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
-    return {f"{program.name}.mjs": f"/*\n{head}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
 
 
 def _lattice(program: Program, step: Sweeps) -> str:
