@@ -12,6 +12,7 @@ import click
 
 from phigen.cli.console import Console, heading, out, out_json, table
 from phigen.cli.run_summary import described_spectrum, finite
+from phigen.cli.sources import FILMS
 from phigen.errors import StepError
 
 if TYPE_CHECKING:
@@ -50,6 +51,10 @@ def run_lattice(
     if output and output.suffix != ".npz":
         raise click.BadParameter("frames of lattices go to .npz files", param_hint="--output")
     extras = replace(spec.extras, tangent=True) if lyapunov else None
+    if plot and plot.suffix.lower() in FILMS:
+        from phigen.drawing.films import expect_writer
+
+        expect_writer(plot)
     compilation = compilation_of(spec, order, extras, scheme=scheme)
     assert compilation.cell is not None
     start = start_of(spec, run)
@@ -85,7 +90,12 @@ def run_lattice(
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
             out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")
-    if plot:
+    if plot and plot.suffix.lower() in FILMS:
+        from phigen.drawing.films import film
+
+        film(made, f"{spec.name}, {run.name}", plot)
+        console.note(f"wrote {plot}")
+    elif plot:
         from phigen.drawing.figures import save
         from phigen.drawing.lattices import lattice_figure
 

@@ -12,7 +12,7 @@ from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.lattice_run import changed, expect_no, run_lattice
 from phigen.cli.run_summary import described_run, finite, print_summary
-from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, run_option, scheme_option
+from phigen.cli.sources import FIGURES, FILMS, ORDER, file_ending, load_one, one_spec, run_option, scheme_option
 from phigen.registry import LOADABLE
 
 if TYPE_CHECKING:
@@ -46,7 +46,10 @@ _TABLES = (".csv", ".npz")
 @click.option("--section", metavar="FILE", callback=file_ending(*_TABLES),
               help="Store the crossings of the run's Poincaré section: FILE.csv or FILE.npz.")  # fmt: skip
 @click.option(
-    "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the run: FILE.png, FILE.svg or FILE.pdf."
+    "--plot",
+    metavar="FILE",
+    callback=file_ending(*FIGURES, *FILMS),
+    help="Draw the run: FILE.png, FILE.svg or FILE.pdf; a lattice as a film: FILE.gif or FILE.mp4.",
 )
 @click.option(
     "--lyapunov",
@@ -101,6 +104,8 @@ def command(
         given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
         run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json, lyapunov=lyapunov)
         return
+    if plot and plot.suffix.lower() in FILMS:
+        raise click.BadParameter(f"films are of lattices, and {spec.name} is none", param_hint="--plot")
     _expect_together(
         {"--until": until, "--every": every, "--at": at, "--extend": extend},
         {"--steps": steps, "--from": source, "--section": section, "--lyapunov": lyapunov},

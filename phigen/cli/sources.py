@@ -23,6 +23,8 @@ SUFFIXES = (".yaml", ".yml")
 
 #: What files of figures end in.
 FIGURES = (".png", ".svg", ".pdf")
+#: And of films, of lattices.
+FILMS = (".gif", ".mp4")
 
 #: The type of ``--order``.
 ORDER = click.IntRange(1, limits.ORDER)

@@ -111,3 +111,19 @@ def test_what_lattices_do_not_have_is_refused(phigen, chain, command):
     done = phigen(*command, chain)
     assert done.exit_code in (1, 2)
     assert "lattice" in done.stderr
+
+
+def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_path, monkeypatch):
+    from matplotlib.animation import FFMpegWriter
+    from PIL import Image
+
+    film = tmp_path / "chain.gif"
+    done = phigen("run", chain, "--target", "numpy", "--steps", "3", "--plot", film)
+    assert done.exit_code == 0, done.stderr
+    with Image.open(film) as pictures:
+        assert pictures.n_frames > 1
+    assert sorted(p.suffix for p in tmp_path.iterdir() if p.stem.startswith(".")) == []
+    monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
+    refused = phigen("run", chain, "--plot", tmp_path / "chain.mp4")
+    assert (refused.exit_code, "needs ffmpeg" in refused.stderr) == (2, True)
+    assert "films are of lattices" in phigen("run", "pendulum", "--plot", tmp_path / "p.gif").stderr

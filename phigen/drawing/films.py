@@ -1,0 +1,67 @@
+"""Films of runs of lattices: chains as curves over the sites, planes as pictures, one after the other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from phigen.drawing.lattices import MOST_PANELS
+from phigen.drawing.palette import SERIES, styled
+from phigen.errors import MissingPackageError
+from phigen.runtime.lattice import LatticeTrajectory
+from phigen.symbolic.arrays import Floats
+
+#: Pictures of a film at most, in a second, and dots to an inch.
+MOST_PICTURES, RATE, DOTS = 400, 20, 80
+
+
+@styled
+def film(run: LatticeTrajectory, title: str, path: Path) -> None:
+    """Write a film of the coordinates, ``.gif`` or ``.mp4``. Raises `MissingPackageError` where ffmpeg is not there."""
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+    from matplotlib.figure import Figure
+
+    expect_writer(path)
+    writer: Any = PillowWriter(fps=RATE) if path.suffix.lower() == ".gif" else FFMpegWriter(fps=RATE)
+    names = run.coordinates[:MOST_PANELS]
+    figure = Figure(figsize=(3.0 * len(names), 3.0), layout="constrained")
+    panels = np.atleast_1d(figure.subplots(1, len(names)))
+    shown = [_shown(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
+    try:
+        with writer.saving(figure, str(part), DOTS):
+            for k in np.unique(np.linspace(0, len(run) - 1, min(len(run), MOST_PICTURES)).astype(int)).tolist():
+                figure.suptitle(f"{title}, t = {run.t[k]:.4g}", fontsize=10)
+                for change, name in zip(shown, names, strict=True):
+                    change(_flat(run.column(name)[k]))
+                writer.grab_frame()
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def expect_writer(path: Path) -> None:
+    """Raises `MissingPackageError` for a film that needs ffmpeg where there is none."""
+    from matplotlib.animation import FFMpegWriter
+
+    if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
+        raise MissingPackageError(f"{path.name} needs ffmpeg, which is not there; a film that ends in .gif does not")
+
+
+def _flat(values: Floats) -> Floats:
+    """A chain as it is, a plane, or the middle plane across the first axis."""
+    return values if values.ndim < 3 else values[values.shape[0] // 2]
+
+
+def _shown(axes: Any, name: str, values: Floats) -> Any:
+    """What is shown of a coordinate (frames, *sizes): the function that changes it."""
+    first, most = _flat(values[0]), float(np.abs(values).max()) or 1.0
+    axes.set_title(name)
+    if first.ndim == 1:
+        (line,) = axes.plot(first, color=SERIES[0], linewidth=1.0)
+        axes.set_ylim(-1.05 * most, 1.05 * most)
+        return line.set_ydata
+    picture = axes.imshow(first.T, origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="none")
+    return lambda plane: picture.set_data(plane.T)
