@@ -168,7 +168,7 @@ def _system(program: Program) -> Mapping[str, object]:
         "parts": program.noise.parts if program.noise else 0,
         "draws": program.noise.draws if program.noise else 0,
         "bound": json.dumps(BOUND),
-        "attitude": _sizes(program.attitude) if program.attitude else "",
+        "attitude": render("js", "attitude.mjs", _sizes(program.attitude)) if program.attitude else "",
         "fractions": json.dumps(program.fractions),
         "table": render("js", "table.mjs", _table(program)).strip("\n"),
     }
@@ -182,6 +182,7 @@ def _sizes(attitude: Attitude) -> Mapping[str, int]:
     return {
         "attitude": rows**2 or 4,
         "element": group.size,
+        "position": group.size > (rows**2 or 4),
         "rows": rows,
         "covector": covector,
         "turning": len(rate.roots) if rate else 0,
