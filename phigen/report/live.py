@@ -29,6 +29,7 @@ HELP = """Drag a picture of space, or use the arrow keys, to turn both; + and âˆ
 are interpolated. It begins with a step that is large for RK4, if there is one that phigen takes well; with smaller
 ones both come closer to the truth."""
 
+NOISE = "RK4, which it has beside the solver, takes no noise"
 NOTHING = "Time or forces act on this system, so nothing is conserved that errors could be counted in."
 
 _COMMENT = re.compile(r"^[ \t]*(/\*.*?\*/|//[^\n]*)[ \t]*\n", re.MULTILINE | re.DOTALL)
@@ -67,7 +68,7 @@ def gathered(
 ) -> Live:
     """The panel for a run: the solver in JavaScript, of the order of the page and of those of ``orders`` below it."""
     if compilation.system.noise:
-        return Live({}, why_not="RK4, which it has beside the solver, takes no noise")
+        return Live({}, why_not=NOISE)
     found, why_not = solvers(compilation, scheme, orders)
     return Live(found, run, parameters, why_not)
 

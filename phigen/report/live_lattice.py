@@ -15,7 +15,20 @@ from phigen.compilation import Compilation
 from phigen.lattice.cell import PAIRS
 from phigen.lattice.states import Start
 from phigen.report import page
-from phigen.report.live import FEW, NOTHING, ORDERS, Live, Slider, general, script, sides, slid, slider_of, solvers
+from phigen.report.live import (
+    FEW,
+    NOISE,
+    NOTHING,
+    ORDERS,
+    Live,
+    Slider,
+    general,
+    script,
+    sides,
+    slid,
+    slider_of,
+    solvers,
+)
 from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import LieAlgebraForm, Parameter, Run, Spec, Values
 from phigen.symbolic.expression import Expression, symbols_of
@@ -49,6 +62,8 @@ def gathered_lattice(
     compilation: Compilation, scheme: str | None, run: Run, start: Start, orders: Sequence[int] = ORDERS
 ) -> LatticeLive:
     """The panel for a run of a lattice."""
+    if compilation.spec.noise:
+        return LatticeLive({}, why_not=NOISE)
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
         return LatticeLive({}, why_not="the lists of its start are too long for a page")
     found, why_not = solvers(compilation, scheme, orders)
