@@ -40,10 +40,10 @@ SHORT = "profile: small\n"
 KINDS = {
     "newton": (TOP + "order: 4\ngauge: none\n", Newton),
     "newton, composed": (TOP + "order: 6\ncomposition: kahan-li\ngauge: none\n" + SHORT, Newton),
-    "newton, gauge": (TOP + "casimirs: {C: x1**2 + x2**2 + x3**2}\n" + SHORT, Newton),
+    "newton, gauge": (TOP + "casimirs: {C: x1**2 + x2**2 + x3**2}\n", Newton),
     "newton, time": (DRIVEN + "order: 4\n", Newton),
     "newton, force": (TOP + "order: 2\nforces: {covector: {x1: -x2*I1/9}, vector: {x3: -x3*I2/9}}\n" + SHORT, Newton),
-    "newton, monitor": (SWING + "monitor: 1/(1 + g*q**2)\norder: 4\n" + SHORT, Newton),
+    "newton, monitor": (SWING + "monitor: 1/(1 + g*q**2)\norder: 4\n", Newton),
     "explicit, time": (DRIVEN + "birealisation: {kind: canonical-euler, side: q}\norder: 1\n" + SHORT, Explicit),
     "path": (TOP + "birealisation: karasev\ngauge: none\norder: 4\n", Path),
     "path, long": (TOP.replace("/2\n", "*8\n") + "birealisation: karasev\ngauge: none\norder: 2\n" + SHORT, Path),
