@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 4f61284aae65510e4844d3e65ab0ff5898e8f9924a0c8f9ab46f55724109966c
+ * body-sha256: cab7c6915d4c8d185488120f0103004de979728d52f0aaa9cd4cca1572507100
  */
 #include "ablowitz_ladik.h"
 
@@ -113,17 +113,6 @@ static inline void ablowitz_ladik_ends(double *row, ptrdiff_t length, ptrdiff_t 
         for (ptrdiff_t k = 0; k < ablowitz_ladik_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= ablowitz_ladik_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void ablowitz_ladik_place(const ablowitz_ladik_solver *s, size_t index,
-    ptrdiff_t place[ablowitz_ladik_AXES])
-{
-    place[ablowitz_ladik_AXES - 1] = 0;
-    for (int a = ablowitz_ladik_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -405,29 +394,6 @@ static void ablowitz_ladik_put(const ablowitz_ladik_solver *s, double *rows, con
     }
 }
 
-/* Where a row is, and those beside it. */
-static void ablowitz_ladik_find_lines(const ablowitz_ladik_solver *s, size_t index,
-    ptrdiff_t at[ablowitz_ladik_LINES])
-{
-    ptrdiff_t place[ablowitz_ladik_AXES];
-    ablowitz_ladik_place(s, index, place);
-    for (int k = 0; k < ablowitz_ladik_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < ablowitz_ladik_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + ablowitz_ladik_lines[k][a];
-            if (ablowitz_ladik_open[a]) { /* mirrored, as in ablowitz_ladik_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void ablowitz_ladik_prepare_step(const ablowitz_ladik_params *params, double h, double *coef)
 {
@@ -468,7 +434,7 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     const size_t block = rows * (size_t)width;
     double *end = aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) ablowitz_ladik_find_lines(s, r, s->lines + r * ablowitz_ladik_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k) * block;

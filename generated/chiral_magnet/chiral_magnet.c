@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 32b864c90732d258507a12d9d066f2e54116dc4837e444a77545de9e20d1bcc9
+ * body-sha256: 881c7fc3aac6b64dbed57febf0c2ecda13501a8eef8d7bf8543784878741a8c3
  */
 #include "chiral_magnet.h"
 
@@ -119,17 +119,6 @@ typedef struct {
 static inline void chiral_magnet_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     (void)row, (void)length, (void)from, (void)to;
-}
-
-/* The position of a row along all axes but the last. */
-static inline void chiral_magnet_place(const chiral_magnet_solver *s, size_t index,
-    ptrdiff_t place[chiral_magnet_AXES])
-{
-    place[chiral_magnet_AXES - 1] = 0;
-    for (int a = chiral_magnet_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -860,29 +849,6 @@ static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const
     }
 }
 
-/* Where a row is, and those beside it. */
-static void chiral_magnet_find_lines(const chiral_magnet_solver *s, size_t index,
-    ptrdiff_t at[chiral_magnet_LINES])
-{
-    ptrdiff_t place[chiral_magnet_AXES];
-    chiral_magnet_place(s, index, place);
-    for (int k = 0; k < chiral_magnet_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < chiral_magnet_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + chiral_magnet_lines[k][a];
-            if (chiral_magnet_open[a]) { /* mirrored, as in chiral_magnet_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void chiral_magnet_prepare_step(const chiral_magnet_params *params, double h, double *coef)
 {
@@ -925,7 +891,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     const size_t block = rows * (size_t)width;
     double *end = aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) chiral_magnet_find_lines(s, r, s->lines + r * chiral_magnet_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         s->before[k] = aligned + (chiral_magnet_ARRAYS + k) * block;

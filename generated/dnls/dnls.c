@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 2cbd74cfae8051c2197957559a56560a9e27fdc1e63cae0bca7c1ab95917d7b4
+ * body-sha256: 8fba4aedd3b926a8929b631847a53551ba1caa7de1a2785f04b04b81779b5ab6
  */
 #include "dnls.h"
 
@@ -109,16 +109,6 @@ static inline void dnls_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 0; k < dnls_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= dnls_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void dnls_place(const dnls_solver *s, size_t index, ptrdiff_t place[dnls_AXES])
-{
-    place[dnls_AXES - 1] = 0;
-    for (int a = dnls_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -357,28 +347,6 @@ static void dnls_put(const dnls_solver *s, double *rows, const double *values)
     }
 }
 
-/* Where a row is, and those beside it. */
-static void dnls_find_lines(const dnls_solver *s, size_t index, ptrdiff_t at[dnls_LINES])
-{
-    ptrdiff_t place[dnls_AXES];
-    dnls_place(s, index, place);
-    for (int k = 0; k < dnls_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < dnls_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + dnls_lines[k][a];
-            if (dnls_open[a]) { /* mirrored, as in dnls_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void dnls_prepare_step(const dnls_params *params, double h, double *coef)
 {
@@ -417,7 +385,7 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     const size_t block = rows * (size_t)width;
     double *end = aligned - dnls_LEAD + dnls_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) dnls_find_lines(s, r, s->lines + r * dnls_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < dnls_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_DIM; ++k) s->before[k] = aligned + (dnls_ARRAYS + k) * block;
     for (size_t k = 0; k < dnls_DIM; ++k) dnls_put(s, s->x[k], x0 + k * sites);

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 62e6d90d34e6d287c636ba4c774920e013175949e9fe2b709c8270220fcc188c
+ * body-sha256: b88bbd864d0ed6c33a700f1c70dc5b40c65c942437be3114b398aab7ff808ce2
  */
 #include "dnls_disorder.h"
 
@@ -420,29 +420,6 @@ static void dnls_disorder_put_parameter(const dnls_disorder_solver *s, double *r
         rows[i] = value;
 }
 
-/* Where a row is, and those beside it. */
-static void dnls_disorder_find_lines(const dnls_disorder_solver *s, size_t index,
-    ptrdiff_t at[dnls_disorder_LINES])
-{
-    ptrdiff_t place[dnls_disorder_AXES];
-    dnls_disorder_place(s, index, place);
-    for (int k = 0; k < dnls_disorder_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < dnls_disorder_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + dnls_disorder_lines[k][a];
-            if (dnls_disorder_open[a]) { /* mirrored, as in dnls_disorder_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void dnls_disorder_prepare_step(const dnls_disorder_params *params, double h, double *coef)
 {
@@ -483,7 +460,7 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     const size_t block = rows * (size_t)width;
     double *end = aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) dnls_disorder_find_lines(s, r, s->lines + r * dnls_disorder_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         s->before[k] = aligned + (dnls_disorder_ARRAYS + k) * block;

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 85ea3ffa30b16a95c82fbfd7b29d84456038f7200b49039c6f17e0306ca0a652
+ * body-sha256: 292408397aceeb07f5a2f7df670984b5c776d9c9c6929ee8f8c105ec868534bc
  */
 #include "food_web.h"
 
@@ -121,16 +121,6 @@ typedef struct {
 static inline void food_web_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     (void)row, (void)length, (void)from, (void)to;
-}
-
-/* The position of a row along all axes but the last. */
-static inline void food_web_place(const food_web_solver *s, size_t index, ptrdiff_t place[food_web_AXES])
-{
-    place[food_web_AXES - 1] = 0;
-    for (int a = food_web_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -551,28 +541,6 @@ static void food_web_put_parameter(const food_web_solver *s, double *rows, const
         rows[i] = value;
 }
 
-/* Where a row is, and those beside it. */
-static void food_web_find_lines(const food_web_solver *s, size_t index, ptrdiff_t at[food_web_LINES])
-{
-    ptrdiff_t place[food_web_AXES];
-    food_web_place(s, index, place);
-    for (int k = 0; k < food_web_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < food_web_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + food_web_lines[k][a];
-            if (food_web_open[a]) { /* mirrored, as in food_web_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void food_web_prepare_step(const food_web_params *params, double h, double *coef)
 {
@@ -614,7 +582,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const size_t block = rows * (size_t)width;
     double *end = aligned - food_web_LEAD + food_web_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) food_web_find_lines(s, r, s->lines + r * food_web_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < food_web_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < food_web_DIM; ++k) s->before[k] = aligned + (food_web_ARRAYS + k) * block;
     for (size_t k = 0; k < food_web_GATHERED; ++k)

@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: abe1fd3bdeee804c71e97c671807d00f16d0368301b596666af4f425297e59f6
+ * body-sha256: baab24dae318b384f6064737ac07b1efddb848f65d121fd0e1d347057d7f21ea
  */
 #include "fput.h"
 
@@ -112,16 +112,6 @@ static inline void fput_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 0; k < fput_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= fput_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void fput_place(const fput_solver *s, size_t index, ptrdiff_t place[fput_AXES])
-{
-    place[fput_AXES - 1] = 0;
-    for (int a = fput_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -317,28 +307,6 @@ static void fput_put(const fput_solver *s, double *rows, const double *values)
     }
 }
 
-/* Where a row is, and those beside it. */
-static void fput_find_lines(const fput_solver *s, size_t index, ptrdiff_t at[fput_LINES])
-{
-    ptrdiff_t place[fput_AXES];
-    fput_place(s, index, place);
-    for (int k = 0; k < fput_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < fput_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + fput_lines[k][a];
-            if (fput_open[a]) { /* mirrored, as in fput_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void fput_prepare_step(const fput_params *params, double h, double *coef)
 {
@@ -378,7 +346,7 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     const size_t block = rows * (size_t)width;
     double *end = aligned - fput_LEAD + fput_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) fput_find_lines(s, r, s->lines + r * fput_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < fput_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < fput_DIM; ++k) s->before[k] = aligned + (fput_ARRAYS + k) * block;
     for (size_t k = 0; k < fput_DIM; ++k) fput_put(s, s->x[k], x0 + k * sites);

@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: b296959ff6bbd44002351797c3e0c1e2bfe44dcd2c2312f49fa75b87a3775c90
+ * body-sha256: 3ed066fffc3dcb65266891b483fbad7decfc5f456ebba1c2645f278748d66221
  */
 #include "kdv.h"
 
@@ -110,16 +110,6 @@ static inline void kdv_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
         for (ptrdiff_t k = 0; k < kdv_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= kdv_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void kdv_place(const kdv_solver *s, size_t index, ptrdiff_t place[kdv_AXES])
-{
-    place[kdv_AXES - 1] = 0;
-    for (int a = kdv_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -420,28 +410,6 @@ static void kdv_put(const kdv_solver *s, double *rows, const double *values)
     }
 }
 
-/* Where a row is, and those beside it. */
-static void kdv_find_lines(const kdv_solver *s, size_t index, ptrdiff_t at[kdv_LINES])
-{
-    ptrdiff_t place[kdv_AXES];
-    kdv_place(s, index, place);
-    for (int k = 0; k < kdv_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < kdv_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + kdv_lines[k][a];
-            if (kdv_open[a]) { /* mirrored, as in kdv_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 /* Where y and what guesses need are, in blocks of memory. */
 static void kdv_place_middle(kdv_solver *s, double *memory, size_t block)
@@ -491,7 +459,7 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     const size_t block = rows * (size_t)width;
     double *end = aligned - kdv_LEAD + kdv_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) kdv_find_lines(s, r, s->lines + r * kdv_LINES);
+    s->lines[0] = 0;
     s->matrix = (double *)(void *)(s->lines + kdv_LINES);
     for (size_t k = 0; k < kdv_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < kdv_DIM; ++k) s->before[k] = aligned + (kdv_ARRAYS + k) * block;

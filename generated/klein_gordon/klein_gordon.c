@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: aed57fe9c1948560a149c0d2042580fc1c003d66424197d3076d27394a4d4340
+ * body-sha256: 63897e390631f2882b5014c027539f15a7014c76e099924c71c3b58ecbdd1933
  */
 #include "klein_gordon.h"
 
@@ -108,17 +108,6 @@ static inline void klein_gordon_ends(double *row, ptrdiff_t length, ptrdiff_t fr
         for (ptrdiff_t k = 0; k < klein_gordon_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= klein_gordon_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void klein_gordon_place(const klein_gordon_solver *s, size_t index,
-    ptrdiff_t place[klein_gordon_AXES])
-{
-    place[klein_gordon_AXES - 1] = 0;
-    for (int a = klein_gordon_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -307,29 +296,6 @@ static void klein_gordon_put(const klein_gordon_solver *s, double *rows, const d
     }
 }
 
-/* Where a row is, and those beside it. */
-static void klein_gordon_find_lines(const klein_gordon_solver *s, size_t index,
-    ptrdiff_t at[klein_gordon_LINES])
-{
-    ptrdiff_t place[klein_gordon_AXES];
-    klein_gordon_place(s, index, place);
-    for (int k = 0; k < klein_gordon_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < klein_gordon_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + klein_gordon_lines[k][a];
-            if (klein_gordon_open[a]) { /* mirrored, as in klein_gordon_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void klein_gordon_prepare_step(const klein_gordon_params *params, double h, double *coef)
 {
@@ -369,7 +335,7 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     const size_t block = rows * (size_t)width;
     double *end = aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) klein_gordon_find_lines(s, r, s->lines + r * klein_gordon_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < klein_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) s->before[k] = aligned + (klein_gordon_ARRAYS + k) * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) klein_gordon_put(s, s->x[k], x0 + k * sites);

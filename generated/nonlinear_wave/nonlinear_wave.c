@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3ca426921abc6897ef951cc367da7e3673698af9614f84bc24bfb3b69c5edab0
+ * body-sha256: 8164c94c01c9541f8ca590fb8196ab35adc968017c68fa54969974bbef943a50
  */
 #include "nonlinear_wave.h"
 
@@ -111,17 +111,6 @@ static inline void nonlinear_wave_ends(double *row, ptrdiff_t length, ptrdiff_t 
         for (ptrdiff_t k = 0; k < nonlinear_wave_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= nonlinear_wave_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void nonlinear_wave_place(const nonlinear_wave_solver *s, size_t index,
-    ptrdiff_t place[nonlinear_wave_AXES])
-{
-    place[nonlinear_wave_AXES - 1] = 0;
-    for (int a = nonlinear_wave_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -314,29 +303,6 @@ static void nonlinear_wave_put(const nonlinear_wave_solver *s, double *rows, con
     }
 }
 
-/* Where a row is, and those beside it. */
-static void nonlinear_wave_find_lines(const nonlinear_wave_solver *s, size_t index,
-    ptrdiff_t at[nonlinear_wave_LINES])
-{
-    ptrdiff_t place[nonlinear_wave_AXES];
-    nonlinear_wave_place(s, index, place);
-    for (int k = 0; k < nonlinear_wave_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < nonlinear_wave_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + nonlinear_wave_lines[k][a];
-            if (nonlinear_wave_open[a]) { /* mirrored, as in nonlinear_wave_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void nonlinear_wave_prepare_step(const nonlinear_wave_params *params, double h, double *coef)
 {
@@ -377,7 +343,7 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     const size_t block = rows * (size_t)width;
     double *end = aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) nonlinear_wave_find_lines(s, r, s->lines + r * nonlinear_wave_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         s->before[k] = aligned + (nonlinear_wave_ARRAYS + k) * block;

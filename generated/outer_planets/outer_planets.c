@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: ccc3db1c79d393ff9d73d90e73ab3ddbba6e4befba72b03c41321bb5c1ed7964
+ * body-sha256: a7e0eb86954bee38310050496df0d5afe97239dfc775e47c3e7b74d5f20ac499
  */
 #include "outer_planets.h"
 
@@ -108,17 +108,6 @@ typedef struct {
 static inline void outer_planets_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     (void)row, (void)length, (void)from, (void)to;
-}
-
-/* The position of a row along all axes but the last. */
-static inline void outer_planets_place(const outer_planets_solver *s, size_t index,
-    ptrdiff_t place[outer_planets_AXES])
-{
-    place[outer_planets_AXES - 1] = 0;
-    for (int a = outer_planets_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -434,29 +423,6 @@ static void outer_planets_put_parameter(const outer_planets_solver *s, double *r
         rows[i] = value;
 }
 
-/* Where a row is, and those beside it. */
-static void outer_planets_find_lines(const outer_planets_solver *s, size_t index,
-    ptrdiff_t at[outer_planets_LINES])
-{
-    ptrdiff_t place[outer_planets_AXES];
-    outer_planets_place(s, index, place);
-    for (int k = 0; k < outer_planets_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < outer_planets_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + outer_planets_lines[k][a];
-            if (outer_planets_open[a]) { /* mirrored, as in outer_planets_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void outer_planets_prepare_step(const outer_planets_params *params, double h, double *coef)
 {
@@ -497,7 +463,7 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     const size_t block = rows * (size_t)width;
     double *end = aligned - outer_planets_LEAD + outer_planets_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) outer_planets_find_lines(s, r, s->lines + r * outer_planets_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         s->before[k] = aligned + (outer_planets_ARRAYS + k) * block;

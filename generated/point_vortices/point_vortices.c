@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 4931d1eec2d42606250560c3a972c92fba1d90d493b73f18803ab68884d086c4
+ * body-sha256: d0568d0dd137af5abf304e3287d23ef69dc17ec697f01c64aa03552426ad50f8
  */
 #include "point_vortices.h"
 
@@ -102,17 +102,6 @@ typedef struct {
 static inline void point_vortices_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
     (void)row, (void)length, (void)from, (void)to;
-}
-
-/* The position of a row along all axes but the last. */
-static inline void point_vortices_place(const point_vortices_solver *s, size_t index,
-    ptrdiff_t place[point_vortices_AXES])
-{
-    place[point_vortices_AXES - 1] = 0;
-    for (int a = point_vortices_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -529,29 +518,6 @@ static void point_vortices_put_parameter(const point_vortices_solver *s, double 
         rows[i] = value;
 }
 
-/* Where a row is, and those beside it. */
-static void point_vortices_find_lines(const point_vortices_solver *s, size_t index,
-    ptrdiff_t at[point_vortices_LINES])
-{
-    ptrdiff_t place[point_vortices_AXES];
-    point_vortices_place(s, index, place);
-    for (int k = 0; k < point_vortices_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < point_vortices_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + point_vortices_lines[k][a];
-            if (point_vortices_open[a]) { /* mirrored, as in point_vortices_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 /* Where y and what guesses need are, in blocks of memory. */
 static void point_vortices_place_middle(point_vortices_solver *s, double *memory, size_t block)
@@ -609,7 +575,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->sums = end;
     end += rows * point_vortices_row_sums(length);
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) point_vortices_find_lines(s, r, s->lines + r * point_vortices_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         s->before[k] = aligned + (point_vortices_ARRAYS + k) * block;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 966eadda4f89e8c05b9834be1b70ea04cbd27424b485b9b0f3dae9eb55c25132
+ * body-sha256: 074e9c3c0723656ffaa959b3913256719305c9b7b26f7a0f7213c969157ded61
  */
 #include "sine_gordon.h"
 
@@ -109,17 +109,6 @@ static inline void sine_gordon_ends(double *row, ptrdiff_t length, ptrdiff_t fro
         for (ptrdiff_t k = 0; k < sine_gordon_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= sine_gordon_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void sine_gordon_place(const sine_gordon_solver *s, size_t index,
-    ptrdiff_t place[sine_gordon_AXES])
-{
-    place[sine_gordon_AXES - 1] = 0;
-    for (int a = sine_gordon_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -343,28 +332,6 @@ static void sine_gordon_put(const sine_gordon_solver *s, double *rows, const dou
     }
 }
 
-/* Where a row is, and those beside it. */
-static void sine_gordon_find_lines(const sine_gordon_solver *s, size_t index, ptrdiff_t at[sine_gordon_LINES])
-{
-    ptrdiff_t place[sine_gordon_AXES];
-    sine_gordon_place(s, index, place);
-    for (int k = 0; k < sine_gordon_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < sine_gordon_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + sine_gordon_lines[k][a];
-            if (sine_gordon_open[a]) { /* mirrored, as in sine_gordon_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void sine_gordon_prepare_step(const sine_gordon_params *params, double h, double *coef)
 {
@@ -404,7 +371,7 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     const size_t block = rows * (size_t)width;
     double *end = aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) sine_gordon_find_lines(s, r, s->lines + r * sine_gordon_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < sine_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) s->before[k] = aligned + (sine_gordon_ARRAYS + k) * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) sine_gordon_put(s, s->x[k], x0 + k * sites);

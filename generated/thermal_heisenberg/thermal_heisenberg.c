@@ -30,7 +30,7 @@
  *   8. Krylov spaces
  *   9. Newton's method where sweeps fail
  *   10. What is seen at sites
- * body-sha256: 46c6bc6dba06dee75d0453a7b03a68496f42727b4fa2179e708b22b8b325124a
+ * body-sha256: 21d2fe8fcfb800f0fbb8af2faea18709f9917430c9faf2730fc00ea9a6672120
  */
 #include "thermal_heisenberg.h"
 
@@ -833,29 +833,6 @@ static void thermal_heisenberg_put_parameter(const thermal_heisenberg_solver *s,
         ++i) rows[i] = value;
 }
 
-/* Where a row is, and those beside it. */
-static void thermal_heisenberg_find_lines(const thermal_heisenberg_solver *s, size_t index,
-    ptrdiff_t at[thermal_heisenberg_LINES])
-{
-    ptrdiff_t place[thermal_heisenberg_AXES];
-    thermal_heisenberg_place(s, index, place);
-    for (int k = 0; k < thermal_heisenberg_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < thermal_heisenberg_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + thermal_heisenberg_lines[k][a];
-            if (thermal_heisenberg_open[a]) { /* mirrored, as in thermal_heisenberg_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 /* Where y and what guesses need are, in blocks of memory. */
 static void thermal_heisenberg_place_middle(thermal_heisenberg_solver *s, double *memory, size_t block)
@@ -912,8 +889,7 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     s->sums = end;
     end += rows * thermal_heisenberg_row_sums(length);
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r)
-        thermal_heisenberg_find_lines(s, r, s->lines + r * thermal_heisenberg_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < thermal_heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
         s->before[k] = aligned + (thermal_heisenberg_ARRAYS + k) * block;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: e0ff99bce4b66f0bb3dc874c55db1307fddd6e784680cd677235fb875a9b8f52
+ * body-sha256: 59e8decf27d864a1355c631fc58292dd6637ea2baa52c9101129a1c628f491d5
  */
 #include "toda.h"
 
@@ -105,16 +105,6 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 0; k < toda_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void toda_place(const toda_solver *s, size_t index, ptrdiff_t place[toda_AXES])
-{
-    place[toda_AXES - 1] = 0;
-    for (int a = toda_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -331,28 +321,6 @@ static void toda_put(const toda_solver *s, double *rows, const double *values)
     }
 }
 
-/* Where a row is, and those beside it. */
-static void toda_find_lines(const toda_solver *s, size_t index, ptrdiff_t at[toda_LINES])
-{
-    ptrdiff_t place[toda_AXES];
-    toda_place(s, index, place);
-    for (int k = 0; k < toda_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < toda_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + toda_lines[k][a];
-            if (toda_open[a]) { /* mirrored, as in toda_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void toda_prepare_step(const toda_params *params, double h, double *coef)
 {
@@ -391,7 +359,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     const size_t block = rows * (size_t)width;
     double *end = aligned - toda_LEAD + toda_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) toda_find_lines(s, r, s->lines + r * toda_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < toda_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < toda_DIM; ++k) s->before[k] = aligned + (toda_ARRAYS + k) * block;
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->x[k], x0 + k * sites);

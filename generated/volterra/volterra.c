@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: abf3da13f46989d3c86d4492a91924e4a2b05035266028b3a2aa412d5ae1b268
+ * body-sha256: 570a69f1a60b3d68b69989ea2bc03374c3704c7c291ed45658dfc2924c8d749a
  */
 #include "volterra.h"
 
@@ -344,28 +344,6 @@ static void volterra_put(const volterra_solver *s, double *rows, const double *v
     }
 }
 
-/* Where a row is, and those beside it. */
-static void volterra_find_lines(const volterra_solver *s, size_t index, ptrdiff_t at[volterra_LINES])
-{
-    ptrdiff_t place[volterra_AXES];
-    volterra_place(s, index, place);
-    for (int k = 0; k < volterra_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < volterra_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + volterra_lines[k][a];
-            if (volterra_open[a]) { /* mirrored, as in volterra_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void volterra_prepare_step(const volterra_params *params, double h, double *coef)
 {
@@ -405,7 +383,7 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     const size_t block = rows * (size_t)width;
     double *end = aligned - volterra_LEAD + volterra_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) volterra_find_lines(s, r, s->lines + r * volterra_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < volterra_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < volterra_DIM; ++k) s->before[k] = aligned + (volterra_ARRAYS + k) * block;
     for (size_t k = 0; k < volterra_DIM; ++k) volterra_put(s, s->x[k], x0 + k * sites);

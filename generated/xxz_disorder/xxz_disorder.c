@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: e805ecc73bfb8dff59d0fad658ff37e27c6e9e5315ada07d62fdd495d8db6398
+ * body-sha256: 64e414797e5ba6caffb9d425e84d9bef2ba0d5f734e7a44558e45d081db9c8c6
  */
 #include "xxz_disorder.h"
 
@@ -112,17 +112,6 @@ static inline void xxz_disorder_ends(double *row, ptrdiff_t length, ptrdiff_t fr
         for (ptrdiff_t k = 0; k < xxz_disorder_HALO; ++k) row[length + k] = row[k];
     if (to == length)
         for (ptrdiff_t k = 1; k <= xxz_disorder_HALO; ++k) row[-k] = row[length - k];
-}
-
-/* The position of a row along all axes but the last. */
-static inline void xxz_disorder_place(const xxz_disorder_solver *s, size_t index,
-    ptrdiff_t place[xxz_disorder_AXES])
-{
-    place[xxz_disorder_AXES - 1] = 0;
-    for (int a = xxz_disorder_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
 }
 
 /* What kernels are told of a row. */
@@ -418,29 +407,6 @@ static void xxz_disorder_put_parameter(const xxz_disorder_solver *s, double *row
         rows[i] = value;
 }
 
-/* Where a row is, and those beside it. */
-static void xxz_disorder_find_lines(const xxz_disorder_solver *s, size_t index,
-    ptrdiff_t at[xxz_disorder_LINES])
-{
-    ptrdiff_t place[xxz_disorder_AXES];
-    xxz_disorder_place(s, index, place);
-    for (int k = 0; k < xxz_disorder_LINES; ++k) {
-        ptrdiff_t line = 0;
-        for (int a = 0; a < xxz_disorder_AXES - 1; ++a) {
-            const ptrdiff_t size = (ptrdiff_t)s->sizes[a];
-            ptrdiff_t p = place[a] + xxz_disorder_lines[k][a];
-            if (xxz_disorder_open[a]) { /* mirrored, as in xxz_disorder_ends */
-                p = p < 0 ? -p : p < size ? p : 2 * (size - 1) - p;
-                p = p < 0 ? 0 : p < size ? p : size - 1;
-            } else {
-                p += (p < 0 ? size : 0) - (p >= size ? size : 0);
-            }
-            line = line * size + p;
-        }
-        at[k] = line * s->width;
-    }
-}
-
 /* ---- The solver ---- */
 static void xxz_disorder_prepare_step(const xxz_disorder_params *params, double h, double *coef)
 {
@@ -480,7 +446,7 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     const size_t block = rows * (size_t)width;
     double *end = aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
-    for (size_t r = 0; r < rows; ++r) xxz_disorder_find_lines(s, r, s->lines + r * xxz_disorder_LINES);
+    s->lines[0] = 0;
     for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) s->before[k] = aligned + (xxz_disorder_ARRAYS + k) * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) xxz_disorder_put(s, s->x[k], x0 + k * sites);

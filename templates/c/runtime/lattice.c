@@ -130,6 +130,7 @@ static void phi_put_parameter(const phi_solver *s, double *rows, const double *v
 }
 
 #endif
+#if !PHI_ONE_ROW
 /* Where a row is, and those beside it. */
 static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
@@ -152,6 +153,7 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
     }
 }
 
+#endif
 /* ---- The solver ---- */
 #if PHI_SERIES
 /* Where y and what guesses need are, in blocks of memory. */
@@ -266,7 +268,11 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     end += rows * phi_row_sums(length);
 #endif
     s->lines = (ptrdiff_t *)(void *)end;
+#if PHI_ONE_ROW
+    s->lines[0] = 0;
+#else
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
+#endif
 #if PHI_BANDED
     s->matrix = (double *)(void *)(s->lines + PHI_LINES);
 #endif

@@ -85,6 +85,7 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 #endif
 }
 
+#if !PHI_ONE_ROW || PHI_OPEN || PHI_COLOURS
 /* The position of a row along all axes but the last. */
 static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[PHI_AXES])
 {
@@ -95,6 +96,7 @@ static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[
     }
 }
 
+#endif
 /* What kernels are told of a row. */
 static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 {
