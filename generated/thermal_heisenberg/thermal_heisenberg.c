@@ -30,7 +30,7 @@
  *   8. Krylov spaces
  *   9. Newton's method where sweeps fail
  *   10. What is seen at sites
- * body-sha256: 21d2fe8fcfb800f0fbb8af2faea18709f9917430c9faf2730fc00ea9a6672120
+ * body-sha256: 4ef45a1285d1786f202b243db8b5de8f706195a3af463f90a29ac25c01a82547
  */
 #include "thermal_heisenberg.h"
 
@@ -1237,6 +1237,11 @@ static thermal_heisenberg_status thermal_heisenberg_newton(thermal_heisenberg_so
 static thermal_heisenberg_status thermal_heisenberg_stages(thermal_heisenberg_solver *s, int far)
 {
     const size_t units = s->rows * thermal_heisenberg_pieces(s);
+    thermal_heisenberg_PARALLEL
+    {
+        size_t first, end = thermal_heisenberg_share(units, &first);
+        thermal_heisenberg_draw_rows(s, s->steps, 0, first, end);
+    }
     const double *coef = s->coef;
     int now = 0;
     thermal_heisenberg_predict(s);
@@ -1261,11 +1266,6 @@ static thermal_heisenberg_status thermal_heisenberg_stages(thermal_heisenberg_so
 /* One step; if it cannot be made, none. */
 static thermal_heisenberg_status thermal_heisenberg_try(thermal_heisenberg_solver *s)
 {
-    thermal_heisenberg_PARALLEL
-    {
-        size_t first, end = thermal_heisenberg_share(s->rows * thermal_heisenberg_pieces(s), &first);
-        thermal_heisenberg_draw_rows(s, s->steps, 0, first, end);
-    }
     thermal_heisenberg_copy(s->before, s->x, s);
     const thermal_heisenberg_status status = thermal_heisenberg_stages(s, 1);
     if (status == thermal_heisenberg_OK) return status;

@@ -22,6 +22,7 @@ from phigen.lattice.observing import BALANCE, CHANGE, errors_of
 from phigen.lattice.states import Start
 from phigen.proofs import statements
 from phigen.runtime.lattice import LatticeSolver
+from phigen.spec.model import Extras
 from phigen.spec.yaml_text import spec_text
 from phigen.study.lattices import verify_lattice
 from phigen.symbolic.arrays import evaluate
@@ -298,3 +299,14 @@ def test_headers_say_what_holds_with_forces_and_noise() -> None:
         assert said in code
     with pytest.raises(SpecError, match="a lattice with noise"):
         emit(compiled("bath").program, "js", "")
+
+
+@pytest.mark.parametrize(("name", "target"), [("bath", "numpy"), ("bath", "c"), ("langevin", "numpy")])
+def test_tangent_vectors_are_carried_along_the_path_of_the_noise(name: str, target: str) -> None:
+    made = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+    found, (x, values) = lattice_solver_of(made, target), given(name)
+    along, asked = np.random.default_rng(0).normal(size=x.shape), {"seed": 4, "parameters": values}
+    after, (carried,) = found.step_tangent(x, 0.05, along[None], **asked)
+    np.testing.assert_allclose(after, found.step(x, 0.05, **asked), rtol=0, atol=1e-14)
+    ahead, behind = (found.step(x + e * along, 0.05, **asked) for e in (1e-5, -1e-5))
+    np.testing.assert_allclose(carried, (ahead - behind) / 2e-5, rtol=0, atol=1e-8)

@@ -167,6 +167,13 @@ static void phi_forget(phi_solver *s)
 static phi_status phi_stages(phi_solver *s, int far)
 {
     const size_t units = s->rows * phi_pieces(s);
+#if PHI_NOISE
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(units, &first);
+        phi_draw_rows(s, s->steps, 0, first, end);
+    }
+#endif
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
 #if PHI_RENEWED
         double *coef = s->coef + stage * PHI_ROW;
@@ -208,13 +215,6 @@ static phi_status phi_stages(phi_solver *s, int far)
 /* One step; if it cannot be made, none. */
 static phi_status phi_try(phi_solver *s)
 {
-#if PHI_NOISE
-    PHI_PARALLEL
-    {
-        size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
-        phi_draw_rows(s, s->steps, 0, first, end);
-    }
-#endif
     phi_copy(s->before, s->x, s);
 #if PHI_NEAR
     if (phi_stages(s, 0) == PHI_OK) return PHI_OK;
