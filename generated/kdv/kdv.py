@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 88e375bdd81fd96e67729537a71a492614406558fe662f35dd842dae4f51c949
+# body-sha256: b002ef47deb45ff603d92bc2e11adf6d720d0f8168c935365854109fc38c1c34
 import numpy as np
 
 VERSION = "0.1.0"
@@ -186,7 +186,8 @@ def _remember(differences, value):
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x."""
+    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x.
+    """
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
         guess = x + sum(differences[:order])

@@ -14,7 +14,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 480ebb7ba9d1e25e99980e0489adb5b048f8b45ac55a46fdc62f28a3a0c43b01
+# body-sha256: 1bf2b45ee242313c5f203f09d2f609aed8777eeb322098f4876c904f9fec4126
 import numpy as np
 
 VERSION = "0.1.0"
@@ -186,7 +186,8 @@ def _remember(differences, value):
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x."""
+    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x.
+    """
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))
         guess = x + sum(differences[:order])

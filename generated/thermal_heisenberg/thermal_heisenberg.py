@@ -18,7 +18,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 1ddae313fd79d1092f20491e0bf42250ff29f340bc7a8f0085467a6d4987621a
+# body-sha256: c9d298975ce6f62989da9fb9b2ebfd53071e646e3a8777b78285e0a2a6920ce9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -239,7 +239,8 @@ def _remember(differences, value):
 
 
 def _advance(sites, rows, x, past):
-    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x."""
+    """One step; raises FailedError. The past has, of each stage, the order of guesses and differences of y - x.
+    """
     sites.dw = _draw(sites, 0)
     for stage, (_, row) in enumerate(SCHEDULE):
         order, differences = past.get(stage, (0, []))

@@ -16,9 +16,10 @@ def test_every_target_has_templates():
 
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=IDS)
-def test_template_is_short(path):
+def test_template_is_a_chapter_at_most(path):
+    """A template is a chapter of the output; what takes more is several, or is no template but code."""
     text = path.read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 60
+    assert len(text.splitlines()) <= 150
 
 
 @pytest.mark.parametrize("path", TEMPLATES, ids=IDS)

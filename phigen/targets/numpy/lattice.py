@@ -60,6 +60,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "split": step.equation is None,
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
+    values["sized"] = bool(program.time or program.noise)
     arguments = {"t0": "0.0"} if program.time else {}
     arguments |= {"seed": "0", "member": "0", "step0": "0"} if program.noise else {}
     values["arguments"] = "".join(f", {name}={value}" for name, value in arguments.items())
