@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: cab7c6915d4c8d185488120f0103004de979728d52f0aaa9cd4cca1572507100
+ * body-sha256: 8ae47026716f8b7506e8a85f77cd541ddd20a4ab7bca6212ada0425a0d96d07d
  */
 #include "ablowitz_ladik.h"
 
@@ -45,13 +45,9 @@ enum { ablowitz_ladik_FLOWS = 25 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { ablowitz_ladik_JOINED = 25 };
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t ablowitz_ladik_least[ablowitz_ladik_AXES] = { 2 };
 static const size_t ablowitz_ladik_periods[ablowitz_ladik_AXES] = { 1 };
-static const int ablowitz_ladik_open[ablowitz_ladik_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int ablowitz_ladik_lines[ablowitz_ladik_LINES][ablowitz_ladik_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 881c7fc3aac6b64dbed57febf0c2ecda13501a8eef8d7bf8543784878741a8c3
+ * body-sha256: 865bba25f95e55aaccfd1529e44aef47d9630248da6f688666c7399d74792132
  */
 #include "chiral_magnet.h"
 
@@ -46,13 +46,9 @@ enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { chiral_magnet_FLOWS = 5 }; /* in a step */
 enum { chiral_magnet_JOINED = 5 }; /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t chiral_magnet_least[chiral_magnet_AXES] = { 1 };
 static const size_t chiral_magnet_periods[chiral_magnet_AXES] = { 1 };
-static const int chiral_magnet_open[chiral_magnet_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int chiral_magnet_lines[chiral_magnet_LINES][chiral_magnet_AXES] = { { 0 } };
 
 /* Whether a part of H is that of the sites of one colour. The flows are those of all parts, of each colour
    where so. */

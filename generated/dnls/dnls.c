@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 8fba4aedd3b926a8929b631847a53551ba1caa7de1a2785f04b04b81779b5ab6
+ * body-sha256: d880a744039187d322cbd34aa3ea574012395d7663d7d39bfb25f982e91c898d
  */
 #include "dnls.h"
 
@@ -44,13 +44,9 @@ enum { dnls_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_FLOWS = 25 };         /* in a step */
 enum { dnls_JOINED = 25 };        /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t dnls_least[dnls_AXES] = { 2 };
 static const size_t dnls_periods[dnls_AXES] = { 1 };
-static const int dnls_open[dnls_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int dnls_lines[dnls_LINES][dnls_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b88bbd864d0ed6c33a700f1c70dc5b40c65c942437be3114b398aab7ff808ce2
+ * body-sha256: 63f11522c3373c56b712a55296f771cebf78d27f40d96394bbdce3761384de43
  */
 #include "dnls_disorder.h"
 
@@ -46,13 +46,9 @@ enum { dnls_disorder_FLOWS = 25 };         /* in a step */
 enum { dnls_disorder_JOINED = 25 };
 enum { dnls_disorder_WEIGHTS = 2 }; /* kinds of terms that open ends take away */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t dnls_disorder_least[dnls_disorder_AXES] = { 2 };
 static const size_t dnls_disorder_periods[dnls_disorder_AXES] = { 1 };
-static const int dnls_disorder_open[dnls_disorder_AXES] = { 1 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int dnls_disorder_lines[dnls_disorder_LINES][dnls_disorder_AXES] = { { 0 } };
 
 /* The terms of H that open ends take away: the least and the largest offsets that they reach along each
    axis. */

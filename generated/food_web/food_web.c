@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 292408397aceeb07f5a2f7df670984b5c776d9c9c6929ee8f8c105ec868534bc
+ * body-sha256: 40c2da49c05e4da0d1a4da13a2abbb406e1377c821034ff35e30a35e1ba39593
  */
 #include "food_web.h"
 
@@ -46,13 +46,9 @@ enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { food_web_FLOWS = 25 }; /* in a step */
 enum { food_web_JOINED = 25 }; /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
 static const size_t food_web_periods[food_web_AXES] = { 1 };
-static const int food_web_open[food_web_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int food_web_lines[food_web_LINES][food_web_AXES] = { { 0 } };
 
 /* Whether a part of H is that of the sites of one colour. The flows are those of all parts, of each colour
    where so. */

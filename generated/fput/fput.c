@@ -22,7 +22,7 @@
  *   5. The flows
  *   6. What is seen at sites
  *   7. Steps by hand
- * body-sha256: baab24dae318b384f6064737ac07b1efddb848f65d121fd0e1d347057d7f21ea
+ * body-sha256: 11e47b1f8a962feab98eb4fc5bb12f7464b7653ceae1b1781528463f0774a8c2
  */
 #include "fput.h"
 
@@ -45,13 +45,9 @@ enum { fput_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { fput_FLOWS = 13 };         /* in a step */
 enum { fput_JOINED = 13 };        /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t fput_least[fput_AXES] = { 2 };
 static const size_t fput_periods[fput_AXES] = { 1 };
-static const int fput_open[fput_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int fput_lines[fput_LINES][fput_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 63897e390631f2882b5014c027539f15a7014c76e099924c71c3b58ecbdd1933
+ * body-sha256: b485ae708a0eaec4c9586a8bafab103192d94ef9d0adf8f5a46e8af5ca8e5e64
  */
 #include "klein_gordon.h"
 
@@ -44,13 +44,9 @@ enum { klein_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { klein_gordon_FLOWS = 13 }; /* in a step */
 enum { klein_gordon_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t klein_gordon_least[klein_gordon_AXES] = { 2 };
 static const size_t klein_gordon_periods[klein_gordon_AXES] = { 1 };
-static const int klein_gordon_open[klein_gordon_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int klein_gordon_lines[klein_gordon_LINES][klein_gordon_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 8164c94c01c9541f8ca590fb8196ab35adc968017c68fa54969974bbef943a50
+ * body-sha256: 909f8d442b566f6fb07f6ff2674d130f249d72d09664b349707073f281087c17
  */
 #include "nonlinear_wave.h"
 
@@ -45,13 +45,9 @@ enum { nonlinear_wave_FLOWS = 13 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { nonlinear_wave_JOINED = 13 };
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t nonlinear_wave_least[nonlinear_wave_AXES] = { 2 };
 static const size_t nonlinear_wave_periods[nonlinear_wave_AXES] = { 1 };
-static const int nonlinear_wave_open[nonlinear_wave_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int nonlinear_wave_lines[nonlinear_wave_LINES][nonlinear_wave_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a7e0eb86954bee38310050496df0d5afe97239dfc775e47c3e7b74d5f20ac499
+ * body-sha256: f53bc1c5aebae5bf41a74e39f91d2be5df0fe31435bacf58e5214080700fd342
  */
 #include "outer_planets.h"
 
@@ -45,13 +45,9 @@ enum { outer_planets_FLOWS = 13 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { outer_planets_JOINED = 13 };
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t outer_planets_least[outer_planets_AXES] = { 1 };
 static const size_t outer_planets_periods[outer_planets_AXES] = { 1 };
-static const int outer_planets_open[outer_planets_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int outer_planets_lines[outer_planets_LINES][outer_planets_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

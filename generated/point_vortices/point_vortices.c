@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: d0568d0dd137af5abf304e3287d23ef69dc17ec697f01c64aa03552426ad50f8
+ * body-sha256: f70c1693c643cb968531e548e2fe7c702c06819c50c91bd0b893fe73c5245799
  */
 #include "point_vortices.h"
 
@@ -46,13 +46,9 @@ enum { point_vortices_ROW = 1 };           /* coefficients of one flow */
 enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
 enum { point_vortices_MOST_SWEEPS = 200 }; /* that a stage may take */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
 static const size_t point_vortices_periods[point_vortices_AXES] = { 1 };
-static const int point_vortices_open[point_vortices_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int point_vortices_lines[point_vortices_LINES][point_vortices_AXES] = { { 0 } };
 
 /* The stages of one step, as fractions of it, each with a row of coefficients. */
 static const double point_vortices_times[point_vortices_ROWS_OF_FLOWS] = { 0.4144907717943757,

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 074e9c3c0723656ffaa959b3913256719305c9b7b26f7a0f7213c969157ded61
+ * body-sha256: b3de7140b631a565f8467e8eef8e245ec1df1834386de14412e4bde6d08cf08c
  */
 #include "sine_gordon.h"
 
@@ -44,13 +44,9 @@ enum { sine_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { sine_gordon_FLOWS = 13 }; /* in a step */
 enum { sine_gordon_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t sine_gordon_least[sine_gordon_AXES] = { 2 };
 static const size_t sine_gordon_periods[sine_gordon_AXES] = { 1 };
-static const int sine_gordon_open[sine_gordon_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int sine_gordon_lines[sine_gordon_LINES][sine_gordon_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -30,7 +30,7 @@
  *   8. Krylov spaces
  *   9. Newton's method where sweeps fail
  *   10. What is seen at sites
- * body-sha256: 4ef45a1285d1786f202b243db8b5de8f706195a3af463f90a29ac25c01a82547
+ * body-sha256: 5ad83064d11f1829967cb35467c84203c33fc366a7fb4fdb7d103938b66012c4
  */
 #include "thermal_heisenberg.h"
 
@@ -59,13 +59,9 @@ enum { thermal_heisenberg_WEIGHTS = 2 }; /* kinds of terms that open ends take a
 /* where normal variates are cut off, so that no rare one makes a step impossible */
 #define thermal_heisenberg_BOUND 6.0
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t thermal_heisenberg_least[thermal_heisenberg_AXES] = { 2 };
 static const size_t thermal_heisenberg_periods[thermal_heisenberg_AXES] = { 1 };
-static const int thermal_heisenberg_open[thermal_heisenberg_AXES] = { 1 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int thermal_heisenberg_lines[thermal_heisenberg_LINES][thermal_heisenberg_AXES] = { { 0 } };
 
 /* The terms of H that open ends take away: the least and the largest offsets that they reach along each
    axis. */

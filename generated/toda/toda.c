@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 59e8decf27d864a1355c631fc58292dd6637ea2baa52c9101129a1c628f491d5
+ * body-sha256: 72a5a3a78a83a6c192687925b3dd0d209f42bb9930a36152c6de33052702b04b
  */
 #include "toda.h"
 
@@ -44,13 +44,9 @@ enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { toda_FLOWS = 13 };         /* in a step */
 enum { toda_JOINED = 13 };        /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t toda_least[toda_AXES] = { 2 };
 static const size_t toda_periods[toda_AXES] = { 1 };
-static const int toda_open[toda_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int toda_lines[toda_LINES][toda_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 570a69f1a60b3d68b69989ea2bc03374c3704c7c291ed45658dfc2924c8d749a
+ * body-sha256: d13ebcfa0c2bbdf22ae6495f4aff0fc5d4cf39848f79d0b3d32a2de89f2726e2
  */
 #include "volterra.h"
 
@@ -46,13 +46,9 @@ enum { volterra_JOINED = 13 }; /* the row of the last flow of a step and the fir
 enum { volterra_COLOUR_COUNT = 2 }; /* colours of sites */
 enum { volterra_COLOUR_STRIDE = 1 }; /* what a step along a row adds to the colour */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t volterra_least[volterra_AXES] = { 2 };
 static const size_t volterra_periods[volterra_AXES] = { 2 };
-static const int volterra_open[volterra_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int volterra_lines[volterra_LINES][volterra_AXES] = { { 0 } };
 
 /* What a step along each axis adds to the colour of a site. */
 static const int volterra_colours[volterra_AXES] = { 1 };

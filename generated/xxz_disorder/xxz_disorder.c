@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 64e414797e5ba6caffb9d425e84d9bef2ba0d5f734e7a44558e45d081db9c8c6
+ * body-sha256: 2391edb6efc4bbb417bdaaf295c811e55cc6dae0ce07db383bfe89048882083b
  */
 #include "xxz_disorder.h"
 
@@ -44,13 +44,9 @@ enum { xxz_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { xxz_disorder_FLOWS = 25 }; /* in a step */
 enum { xxz_disorder_JOINED = 25 }; /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t xxz_disorder_least[xxz_disorder_AXES] = { 2 };
 static const size_t xxz_disorder_periods[xxz_disorder_AXES] = { 1 };
-static const int xxz_disorder_open[xxz_disorder_AXES] = { 0 };
-
-/* The rows that kernels read, by their offsets along all axes but the last. */
-static const int xxz_disorder_lines[xxz_disorder_LINES][xxz_disorder_AXES] = { { 0 } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */
