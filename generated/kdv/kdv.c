@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 8accecc3850307ba19edb7efaf8cd7531bde19a05247756cba9e3d3661ca99a8
+ * body-sha256: 531cf81c9e86b29c5bc36cd24d84c806570efab3a247fc90cd940e81981e8785
  */
 #include "kdv.h"
 
@@ -47,9 +47,10 @@ enum { kdv_MOST_SWEEPS = 200 }; /* that a stage may take */
 enum { kdv_REACH = 2 };         /* sites that y at a site depends on, to each side */
 enum { kdv_BAND = 2 };          /* diagonals beside that of the matrix of Newton's method */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t kdv_least[kdv_AXES] = { 2 };
 static const size_t kdv_periods[kdv_AXES] = { 1 };
+static const int kdv_open[kdv_AXES] = { 0 };
 
 /* The stages of one step, as fractions of it, each with a row of coefficients. */
 static const double kdv_times[kdv_ROWS_OF_FLOWS] = { 1.0 };

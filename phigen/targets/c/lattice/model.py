@@ -115,6 +115,7 @@ def model(program: Program, step: Sweeps) -> str:
         "least": ", ".join(map(str, sites.least)),
         "periods": ", ".join(map(str, sites.periods)),
         "several": len(sites.axes) > 1,
+        "ends": len(sites.axes) > 1 or switches(program, step, layout)["BANDED"],
         "open": ", ".join(str(int(o)) for o in sites.open),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
         "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights),
