@@ -36,7 +36,7 @@ UNFORESEEN = {"henon_heiles", "kowalevski_top", "dzhanibekov"}
 EXERCISE = Path(__file__).with_name("blocks.c")
 
 
-WITHOUT_BLOCKS = ["ablowitz_ladik3", "charged_particle", "pendulum_euler", "toda3_quadratic"]
+WITHOUT_BLOCKS = ["ablowitz_ladik3", "charged_particle", "pendulum_euler", "quaternion_top", "toda3_quadratic"]
 WITH_BLOCKS = [name for name in NAMES if name not in WITHOUT_BLOCKS]
 
 
