@@ -108,7 +108,13 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
     kinds = {"packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
     kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
-    own = {"gauge.c": ["GAUGE"], "level.c": ["GAUGE"], "attitude.c": ["ATTITUDE"], "noise.c": ["NOISE"], "philox.c": ["NOISE"]}
+    own = {
+        "gauge.c": ["GAUGE"],
+        "level.c": ["GAUGE"],
+        "attitude.c": ["ATTITUDE"],
+        "noise.c": ["NOISE"],
+        "philox.c": ["NOISE"],
+    }
     kind = kinds.get(path.name, "NEWTON")
     switches = defined((kind, "FAST", "TANGENT", "ADJOINT", *own.get(path.name, ())))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, path], tmp_path)
