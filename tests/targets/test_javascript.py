@@ -10,7 +10,7 @@ from shutil import copy
 
 import numpy as np
 import pytest
-from support import BODY, COMMAND, NAMES, RATTLEBACK, compile_text, compiled, setting, solver, spec_of, tool
+from support import BODY, COMMAND, NAMES, QUICK, RATTLEBACK, compile_text, compiled, setting, solver, spec_of, tool
 
 import phigen
 from phigen import resources, spec
@@ -187,8 +187,9 @@ def test_a_step_that_leads_elsewhere_is_tried_again(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
+@pytest.mark.parametrize("case", QUICK)
 def test_steps_are_those_of_c_to_roundoff(case, answers):
+    """That C and NumPy agree everywhere is another test."""
     at = setting(compilation_of(case))
     expected = solver(compilation_of(case), "c").integrate(at.x, at.h, STEPS, **at.parameters).x[-1]
     assert apart(answers[case]["x"], expected) < 1e-13
