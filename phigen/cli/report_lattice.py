@@ -32,8 +32,7 @@ def report_lattice(
     from phigen.proofs.examination import refutation
     from phigen.report.lattice import LatticeMaterial, lattice_document
 
-    extras = with_tangent(spec) if lyapunov else None
-    found = examine(spec, order=order, scheme=scheme, extras=extras)
+    found = examine(spec, order=order, scheme=scheme, extras=with_tangent(spec))
     if found.refuted:
         raise CheckError(refutation(found))
     if found.compilation is None:

@@ -67,8 +67,7 @@ def command(
         with collector.collecting():
             if plot:
                 expect_system(spec)
-            extras = with_tangent(spec) if not spec.lattice else None
-            compilation = compile_proved(spec, order=order, scheme=scheme, extras=extras)
+            compilation = compile_proved(spec, order=order, scheme=scheme, extras=with_tangent(spec))
             judged = verified_lattice if spec.lattice else verified
             verification = judged(compilation, name, quick, console)
             found.append(verification)
@@ -145,7 +144,7 @@ def verified(
 def verified_lattice(
     compilation: Compilation, name: str | None, quick: bool, console: Console, targets: Sequence[str] = ()
 ) -> Verification:
-    """The same for a lattice, which has no tangent map."""
+    """The same for a lattice."""
     from phigen.api import chosen_target, lattice_solver_of
     from phigen.cli.experiment import run_of
     from phigen.lattice.states import start_of

@@ -33,8 +33,8 @@ from phigen.symbolic.arrays import Floats, evaluate
 MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 #: The largest error of energy in the last quarter of a run may be this many times that before.
 GROWTH = 4.0
-#: The Poisson identity, by differences of order 6 on a small lattice.
-DIFFERENCES = 1e-9
+#: The Poisson identity on a small lattice, with exact tangent maps; and these against differences of order 6.
+IDENTITY, DIFFERENCES = 1e-12, 1e-9
 #: What errors are relative to.
 SAID = (
     "Errors of energy are relative to the sum of the magnitudes of the energies of the sites, those of sums to that of "
@@ -85,8 +85,9 @@ def verify_lattice(
 ) -> Verification:
     """Measure and judge the solvers of a lattice, by target, on the numbers of a run, which is shortened if it is long.
 
-    ``t0`` is the time of its start, None where there is no time, ``seed`` that of the noise, None where there is none.
-    ``single`` is the same solver in single precision, if there is one: it is measured against the others.
+    The solvers carry tangent vectors. ``t0`` is the time of its start, None where there is no time, ``seed`` that of
+    the noise, None where there is none. ``single`` is the same solver in single precision, if there is one: it is
+    measured against the others.
     Raises `StepError` where a step of the run fails.
     """
     assert compilation.cell is not None
@@ -102,7 +103,7 @@ def verify_lattice(
     checks += _conserved(compilation.cell, made)
     with progress.stage(f"{name}: single steps"):
         checks += [_reversal(subject, made), *_agreement(subject, made)]
-        checks += [] if compilation.cell.forces else [_identity(compilation.cell, subject, made)]
+        checks += _identity(compilation.cell, subject, made)
         checks += _single(compilation.cell, subject, single, made) if single else []
     label = f"{compilation.label}, order {compilation.order.order}"
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, SAID)
@@ -226,8 +227,11 @@ def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, made: LatticeT
 # --- a lattice of a few sites
 
 
-def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Check:
-    """The largest entry of DΦ π DΦᵀ − π∘Φ, by differences of the step."""
+def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
+    """The Poisson identity, with the exact tangent maps of all targets; and that these are derivatives of steps.
+
+    The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, in what is usual of each field.
+    """
     about = subject.solver.interface
     sizes = [
         -(-max(least, 3 if len(about.axes) < 3 else 2) // p) * p
@@ -238,35 +242,65 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Check:
     wanted = int(np.prod(sizes))
     picked = np.random.default_rng(1).choice(sites, wanted, replace=sites < wanted).reshape(sizes)
     x = subject.start.state.reshape(len(cell.fields), -1)[:, picked]
-    parameters = _few(cell, subject.start, picked, whole)
-    # what is usual at each site, and for each field: differences are taken in both units, and with two distances; the
-    # better, the less their own errors say
+    few = _Few(whole, subject, _few(cell, subject.start, picked, whole), x)
     usual = np.abs(made.x).max(axis=0).reshape(len(x), -1)
-    each = np.maximum(usual[:, picked.reshape(-1)], 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1)
-    fields = usual.max(axis=1).repeat(wanted)
-    tried = [(np.where(units > 0, units, 1.0), apart) for units in (each, fields) for apart in (3e-3, 3e-4)]
-    defect = min(_defect(whole, subject, parameters, x, units, apart) for units, apart in tried)
-    where = f"Poisson identity on {'×'.join(map(str, sizes))} sites"
-    return Check(where, defect, f"≤ {DIFFERENCES:.0e}", defect <= DIFFERENCES, f"is off by {defect:.1e}")
+    fields = _units(usual.max(axis=1).repeat(wanted))
+    where = f"on {'×'.join(map(str, sizes))} sites"
+    if not cell.forces:
+        defect = max(few.defect(solver, f * subject.h, fields) for solver in subject.solvers.values() for f in (1, -1))
+        name, limit = f"Poisson identity {where}", f"≤ {IDENTITY:.0e}"
+        yield Check(name, defect, limit, defect <= IDENTITY, f"is off by {defect:.1e}")
+    # differences are taken in what is usual of each field and at each site, and with two distances; the better, the
+    # less their own errors say
+    each = _units(np.maximum(usual[:, picked.reshape(-1)], 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
+    tried = [(units, apart) for units in (fields, each) for apart in (3e-3, 3e-4)]
+    slip = min(max(few.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in tried)
+    name, limit = f"tangent map against differences {where}", f"≤ {DIFFERENCES:.0e}"
+    yield Check(name, slip, limit, slip <= DIFFERENCES, f"is no derivative of the step, {slip:.1e} off")
 
 
-def _defect(
-    whole: Expansion, subject: _Subject, parameters: Mapping[str, Any], x: Floats, units: Floats, apart: float
-) -> float:
-    """The largest entry of DΦ π DΦᵀ − π∘Φ over that of π, where states are in some units."""
+@dataclass(frozen=True)
+class _Few:
+    """A lattice of a few sites, with the state where its steps begin."""
 
-    def step(y: Floats) -> Floats:
-        state = (y * units).reshape(x.shape)
-        given: dict[str, Any] = {"t0": subject.t0, "seed": subject.seed}
-        there = subject.solver.step(state, subject.h, parameters=parameters, **given)
-        return np.asarray(there.reshape(-1) / units)
+    whole: Expansion
+    subject: _Subject
+    parameters: Mapping[str, Any]
+    x: Floats
 
-    def poisson(y: Floats) -> Floats:
-        return np.asarray(_poisson(whole, y * units, parameters) / units / units[:, None])
+    @property
+    def given(self) -> dict[str, Any]:
+        """What steps are asked for with."""
+        return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters}
 
-    y = x.reshape(-1) / units
-    slopes, after = _slopes(step, y, apart), poisson(step(y))
-    return float(np.abs(slopes @ poisson(y) @ slopes.T - after).max() / np.abs(after).max())
+    def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
+        """The state after a step, and its derivative (numbers, numbers)."""
+        count = self.x.size
+        after, columns = solver.step_tangent(self.x, h, np.eye(count).reshape(count, *self.x.shape), **self.given)
+        return after, columns.reshape(count, count).T
+
+    def defect(self, solver: LatticeSolver, h: float, units: Floats) -> float:
+        """DΦ π DΦᵀ − π∘Φ, where states are in some units (numbers,)."""
+        after, slopes = self.tangent(solver, h)
+        slopes = slopes * units / units[:, None]
+        before, image = (_poisson(self.whole, x, self.parameters) / units / units[:, None] for x in (self.x, after))
+        size = float((np.abs(slopes) @ np.abs(before) @ np.abs(slopes).T).max()) or 1.0
+        return float(np.abs(slopes @ before @ slopes.T - image).max()) / size
+
+    def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
+        """How far the derivative is from differences of order 6, relative to its largest entry, in some units."""
+
+        def step(y: Floats) -> Floats:
+            there = solver.step((y * units).reshape(self.x.shape), self.subject.h, **self.given)
+            return np.asarray(there.reshape(-1) / units)
+
+        slopes = self.tangent(solver, self.subject.h)[1] * units / units[:, None]
+        found = _slopes(step, self.x.reshape(-1) / units, apart)
+        return float(np.abs(slopes - found).max() / np.abs(slopes).max())
+
+
+def _units(sizes: Floats) -> Floats:
+    return np.where(sizes > 0, sizes, 1.0)
 
 
 def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Floats:

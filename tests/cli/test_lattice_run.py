@@ -55,7 +55,8 @@ def test_what_a_lattice_promises_is_measured(phigen, chain):
     checks = {check["name"]: check["value"] for check in found["checks"]}
     assert found["passed"]
     assert checks["observed order"] == pytest.approx(4, abs=0.1)
-    assert checks["Poisson identity on 3 sites"] < 1e-11
+    assert checks["Poisson identity on 3 sites"] < 1e-14
+    assert checks["tangent map against differences on 3 sites"] < 1e-10
     assert checks["reversibility"] < 1e-14
 
 
@@ -81,7 +82,7 @@ def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        (lambda x, h: x * (1 + 1e-6 * h), "Poisson identity on 3 sites"),
+        (lambda x, h: x * (1 + 1e-6 * h), "tangent map against differences on 3 sites"),
         (lambda x, h: x + 1e-3 * h**2 * x[::-1], "observed order"),
         (lambda x, h: x + 1e-12, "reversibility"),
     ],

@@ -268,11 +268,13 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
     assert bath is not None
     assert CHANGE in errors_of(bath, solver("langevin").integrate(y, 0.1, 5, parameters=heat))
     start = Start(y.shape[1:], y, heat, np.empty((0, 2), dtype=np.int64))
-    found = verify_lattice(compiled("langevin"), {"numpy": solver("langevin")}, "run", start, 0.05, 20, seed=1)
+    carrying = compile_spec(compiled("langevin").spec, extras=Extras(tangent=True))
+    solvers = {"numpy": lattice_solver_of(carrying, "numpy")}
+    found = verify_lattice(carrying, solvers, "run", start, 0.05, 20, seed=1)
     assert found.failures == []
-    assert {"observed order, without the noise", "energy: largest change", "reversibility"} <= {
-        c.name for c in found.checks
-    }
+    names = {c.name for c in found.checks}
+    assert {"observed order, without the noise", "energy: largest change", "reversibility"} <= names
+    assert any("tangent map against differences" in name for name in names)
     assert not any("Poisson identity" in c.name for c in found.checks)
 
 

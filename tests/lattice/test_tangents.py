@@ -27,8 +27,10 @@ from phigen.api import lattice_solver_of, solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec
 from phigen.errors import StepError
+from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver
 from phigen.spec.model import Extras
+from phigen.study.lattices import verify_lattice
 
 H = 0.2
 
@@ -142,3 +144,71 @@ def test_tangent_vectors_go_with_time_forces_and_noise() -> None:
         after, carried = made.step_tangent(x, h, vectors, **draws)
         np.testing.assert_allclose(after, made.step(x, h, **draws), rtol=0, atol=1e-14)
         np.testing.assert_allclose(carried[0], (ahead - behind) / (2 * e), rtol=0, atol=1e-9)
+
+
+class Midpoint(LatticeSolver):
+    """Steps of the implicit midpoint rule for quadratic fields: they keep lengths of spins, but are no Poisson maps."""
+
+    def step(self, x: Any, h: float, **_: Any) -> np.ndarray:
+        y = x
+        for _ in range(16):
+            y = x + h * self.vector_field((x + y) / 2)
+        return y
+
+    def step_tangent(self, x: Any, h: float, vectors: Any, **_: Any) -> tuple[np.ndarray, np.ndarray]:
+        after, units = self.step(x, h), np.eye(x.size).reshape(-1, *x.shape)
+        middle = (x + after) / 2
+        slopes = [(self.vector_field(middle + e) - self.vector_field(middle - e)).ravel() / 2 for e in units]
+        half, one = h / 2 * np.array(slopes).T, np.eye(x.size)
+        matrix = np.linalg.solve(one - half, one + half)
+        return after, (matrix @ vectors.reshape(len(vectors), -1).T).T.reshape(vectors.shape)
+
+
+class Backwards(LatticeSolver):
+    """The derivative has the sign of the step wrong."""
+
+    def step_tangent(self, x: Any, h: float, vectors: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
+        return self.step(x, h), super().step_tangent(x, -h, vectors, **more)[1]
+
+
+class Rounded(LatticeSolver):
+    """The derivative is off by little more than rounding."""
+
+    def step_tangent(self, *of: Any, **more: Any) -> tuple[np.ndarray, np.ndarray]:
+        after, carried = super().step_tangent(*of, **more)
+        return after, carried * (1 + 2e-12)
+
+
+RING = """phigen: 1
+name: ring
+lattice: {axes: [i], boundary: periodic}
+coordinates: [x, y, z]
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: -(x*x[i+1] + y*y[i+1] + 0.7*z*z[i+1]) - 0.3*z
+casimirs: {C: x**2 + y**2 + z**2}
+order: 2
+"""
+NOISY = "noise: {kicks: {hamiltonian: x, amplitude: 0.3}, turns: {hamiltonian: z, amplitude: 0.2}}\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "text", "short"),
+    [
+        (LatticeSolver, RING, []),
+        (LatticeSolver, RING + NOISY, []),
+        (Midpoint, RING, ["Poisson identity"]),
+        (Backwards, RING, ["Poisson identity", "tangent map"]),
+        (Rounded, RING, ["Poisson identity"]),
+    ],
+)
+def test_verification_tells_poisson_maps_to_roundoff(kind: type[LatticeSolver], text: str, short: list[str]) -> None:
+    made = compile_spec(specs.loads(text), extras=Extras(tangent=True))
+    plain = lattice_solver_of(made, "numpy")
+    x = np.random.default_rng(5).normal(size=(3, 6))
+    begin = Start((6,), x, {}, np.empty((0, 2), dtype=np.int64))
+    seed = 2 if "noise" in text else None
+    solvers = {"numpy": kind(plain.backend, plain.interface)}
+    found = verify_lattice(made, solvers, "run", begin, 0.1, 20, seed=seed)
+    failed = {c.name for c in found.checks if not c.passed}
+    assert [s for s in ("Poisson identity", "tangent map") if any(name.startswith(s) for name in failed)] == short
+    assert any(c.name.startswith("Poisson identity on 3 sites") for c in found.checks)

@@ -21,7 +21,7 @@ from phigen.lattice.observing import BALANCE, errors_of
 from phigen.lattice.states import Start
 from phigen.proofs import statements
 from phigen.runtime.lattice import LatticeSolver
-from phigen.spec.model import Spec
+from phigen.spec.model import Extras, Spec
 from phigen.spec.yaml_text import spec_text
 from phigen.study.lattices import verify_lattice
 from phigen.symbolic.arrays import evaluate
@@ -176,13 +176,14 @@ def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
 
 def test_verification_judges_the_balance_of_energy() -> None:
     x, values = given("pushed")
-    made = compiled("pushed", 4)
+    made = compile_spec(compiled("pushed").spec, order=4, extras=Extras(tangent=True))
     start = Start(x.shape[1:], x, values, np.empty((0, 2), dtype=np.int64))
-    found = verify_lattice(made, {"numpy": solver("pushed", 4)}, "run", start, 0.1, 60, t0=T0)
+    found = verify_lattice(made, {"numpy": lattice_solver_of(made, "numpy")}, "run", start, 0.1, 60, t0=T0)
     rows = {c.name: c for c in found.checks}
     assert found.failures == []
     assert rows["energy balance: largest error"].value < 1e-5
     assert rows["invariant F: largest error"].value < 1e-13
+    assert rows["Poisson identity on 3×3 sites"].value < 1e-14
 
 
 def test_the_time_is_asked_for() -> None:
