@@ -26,6 +26,7 @@ import numpy as np
 
 from phigen.errors import MissingPackageError, StepError
 from phigen.runtime import arguments
+from phigen.runtime.arguments import Beginning
 from phigen.runtime.c_lattice import CLattice, CLatticeSession, Stage
 from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
@@ -111,7 +112,7 @@ class DistributedLattice:
             arguments.count(stride, "stride", 1),
         )
         begin = arguments.start_time(t0, self.solver.interface, more)
-        draws = arguments.draws(self.solver.interface, more, seed=seed, member=member, step0=step0)
+        draws = arguments.draws(self.solver.interface, more, {"seed": seed, "member": member, "step0": step0})
         domain = _Domain(self, whole, x0, h, {**(parameters or {}), **more}, begin, draws)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *whole)
@@ -166,7 +167,7 @@ class _Domain:
         start = self._cut(x0, *around, axis=1)
         checked = lattice.solver.state(start, "x0")
         values = lattice.solver.values(self.values, {}, checked.shape[1:])
-        session = lattice.solver.started(checked, h, values, t0, draws)
+        session = lattice.solver.started(Beginning(checked, h, values, t0, draws))
         assert isinstance(session, CLatticeSession)
         self.session = session
         self.noisy = bool(lattice.solver.interface.noise)

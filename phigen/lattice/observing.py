@@ -10,6 +10,7 @@ import numpy as np
 from phigen.errors import StepError
 from phigen.lattice.balance import Power, integral, shifted, there
 from phigen.lattice.cell import Cell
+from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats, evaluate
@@ -54,7 +55,7 @@ def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
     """The work done until each frame (frames,), along the steps of a run, made once more; and how far it may be off."""
     power, solver, begin = Power(cell), run.solver, float(run.t[0])
-    session, found = solver.started(run.x[0], run.h, run.parameters, begin), []
+    session, found = solver.started(Beginning(run.x[0], run.h, run.parameters, begin)), []
     for step in range(run.steps + 1):
         now = dict.fromkeys(cell.times, begin + step * run.h)
         found.append(power(session.state(), session.vector_field(), {**run.parameters, **now}))

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from reprlib import repr as shortened
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,6 +22,25 @@ _MOST = int(np.iinfo(np.int64).max)
 
 #: The same of what chooses random numbers.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
+
+
+#: Random numbers of which nothing was said.
+NONE_DRAWN: Mapping[str, int | None] = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """A state where a trajectory begins, at its time, and what its steps depend on, all of it checked.
+
+    ``first`` are the numbers of the attitude and position there, if they were given.
+    """
+
+    x: Floats
+    h: float
+    values: Mapping[str, Any]
+    t0: float
+    draws: Draws = FIRST_DRAWS
+    first: Floats | None = None
 
 
 def step_size(h: float) -> float:
@@ -61,11 +82,11 @@ def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -
     return 0.0
 
 
-def draws(
-    interface: Interface, more: dict[str, Any], *, seed: int | None, member: int | None = None, step0: int | None = None
-) -> Draws:
-    """The random numbers of the noise; without noise these names may be those of parameters, which join ``more``."""
-    named = {"seed": seed, "member": member, "step0": step0}
+def draws(interface: Interface, more: dict[str, Any], named: Mapping[str, int | None] = NONE_DRAWN) -> Draws:
+    """The random numbers of the noise, by seed, member and step0.
+
+    Without noise these names may be those of parameters, which join ``more``.
+    """
     given = {name: value for name, value in named.items() if value is not None}
     if interface.noise:
         numbers = {name: count(value, name, 0, _LARGEST[name]) for name, value in given.items()}
@@ -122,14 +143,19 @@ def times(t: ArrayLike | None, interface: Interface, shape: tuple[int, ...], mor
     return found
 
 
-def parameters(interface: Interface, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
-    """The values of all parameters: those ``given`` and ``more``, which exclude each other, and defaults."""
-    known = interface.parameters
+def together(given: Mapping[str, Any] | None, more: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters that were ``given`` in a mapping, and ``more`` that were by keyword; none in both."""
     both = sorted(set(given or {}) & set(more))
     if both:
         raise TypeError(f"parameter {both[0]!r} is given twice")
+    return {**(given or {}), **more}
+
+
+def parameters(interface: Interface, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
+    """The values of all parameters: those ``given`` and ``more``, which exclude each other, and defaults."""
+    known = interface.parameters
     values = {name: float(value) for name, value in known.items()}
-    for name, value in {**(given or {}), **more}.items():
+    for name, value in together(given, more).items():
         if name not in known:
             raise TypeError(_unknown(name, known))
         values[name] = _number(value, f"parameter {name!r}")

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from phigen.errors import ParameterError, StepError
 from phigen.runtime import arguments, lattice_ensemble, lattice_gradients
+from phigen.runtime.arguments import Beginning
 from phigen.runtime.gradients import Pullback
 from phigen.runtime.interface import (
     FIRST_DRAWS,
@@ -220,32 +221,23 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         the end. ``progress`` is called after each frame with the number of steps done. Raises `StepError`, whose
         ``trajectory`` ends with the state before the failing step.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
-        start, h = self.state(x0, "x0"), arguments.step_size(h)
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
         steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
-        values = self.values(parameters, more, start.shape[1:])
         marks = row_steps(steps, stride)
-        frames = Frames(stream_path(output) if output else None, (len(marks), *start.shape))
-        kept_at = Path(checkpoints) if checkpoints else None
-        run = LatticeRun(self, start, h, marks, values, frames, kept_at, begin, draws)
+        frames = Frames(stream_path(output) if output else None, (len(marks), *at.x.shape))
+        run = LatticeRun(self, at, marks, frames, Path(checkpoints) if checkpoints else None)
         try:
             count = run.made(progress)
         except BackendError as error:
             frames.discard()
             run.energy.append(run.session.hamiltonian())
             kept = np.array([*frames.kept(run.count), error.states[-1]])
-            t = np.array([begin + h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
-            found = self._trajectory(t, kept, np.array(run.energy), error.step, h, values)
-            raise self.failure(error, h, found, values) from error
-        found = self._trajectory(
-            np.asarray(begin + h * marks[:count], dtype=np.float64),
-            frames.array,
-            np.array(run.energy),
-            steps,
-            h,
-            values,
-        )
+            t = np.array([at.t0 + at.h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
+            found = self._trajectory(t, kept, np.array(run.energy), error.step, at)
+            raise self.failure(error, at.h, found, at.values) from error
+        t = np.asarray(at.t0 + at.h * marks[:count], dtype=np.float64)
+        found = self._trajectory(t, frames.array, np.array(run.energy), steps, at)
         frames.finish(found)
         return found
 
@@ -261,15 +253,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         **more: Any,
     ) -> Floats:
         """The state one step of size ``h`` after ``x`` (coordinates, *sizes), at ``t0``; raises `StepError`."""
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
-        start, h = self.state(x, "x"), arguments.step_size(h)
-        values = self.values(parameters, more, start.shape[1:])
-        session = self.started(start, h, values, begin, draws)
+        at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
+        session = self.started(at)
         try:
-            session.advance(h, 1)
+            session.advance(at.h, 1)
         except BackendError as error:
-            raise self.failure(error, h, None, values) from error
+            raise self.failure(error, at.h, None, at.values) from error
         return session.state()
 
     def step_tangent(
@@ -312,23 +301,21 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         These have the shape (count, coordinates, *sizes). They go on as they are, unless others are sent in their
         place. Raises what `step_tangent` does.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
-        start, h, steps = self.state(x0, "x0"), arguments.step_size(h), arguments.count(steps, "steps", 0)
-        values = self.values(parameters, more, start.shape[1:])
+        at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "step0": step0})
+        start, steps = at.x, arguments.count(steps, "steps", 0)
         carried = np.array(vectors, dtype=np.float64)
         if carried.ndim != start.ndim + 1 or carried.shape[1:] != start.shape or not np.isfinite(carried).all():
             shape = ", ".join(map(str, start.shape))
             raise ValueError(f"tangent vectors must be finite and have shape (count, {shape}), not {carried.shape}")
-        session = self.started(start, h, values, begin, draws)
+        session = self.started(at)
         for count in np.diff(row_steps(steps, arguments.count(stride, "stride", 1))).tolist():
             try:
-                carried = session.advance_tangent(h, carried, count)
+                carried = session.advance_tangent(at.h, carried, count)
             except MissingExtraError:
                 hint = "compile it with tangent=True, or say tangent: true in the spec"
                 raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
             except BackendError as error:
-                raise self.failure(error, h, None, values) from error
+                raise self.failure(error, at.h, None, at.values) from error
             sent = yield session.state(), carried
             carried = carried if sent is None else sent
 
@@ -355,15 +342,12 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         threads of their own. With noise, each has the random numbers of a member of its own, from ``member`` on. Raises
         `StepError` with the ``members`` that failed and the states as far as each came, NaN in the rows after that.
         """
-        both = sorted(set(parameters or {}) & set(more))
-        if both:
-            raise TypeError(f"parameter {both[0]!r} is given twice")
         begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
         alone: Any = t0 if begin is None else 0.0
         first = arguments.start_time(alone, self.interface, more)
         times = np.asarray(first if begin is None else begin, dtype=np.float64)
-        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
-        given = {**(parameters or {}), **more}
+        draws = arguments.draws(self.interface, more, {"seed": seed, "member": member, "step0": step0})
+        given = arguments.together(parameters, more)
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, given, times, draws)
 
     def pullback(
@@ -385,10 +369,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         `integrate`, with a first axis of rows, and so is the cotangent. All is exact to round-off. Raises `StepError`,
         and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
-        both = sorted(set(parameters or {}) & set(more))
-        if both:
-            raise TypeError(f"parameter {both[0]!r} is given twice")
-        given = {**(parameters or {}), **more}
+        given = arguments.together(parameters, more)
         return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, given)
 
     def session(
@@ -406,11 +387,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
 
         The other arguments are those of `integrate`.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
-        start = self.state(x0, "x0")
-        values = self.values(parameters, more, start.shape[1:])
-        return LiveLattice(self, self.started(start, math.nan, values, begin, draws), values, begin, draws)
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        at = self._beginning(x0, "x0", None, parameters, more, t0, drawn)
+        return LiveLattice(self, self.started(at), at)
 
     # --- what is seen
 
@@ -445,7 +424,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         state = self.state(x, "x")
         found = arguments.times(t, self.interface, (), more)
         values = self.values(parameters, more, state.shape[1:])
-        return self.started(state, 1.0, values, 0.0 if found is None else float(found[0]))
+        return self.started(Beginning(state, 1.0, values, 0.0 if found is None else float(found[0])))
 
     # --- arguments
 
@@ -504,14 +483,29 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             values[name] = array
         return values | bonds
 
-    def started(
-        self, start: Floats, h: float, values: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
-    ) -> LatticeSession:
-        """A session at a state and with values that have been checked."""
+    def _beginning(
+        self,
+        x: ArrayLike,
+        what: str,
+        h: float | None,
+        parameters: Mapping[str, Any] | None,
+        more: dict[str, Any],
+        t0: float | None,
+        drawn: Mapping[str, int | None] = arguments.NONE_DRAWN,
+    ) -> Beginning:
+        """What the user gave for a trajectory, checked; None for a step that he gives later."""
+        begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, drawn)
+        start = self.state(x, what)
+        size = math.nan if h is None else arguments.step_size(h)
+        return Beginning(start, size, self.values(parameters, more, start.shape[1:]), begin, draws)
+
+    def started(self, at: Beginning) -> LatticeSession:
+        """A session at a beginning that has been checked."""
         try:
-            return self.backend.start(start, values, t0, draws)
+            return self.backend.start(at.x, at.values, at.t0, at.draws)
         except BackendError as error:
-            raise self.failure(error, h, None, values) from error
+            raise self.failure(error, at.h, None, at.values) from error
 
     def failure(self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any]) -> StepError:
         name = self.interface.name
@@ -526,10 +520,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
         return StepError(f"{name}: {where}: {error.status}, {advice}", **told)
 
-    def _trajectory(
-        self, t: Floats, x: Floats, energy: Floats, steps: int, h: float, values: Mapping[str, Any]
-    ) -> LatticeTrajectory:
-        return LatticeTrajectory(t, x, energy, steps, h, values, self.coordinates, self.interface.axes, self)
+    def _trajectory(self, t: Floats, x: Floats, energy: Floats, steps: int, at: Beginning) -> LatticeTrajectory:
+        about = self.interface
+        return LatticeTrajectory(t, x, energy, steps, at.h, at.values, self.coordinates, about.axes, self)
 
 
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:

@@ -6,7 +6,7 @@ import hashlib
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,10 @@ import numpy as np
 
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint
-from phigen.runtime.interface import FIRST_DRAWS, Draws, Floats, Progress
+from phigen.runtime.interface import FIRST_DRAWS, Floats, Progress
 
 if TYPE_CHECKING:
+    from phigen.runtime.arguments import Beginning
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 
 #: Where frames can be streamed to.
@@ -28,14 +29,10 @@ class LatticeRun:
     """One call of `LatticeSolver.integrate`: ``count`` frames have been made."""
 
     solver: LatticeSolver
-    start: Floats
-    h: float
+    at: Beginning
     marks: Any
-    values: Mapping[str, Any]
     frames: Frames
     checkpoints: Path | None
-    t0: float = 0.0
-    draws: Draws = FIRST_DRAWS
     energy: list[float] = field(default_factory=list)
     count: int = 0
     session: Any = None
@@ -44,13 +41,13 @@ class LatticeRun:
     def made(self, progress: Progress | None) -> int:
         """All frames that are left."""
         first = self._resumed()
-        self.session = self.solver.started(first, self.h, self.values, self.t0, self.draws)
+        self.session = self.solver.started(replace(self.at, x=first))
         if self.count:
-            self.session.resume(self.h, int(self.marks[self.count - 1]), self.saved)
+            self.session.resume(self.at.h, int(self.marks[self.count - 1]), self.saved)
         else:
             self._store(first)
         for mark in self.marks[self.count :].tolist():
-            self.session.advance(self.h, mark - self.session.steps)
+            self.session.advance(self.at.h, mark - self.session.steps)
             self._store(self.session.state())
             self._save(mark)
             if progress:
@@ -65,13 +62,14 @@ class LatticeRun:
         self.count += 1
 
     def _identity(self) -> dict[str, Any]:
-        arrays = {name: np.asarray(value) for name, value in self.values.items() if np.ndim(value)}
-        numbers = {name: float(value) for name, value in self.values.items() if not np.ndim(value)}
-        hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": self.start}.items()}
+        at = self.at
+        arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
+        numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
+        hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
         marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
-        hashes |= {"t0": self.t0.hex()} if self.t0 else {}
-        hashes |= {"draws": repr(self.draws)} if self.draws != FIRST_DRAWS else {}
-        about = {"solver": self.solver.backend.identity, "h": self.h, "sizes": list(self.start.shape), "steps": marks}
+        hashes |= {"t0": at.t0.hex()} if at.t0 else {}
+        hashes |= {"draws": repr(at.draws)} if at.draws != FIRST_DRAWS else {}
+        about = {"solver": self.solver.backend.identity, "h": at.h, "sizes": list(at.x.shape), "steps": marks}
         return {**about, "parameters": numbers, "arrays": hashes}
 
     def _save(self, mark: int) -> None:
@@ -86,7 +84,7 @@ class LatticeRun:
     def _resumed(self) -> Floats:
         """The state to go on from."""
         if self.checkpoints is None or not self.checkpoints.exists():
-            return self.start
+            return self.at.x
         arrays = checkpoint.load(self.checkpoints, self._identity())
         self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
         self.frames.restore(arrays.get("frames"), self.count)

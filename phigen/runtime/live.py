@@ -11,7 +11,8 @@ from numpy.typing import ArrayLike
 
 from phigen.errors import StepError
 from phigen.runtime import arguments
-from phigen.runtime.interface import BackendError, Clock, Draws, Floats
+from phigen.runtime.arguments import Beginning
+from phigen.runtime.interface import BackendError, Clock, Floats
 from phigen.runtime.session import Session
 from phigen.runtime.trajectory import turned_into
 
@@ -29,7 +30,9 @@ class LiveSession:
     pickled, and go on to the last bit.
     """
 
-    def __init__(self, solver: Solver, session: Session, parameters: Mapping[str, float], t0: float) -> None:
+    def __init__(
+        self, solver: Solver | LatticeSolver, session: Session, parameters: Mapping[str, float], t0: float
+    ) -> None:
         self.solver: Any = solver
         self.parameters = dict(parameters)
         self._session = session
@@ -144,14 +147,9 @@ class LiveLattice(LiveSession):
     `LiveSession`, and a step, a kick or a copy take work in proportion to the sites.
     """
 
-    def __init__(
-        self, solver: LatticeSolver, session: LatticeSession, parameters: Mapping[str, Any], t0: float, draws: Draws
-    ) -> None:
-        self.solver = solver
-        self.parameters = dict(parameters)
-        self._session = cast("Session", session)
-        self._clock, self._draws, self._before = Clock(t0), draws, 0
-        self._put = session.state()
+    def __init__(self, solver: LatticeSolver, session: LatticeSession, at: Beginning) -> None:
+        super().__init__(solver, cast("Session", session), at.values, at.t0)
+        self._draws, self._before = at.draws, 0
 
     @property
     def steps(self) -> int:
@@ -180,7 +178,7 @@ class LiveLattice(LiveSession):
         # counted from where the size of the step was set: with the same times and random numbers
         clock, self._before = self._clock, self._clock.counted
         draws = replace(self._draws, step=self._draws.step + self._before)
-        self._session = self.solver.started(x, clock.h, self.parameters, clock.t, draws)
+        self._session = self.solver.started(Beginning(x, clock.h, self.parameters, clock.t, draws))
         if clock.h:
             self._lattice.resume(clock.h, made - self._before, saved)
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from phigen.runtime.interface import BackendError, Floats
-from phigen.runtime.session import Session
+from phigen.runtime.session import Followed
 
 
 class Retrying:
-    """A course (`phigen.runtime.session.Course`) that makes a failing step in 2, 4, …, 2^``most`` equal parts.
+    """A course (`phigen.runtime.session.Followed`) that makes a failing step in 2, 4, …, 2^``most`` equal parts.
 
     Each part is a step of the method: a Poisson map that stays on the leaf. But the whole is another map than the steps
     that did not fail; ``retried`` are their numbers. ``steps`` counts whole steps.
     """
 
-    def __init__(self, session: Session, most: int) -> None:
+    def __init__(self, session: Followed, most: int) -> None:
         self.session, self.most = session, most
         self.retried: list[int] = []
         self._more = 0  # steps of the session beyond one for each step
@@ -28,11 +28,11 @@ class Retrying:
         return self.session.state()
 
     def time(self) -> float:
-        """See `Session`."""
+        """See `Followed`."""
         return self.session.time()
 
     def element(self) -> Floats:
-        """See `Session`."""
+        """See `Followed`."""
         return self.session.element()
 
     def advance(self, h: float, steps: int) -> None:

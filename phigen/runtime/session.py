@@ -37,15 +37,23 @@ class Course(Protocol):
         ...
 
 
-class Session(Course, Protocol):
-    """A trajectory being computed by a generated solver.
-
-    Steps are those of one integration, to the last bit, however they are split into calls.
-    """
+class Followed(Course, Protocol):
+    """A trajectory of a generated solver, with the time and the attitude that it keeps."""
 
     def time(self) -> float:
         """The physical time since the start, where steps are equal in τ and the solver keeps it; NaN elsewhere."""
         ...
+
+    def element(self) -> Floats:
+        """A copy of the numbers of the attitude, and of the position; none if they are not followed."""
+        ...
+
+
+class Session(Followed, Protocol):
+    """A trajectory being computed by a generated solver.
+
+    Steps are those of one integration, to the last bit, however they are split into calls.
+    """
 
     def advance_along(self, h: float, increments: Floats) -> None:
         """Make a step with each row of increments of the noise (steps, draws), in place of random ones."""
@@ -65,10 +73,6 @@ class Session(Course, Protocol):
 
     def kick(self, change: Floats) -> None:
         """Move the state by ``change`` (DIM,), else as `place`."""
-        ...
-
-    def element(self) -> Floats:
-        """A copy of the numbers of the attitude, and of the position; none if they are not followed."""
         ...
 
     def saved(self) -> bytes:

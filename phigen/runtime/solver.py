@@ -12,24 +12,16 @@ from numpy.typing import ArrayLike
 
 from phigen.errors import ParameterError, StepError
 from phigen.runtime import arguments, gradients
+from phigen.runtime.arguments import Beginning
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import SIGNS, CrossingFinder, Function, Section
 from phigen.runtime.given import Given
 from phigen.runtime.gradients import Jacobian, Pullback
-from phigen.runtime.interface import (
-    FIRST_DRAWS,
-    BackendError,
-    Draws,
-    Floats,
-    Interface,
-    MissingExtraError,
-    Progress,
-    row_steps,
-)
+from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
 from phigen.runtime.named import Named
 from phigen.runtime.retrying import Retrying
-from phigen.runtime.session import Session, rows_along
+from phigen.runtime.session import Followed, Session, rows_along
 from phigen.runtime.timed import along_until, states_at
 from phigen.runtime.trajectory import Trajectory, turned_into
 
@@ -103,61 +95,57 @@ class Solver(Named[Backend, Interface]):
         draws) takes their place. ``progress`` is called now and then with the number of steps done.
         Raises `StepError`, whose ``trajectory`` ends with the state before the failing step.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
-        values = self.values(parameters, more)
-        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        at = self._beginning(x0, "x0", h, parameters, more, t0, drawn, (attitude0, position0))
         stride, retry = arguments.count(stride, "stride", 1), arguments.count(retry, "retry", 0)
-        first = arguments.first(attitude0, position0, self.interface)
         if retry:
             arguments.expect_no_noise("retry", self.interface)
-        session = self._started(start, h, values, begin, first, draws)
+        session = self._started(at)
+        followed: Followed = session
         if increments is not None:
             given = arguments.increments(increments, self.interface)
-            session, steps = Given(session, given), len(given) if steps is None else steps
+            followed, steps = Given(session, given), len(given) if steps is None else steps
             if steps > len(given) or until is not None:
                 raise ValueError(f"increments are those of {len(given)} steps")
-        course = Retrying(session, retry)
+        course = Retrying(followed, retry)
         passed, elements = dict[int, float](), dict[int, Floats]()
 
         def see(row: int) -> None:
             passed[row], elements[row] = course.time(), course.element()
 
         def made(states: Floats, done: int) -> Trajectory:
-            tau: Floats = h * row_steps(done, stride).astype(np.float64)
+            tau: Floats = at.h * row_steps(done, stride).astype(np.float64)
             turned = np.array(list(elements.values()))
             marks = Marks(tau, np.array(list(passed.values())), turned, done, tuple(course.retried))
-            return self._trajectory(states, marks, h, values, begin)
+            return self._trajectory(states, marks, at)
 
         if (steps is None) == (until is None):
             raise TypeError("integrate takes either steps or until")
         if until is not None:
-            return self._until(course, h, arguments.end(until, begin, h), stride, values, begin)
+            return self._until(course, arguments.end(until, at.t0, at.h), stride, at)
         steps = arguments.count(steps if steps is not None else 0, "steps", 0)
         try:
-            states = rows_along(course, h, steps, stride, progress, see)
+            states = rows_along(course, at.h, steps, stride, progress, see)
         except BackendError as error:
-            raise self.failure(error, h, made(error.states, error.step), values) from error
+            raise self.failure(error, at.h, made(error.states, error.step), at.values) from error
         return made(states, steps)
 
-    def _until(
-        self, course: Retrying, h: float, span: float, stride: int, values: dict[str, float], t0: float
-    ) -> Trajectory:
+    def _until(self, course: Retrying, span: float, stride: int, at: Beginning) -> Trajectory:
         """`integrate` for a span of time."""
-        seen: list[tuple[Floats, float, float, Floats, int]] = []
+        seen: list[tuple[Floats, float, float, Floats, int, tuple[int, ...]]] = []
 
-        def see(at: Retrying, tau: float) -> None:
-            seen.append((at.state(), tau, at.time(), at.element(), at.steps))
+        def see(now: Retrying, tau: float) -> None:
+            seen.append((now.state(), tau, now.time(), now.element(), now.steps, tuple(now.retried)))
 
         def made() -> Trajectory:
-            x, tau, passed, turned, steps = zip(*seen, strict=True)
-            marks = Marks(np.array(tau), np.array(passed), np.array(turned), steps[-1])
-            return self._trajectory(np.array(x), marks, h, values, t0)
+            x, tau, passed, turned, steps, retried = zip(*seen, strict=True)
+            marks = Marks(np.array(tau), np.array(passed), np.array(turned), steps[-1], retried[-1])
+            return self._trajectory(np.array(x), marks, at)
 
         try:
-            along_until(course, h, span, stride, see)
+            along_until(course, at.h, span, stride, see)
         except BackendError as error:
-            raise self.failure(error, h, made(), values) from error
+            raise self.failure(error, at.h, made(), at.values) from error
         return made()
 
     def session(
@@ -177,19 +165,17 @@ class Solver(Named[Backend, Interface]):
 
         The other arguments are those of `integrate`.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, member=member, step0=step0)
-        values = self.values(parameters, more)
-        start = arguments.state(x0, "x0", self.interface)
-        first = arguments.first(attitude0, position0, self.interface)
-        return LiveSession(self, self._started(start, math.nan, values, begin, first, draws), values, begin)
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        at = self._beginning(x0, "x0", None, parameters, more, t0, drawn, (attitude0, position0))
+        return LiveSession(self, self._started(at), at.values, at.t0)
 
     def states_at(self, trajectory: Trajectory, times: Floats) -> Floats:
         """The states (times, DIM) of a trajectory of this solver at given times; see `Trajectory.at`."""
         if self.interface.noise:
             return arguments.rows_at(trajectory.t, trajectory.x, times)
         values, h = dict(trajectory.parameters), trajectory.h
-        first = self._started(trajectory.x[0], h, values, float(trajectory.t[0]) if self.interface.time else 0.0)
+        begin = float(trajectory.t[0]) if self.interface.time else 0.0
+        first = self._started(Beginning(trajectory.x[0], h, values, begin))
 
         def place(row: int) -> Session:
             if self.interface.time:
@@ -213,15 +199,12 @@ class Solver(Named[Backend, Interface]):
         **more: float,
     ) -> Floats:
         """The state (DIM,) one step of size ``h`` after ``x`` (DIM,), whose time is ``t0``; raises `StepError`."""
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
-        values = self.values(parameters, more)
-        start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
-        session = self._started(start, h, values, begin, None, draws)
+        at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
+        session = self._started(at)
         try:
-            session.advance(h, 1)
+            session.advance(at.h, 1)
         except BackendError as error:
-            raise self.failure(error, h, None, values) from error
+            raise self.failure(error, at.h, None, at.values) from error
         return session.state()
 
     def step_tangent(
@@ -240,12 +223,9 @@ class Solver(Named[Backend, Interface]):
         The derivative is exact to round-off; a gauge chosen by the solver is held fixed. Raises `StepError`, and
         `TypeError` if the solver was compiled without ``tangent=True``.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
-        values = self.values(parameters, more)
-        start, h = arguments.state(x, "x", self.interface), arguments.step_size(h)
-        session = self._started(start, h, values, begin, None, draws)
-        tangent = self._with_tangent(session, h, values)
+        at = self._beginning(x, "x", h, parameters, more, t0, {"seed": seed, "step0": step0})
+        session = self._started(at)
+        tangent = self._with_tangent(session, at)
         return session.state(), tangent
 
     def tangents(
@@ -264,14 +244,11 @@ class Solver(Named[Backend, Interface]):
 
         The steps are those of `integrate`. Raises what `step_tangent` does.
         """
-        begin = arguments.start_time(t0, self.interface, more)
-        draws = arguments.draws(self.interface, more, seed=seed, step0=step0)
-        values = self.values(parameters, more)
-        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "step0": step0})
         steps = arguments.count(steps, "steps", 0)
-        session = self._started(start, h, values, begin, None, draws)
+        session = self._started(at)
         for _ in range(steps):
-            tangent = self._with_tangent(session, h, values)
+            tangent = self._with_tangent(session, at)
             yield session.state(), tangent
 
     def section(
@@ -295,22 +272,20 @@ class Solver(Named[Backend, Interface]):
         ``trajectory`` is the `Section` so far.
         """
         arguments.expect_no_noise("section", self.interface)
-        begin = arguments.start_time(t0, self.interface, more)
-        values = self.values(parameters, more)
-        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        at = self._beginning(x0, "x0", h, parameters, more, t0)
         steps = arguments.count(steps, "steps", 0)
         found: list[tuple[float, Floats]] = []
         if direction not in SIGNS:
             raise ValueError(f"direction must be {', '.join(SIGNS)}, not {direction!r}")
-        finder = CrossingFinder[Session](g, h, begin, timed=bool(self.interface.time), direction=direction)
+        finder = CrossingFinder[Session](g, at.h, at.t0, timed=bool(self.interface.time), direction=direction)
+        session = self._started(at)
         try:
-            session = self.backend.start(start, values, begin)
-            for _, crossings in finder.follow(session, steps, lambda: session.advance(h, 1)):
+            for _, crossings in finder.follow(session, steps, lambda: session.advance(at.h, 1)):
                 found += crossings
                 if progress:
                     progress(session.steps)
         except BackendError as error:
-            raise self.failure(error, h, self._section(found), values) from error
+            raise self.failure(error, at.h, self._section(found), at.values) from error
         return self._section(found)
 
     def ensemble(
@@ -339,7 +314,7 @@ class Solver(Named[Backend, Interface]):
         far as each came, with NaN in the rows after that.
         """
         own: dict[str, Any] = dict(more)
-        draws = arguments.draws(self.interface, own, seed=seed, member=member, step0=step0)
+        draws = arguments.draws(self.interface, own, {"seed": seed, "member": member, "step0": step0})
         asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
         try:
@@ -371,11 +346,8 @@ class Solver(Named[Backend, Interface]):
         monitor is not; times and attitudes have no part.
         Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
-        both = sorted(set(parameters or {}) & set(more))
-        if both:
-            raise TypeError(f"parameter {both[0]!r} is given twice")
+        given = arguments.together(parameters, more)
         threads = threads if threads is None else arguments.count(threads, "threads", 1)
-        given = {**(parameters or {}), **more}
         return gradients.pullback(self, x0, h, steps, cotangent, stride, t0, threads, given)
 
     def jacobian(
@@ -462,9 +434,9 @@ class Solver(Named[Backend, Interface]):
         """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
         return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
 
-    def _trajectory(self, x: Floats, marks: Marks, h: float, parameters: dict[str, float], t0: float) -> Trajectory:
-        casimirs = self.backend.casimirs(x, parameters)
-        t = marks.passed if self.interface.monitored else t0 + marks.tau
+    def _trajectory(self, x: Floats, marks: Marks, at: Beginning) -> Trajectory:
+        casimirs = self.backend.casimirs(x, at.values)
+        t = marks.passed if self.interface.monitored else at.t0 + marks.tau
         attitude, position = turned_into(self.interface, marks.turned)
         return Trajectory(
             tau=marks.tau if self.interface.monitored else t,
@@ -472,38 +444,49 @@ class Solver(Named[Backend, Interface]):
             solver=self,
             t=t,
             x=x,
-            energy=self.energies(x, t, parameters),
+            energy=self.energies(x, t, at.values),
             casimirs={name: casimirs[:, i] for i, name in enumerate(self.interface.casimirs)},
             steps=marks.steps,
-            h=h,
-            parameters=parameters,
+            h=at.h,
+            parameters=at.values,
             coordinates=self.interface.coordinates,
             attitude=attitude,
             position=position,
         )
 
-    def _started(
+    def _beginning(
         self,
-        start: Floats,
-        h: float,
-        values: Mapping[str, float],
-        t0: float,
-        first: Floats | None = None,
-        draws: Draws = FIRST_DRAWS,
-    ) -> Session:
-        try:
-            return self.backend.start(start, values, t0, first, draws)
-        except BackendError as error:
-            raise self.failure(error, h, None, values) from error
+        x: ArrayLike,
+        what: str,
+        h: float | None,
+        parameters: Mapping[str, float] | None,
+        more: dict[str, float],
+        t0: float | None,
+        drawn: Mapping[str, int | None] = arguments.NONE_DRAWN,
+        first: tuple[ArrayLike | None, ArrayLike | None] = (None, None),
+    ) -> Beginning:
+        """What the user gave for a trajectory, checked; None for a step that he gives later."""
+        begin = arguments.start_time(t0, self.interface, more)
+        draws = arguments.draws(self.interface, more, drawn)
+        values = self.values(parameters, more)
+        start = arguments.state(x, what, self.interface)
+        size = math.nan if h is None else arguments.step_size(h)
+        return Beginning(start, size, values, begin, draws, arguments.first(*first, self.interface))
 
-    def _with_tangent(self, session: Session, h: float, values: Mapping[str, float]) -> Floats:
+    def _started(self, at: Beginning) -> Session:
         try:
-            return session.advance_tangent(h)
+            return self.backend.start(at.x, at.values, at.t0, at.first, at.draws)
+        except BackendError as error:
+            raise self.failure(error, at.h, None, at.values) from error
+
+    def _with_tangent(self, session: Session, at: Beginning) -> Floats:
+        try:
+            return session.advance_tangent(at.h)
         except MissingExtraError:
             hint = "compile it with tangent=True, or say tangent: true in the spec"
             raise TypeError(f"{self.interface.name} was compiled without step_tangent; {hint}") from None
         except BackendError as error:
-            raise self.failure(error, h, None, values) from error
+            raise self.failure(error, at.h, None, at.values) from error
 
     def _section(self, found: Sequence[tuple[float, Floats]]) -> Section:
         t, x = np.array([t for t, _ in found]), np.array([x for _, x in found])

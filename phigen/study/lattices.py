@@ -208,12 +208,8 @@ def _agreement(subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
 
 def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, made: LatticeTrajectory) -> Iterator[Check]:
     """What single precision makes of a step, and of the Casimirs along a run."""
-    found = replace(subject, solvers={"c": solver})
-    worst = 0.0
-    for x in (made.x[0], made.x[-1]):
-        kept = x.astype(np.float32).astype(np.float64)
-        image = subject.stepped(kept, subject.h)
-        worst = max(worst, float(np.abs(found.stepped(kept, subject.h) - image).max()) / _size(image))
+    single = replace(subject, solvers={"c": solver})
+    worst = single_precision.farthest(single.stepped, subject.stepped, [made.x[0], made.x[-1]], subject.h)
     limit = single_precision.ONE_STEP
     name, reason = "single precision: a step, beside double", f"{worst:.1e} is no rounding"
     yield Check(name, worst, f"≤ {limit:.0e}", worst <= limit, reason)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -19,6 +19,8 @@ ONE_STEP = 2.0**-19
 
 #: Name, value, and the largest value allowed.
 Measured = tuple[str, float, float]
+#: A step of size h from a state.
+Step = Callable[[Floats, float], Floats]
 
 
 def measured(
@@ -33,7 +35,8 @@ def measured(
     t0: float,
 ) -> Iterator[Measured]:
     """How far single steps are from those in double precision, and how Casimirs change along a run."""
-    yield "single precision: a step, beside double", farthest(single, double, states, h), ONE_STEP
+    apart = farthest(single.step, double.step, states, h)
+    yield "single precision: a step, beside double", apart, ONE_STEP
     rows, times = single.rows(start, h, steps, 1), t0 + h * np.arange(steps + 1.0)
     columns = dict(zip(system.coordinates, rows.T, strict=True))
     found = summarise(single.name, system, None, parameters, times, rows)
@@ -44,11 +47,11 @@ def measured(
             yield f"single precision: Casimir {name}", drift.error, COARSER * rounding(steps) * terms / drift.unit.size
 
 
-def farthest(single: Method, double: Method, states: Sequence[Floats], h: float) -> float:
+def farthest(single: Step, double: Step, states: Sequence[Floats], h: float) -> float:
     """The largest difference of single steps from the same states, which single precision has, in sizes of these."""
     worst = 0.0
     for x in states:
         kept = x.astype(np.float32).astype(np.float64)
-        image = double.step(kept, h)
-        worst = max(worst, float(np.max(np.abs(single.step(kept, h) - image)) / np.max(np.abs(image))))
+        image = double(kept, h)
+        worst = max(worst, float(np.max(np.abs(single(kept, h) - image)) / np.max(np.abs(image))))
     return worst

@@ -20,6 +20,7 @@ from phigen.lattice.expansion import expand
 from phigen.lattice.observing import BALANCE, errors_of
 from phigen.lattice.states import Start
 from phigen.proofs import statements
+from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.spec.model import Extras, Spec
 from phigen.spec.yaml_text import spec_text
@@ -136,7 +137,7 @@ def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tm
 def test_sweeps_by_hand_know_the_time() -> None:
     x, values = given("driven")
     found = solver("driven", 4, "c")
-    session = found.started(x, 0.05, values, T0)
+    session = found.started(Beginning(x, 0.05, values, T0))
     session.begin(0.05)
     for step in range(2):
         session.passed(0.05, step)

@@ -207,6 +207,7 @@ def test_a_step_that_fails_is_made_in_parts_only_where_that_is_asked(kepler):
     found = made.integrate(START, 3.5, 6, retry=6)
     assert found.retried
     assert found.steps == 6
+    assert made.integrate(START, 3.5, until=found.t[-1], retry=6).retried[: len(found.retried)] == found.retried
     assert np.ptp(found.x[:, 0] * found.x[:, 3] - found.x[:, 1] * found.x[:, 2]) < 1e-13
     assert made.integrate(START, STEP, 10, retry=3).retried == ()
 
