@@ -7,6 +7,7 @@ import pytest
 from lattice.test_sweeps import compiled, disorder, solver, start
 
 from phigen.compiler import compile_spec, emit
+from phigen.runtime.arguments import Beginning
 from phigen.spec.model import Extras
 
 #: Chains with open and periodic ends, with colours and with functions; planes, with both kinds of ends, and a box.
@@ -18,7 +19,7 @@ def by_hand(name: str, x: np.ndarray, h: float, steps: int, seed: int) -> np.nda
     """Steps stage by stage, each in pieces that are cut at random and made in any order."""
     found = solver(name, 4, "c")
     stages = found.backend.stages()
-    session = found.started(x, h, found.values(disorder(name, x), {}, x.shape[1:]))
+    session = found.started(Beginning(x, h, found.values(disorder(name, x), {}, x.shape[1:])))
     session.begin(h)
     random = np.random.default_rng(seed)
     flows = [0, *range(1, len(stages) - 2)]
@@ -54,7 +55,7 @@ def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
     for number, stage in enumerate(found.backend.stages()):
         seen = []
         for wrong in (False, True):
-            session = found.started(x, 0.03, found.values(disorder(name, x), {}, x.shape[1:]))
+            session = found.started(Beginning(x, 0.03, found.values(disorder(name, x), {}, x.shape[1:])))
             session.begin(0.03)
             for field in range(len(x) if wrong else 0):
                 beside = stage.read >> field & 1
@@ -74,7 +75,7 @@ def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
 def test_planes_and_stages_that_there_are_not_are_refused() -> None:
     x = start("sheet", (9, 5))
     found = solver("sheet", 4, "c")
-    session = found.started(x, 0.1, found.values(disorder("sheet", x), {}, x.shape[1:]))
+    session = found.started(Beginning(x, 0.1, found.values(disorder("sheet", x), {}, x.shape[1:])))
     with pytest.raises(ValueError, match="BAD_ARGUMENT"):
         session.sweep(0, 1, 0, 9)  # before the step size is known
     session.begin(0.1)
