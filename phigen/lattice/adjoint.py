@@ -34,13 +34,13 @@ def transposed(
 
 
 def _back(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    full = replace(kernel, inputs={**kernel.inputs, TABLE: coefficients.slots})
+    full = replace(kernel, inputs={**kernel.inputs, TABLE: coefficients.table})
     (output,) = kernel.outputs
     along = {array: kernel.inputs[array] for array in _READ if kernel.inputs.get(array)}
     return pulled_back(
         full,
         kernel.name + BACK,
         {f"{output.name}_bar": output.values},
-        {**along, TABLE: coefficients.slots},
+        {**along, TABLE: coefficients.table},
         "cotangents of all that is read, from those of what is found",
     )

@@ -16,7 +16,20 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.path import PathSlopes, path_of, used_by_path
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import Adjoint, PathAdjoint
-from phigen.symbolic.expression import Expression, gradient, neg, symbol, total
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    call,
+    fold,
+    gradient,
+    neg,
+    rebuild,
+    symbol,
+    symbols_of,
+    topological,
+    total,
+)
 from phigen.symbolic.symbols import LEVEL, Symbol, cotangent, momentum
 
 
@@ -34,10 +47,23 @@ def pulled_back(
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
     )
-    slopes = iter(gradient(value, [s for symbols in along.values() for s in symbols]))
+    found = gradient(value, [s for symbols in along.values() for s in symbols])
+    slopes = iter(_without_cosines(found, [e for values in seeds.values() for e in values]))
     outputs = tuple(Output(f"{array}_bar", tuple(next(slopes) for _ in symbols)) for array, symbols in along.items())
     inputs = {**kernel.inputs, **{seed: tuple(Symbol(seed, i) for i in range(len(v))) for seed, v in seeds.items()}}
     return Kernel(name, purpose, inputs, outputs)
+
+
+def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression]) -> list[Expression]:
+    """The same with 1 - versin(a) for cos(a) where the values have computed versin(a)."""
+    known = {e.args[0] for e in topological(values) if e.op == "versin"}
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op == "cos" and e.args[0] in known:
+            return ONE - call("versin", *args)
+        return rebuild(e, args)
+
+    return fold(slopes, visit) if known else list(slopes)
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
@@ -90,7 +116,25 @@ def completed(
         {TABLE: coefficients.slots},
         "cotangents of the coefficients that do not depend on the time, from those of the others",
     )
-    return Adjoint(tuple(steps), early, late, path)
+    idle = _idle(coefficients, held)
+    return Adjoint(tuple(_without(kernel, idle) for kernel in steps), early, late, path)
+
+
+def _idle(coefficients: Coefficients, held: Mapping[str, Sequence[str]]) -> list[bool]:
+    """Of each coefficient whether it depends on nothing that is differentiated."""
+    names = {s for symbols in held.values() for s in symbols}
+    return [names.isdisjoint(symbols_of(e)) for e in coefficients.written_out(coefficients.everything)]
+
+
+def _without(kernel: Kernel, idle: Sequence[bool]) -> Kernel:
+    """The kernel, which does not compute cotangents of coefficients that nobody asks for."""
+    outputs = [
+        replace(o, values=tuple(ZERO if unused else e for e, unused in zip(o.values, idle, strict=True)))
+        if o.name == f"{TABLE}_bar"
+        else o
+        for o in kernel.outputs
+    ]
+    return replace(kernel, outputs=tuple(outputs))
 
 
 def level_adjoint(system: System) -> Kernel:

@@ -49,6 +49,11 @@ class Coefficients:
         """The symbols of all coefficients so far, those that are renewed in each step last."""
         return (*self.slots, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
 
+    @property
+    def everything(self) -> list[Expression]:
+        """What the symbols of the table stand for."""
+        return [*self.values, *self.renewed]
+
     def empty(self) -> Coefficients:
         """A table with the same symbols and no values."""
         return Coefficients(self._static, self._inputs)

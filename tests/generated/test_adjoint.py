@@ -17,6 +17,8 @@ from phigen.runtime.gradients import segments
 from phigen.scheme.lowering import cost
 from phigen.scheme.steps import Explicit, Newton, Path, Splitting
 from phigen.spec.model import Extras
+from phigen.splitting.ring import TIME
+from phigen.symbolic.expression import symbols_of, topological
 
 TOP = """coordinates: [x1, x2, x3]
 parameters: {I1: 1, I2: 2, I3: 3, c: 1.1}
@@ -305,6 +307,19 @@ def test_adjoint_is_refused_where_it_is_not_offered():
         compile("fput", target="c", adjoint=True)
     plain = compile_spec(compilation("newton").spec)
     assert all("adjoint" not in text for target in TARGETS for text in files(plain, target).values())
+
+
+def test_transposes_of_flows_compute_nothing_that_is_known_or_unused():
+    """Of rotations they take the cosine from 1 - cos; a time that no parameter changes gets no cotangent."""
+    head = "phigen: 1\nname: t\nscheme: splitting\nadjoint: true\n"
+    turned = compile_spec(spec.loads(head + TOP)).program.step.adjoint.steps
+    used = [{e.op for e in topological(kernel.roots)} for kernel in turned]
+    assert all({"sin", "versin"} <= ops and "cos" not in ops for ops in used)
+    step = compile_spec(spec.loads(head + SWING.replace("(2*m)", "2"))).program.step
+    alone = [set(symbols_of(e)) == {TIME} for e in step.prepare.outputs[0].values]
+    assert any(alone)
+    found = [[kernel.outputs[1].values[c].is_zero for kernel in step.adjoint.steps] for c in range(len(alone))]
+    assert [all(unused) for unused in found] == alone
 
 
 def test_steps_that_forget_what_was_before_are_pulled_back_too():
