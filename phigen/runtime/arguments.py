@@ -38,7 +38,7 @@ class Beginning:
     x: Floats
     h: float
     values: Mapping[str, Any]
-    t0: float
+    t0: float = 0.0
     draws: Draws = FIRST_DRAWS
     first: Floats | None = None
 
