@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 8ae47026716f8b7506e8a85f77cd541ddd20a4ab7bca6212ada0425a0d96d07d
+ * body-sha256: 20d4fd78654581213b175ab884ed726633c9d3f8b014239f4eb31b192696b73a
  */
 #include "ablowitz_ladik.h"
 
@@ -121,7 +121,7 @@ static inline void ablowitz_ladik_locate(const ablowitz_ladik_solver *s, size_t 
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { ablowitz_ladik_PIECE = 2048 };
+enum { ablowitz_ladik_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t ablowitz_ladik_pieces(const ablowitz_ladik_solver *s)
@@ -341,7 +341,34 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_params *params,
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define ablowitz_ladik_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define ablowitz_ladik_THREADS (size_t)omp_get_num_threads()
+#define ablowitz_ladik_THREAD (size_t)omp_get_thread_num()
+#else
+#define ablowitz_ladik_PARALLEL
+#define ablowitz_ladik_THREADS (size_t)1
+#define ablowitz_ladik_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t ablowitz_ladik_share(size_t units, size_t *first)
+{
+    const size_t threads = ablowitz_ladik_THREADS, own = ablowitz_ladik_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void ablowitz_ladik_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (ablowitz_ladik_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     ablowitz_ladik_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -400,9 +427,9 @@ static void ablowitz_ladik_prepare_step(const ablowitz_ladik_params *params, dou
 
 static int ablowitz_ladik_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowitz_ladik_params *params,
@@ -472,49 +499,52 @@ static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *co
 /* One part of H. */
 static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * ablowitz_ladik_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = ablowitz_ladik_share(s->rows * ablowitz_ladik_pieces(s), &first);
     ablowitz_ladik_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    ablowitz_ladik_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void ablowitz_ladik_flow(const ablowitz_ladik_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} ablowitz_ladik_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void ablowitz_ladik_find_flow(const ablowitz_ladik_solver *s, size_t steps, int number,
+    ablowitz_ladik_flow *flow)
 {
-    const int joined = flow == ablowitz_ladik_FLOWS, row = joined ? ablowitz_ladik_JOINED
-        : ablowitz_ladik_flow_rows[flow];
-    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : flow],
-        s->coef + row * ablowitz_ladik_ROW, s->far > 0);
+    const int joined = number == ablowitz_ladik_FLOWS, row = joined ? ablowitz_ladik_JOINED
+        : ablowitz_ladik_flow_rows[number];
+    flow->part = ablowitz_ladik_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * ablowitz_ladik_ROW;
+}
+
+static void ablowitz_ladik_make_flow(const ablowitz_ladik_solver *s, size_t steps, int number)
+{
+    ablowitz_ladik_flow flow;
+    ablowitz_ladik_find_flow(s, steps, number, &flow);
+    ablowitz_ladik_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, int steps)
+static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    ablowitz_ladik_PARALLEL
     {
-        if (steps == 0) ablowitz_ladik_flow(s, ablowitz_ladik_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            ablowitz_ladik_flow(s, ablowitz_ladik_FLOWS > 1 && (step > 0 || s->open) ? ablowitz_ladik_FLOWS
-                : 0);
-            for (int flow = 1; flow < ablowitz_ladik_FLOWS - 1; ++flow) ablowitz_ladik_flow(s, flow);
+        if (steps == 0) ablowitz_ladik_make_flow(s, s->steps - 1, ablowitz_ladik_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            ablowitz_ladik_make_flow(s, step, ablowitz_ladik_FLOWS > 1 && (step > s->steps || s->open)
+                ? ablowitz_ladik_FLOWS : 0);
+            for (int flow = 1; flow < ablowitz_ladik_FLOWS - 1; ++flow)
+                ablowitz_ladik_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int ablowitz_ladik_try(ablowitz_ladik_solver *s, int steps)
+static int ablowitz_ladik_try(ablowitz_ladik_solver *s, size_t steps)
 {
     ablowitz_ladik_steps(s, steps);
     if (ablowitz_ladik_all_hold(s, s->x)) return 1;
@@ -530,7 +560,7 @@ ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double 
     const size_t end = s->steps + steps;
     for (size_t stretch = ablowitz_ladik_STRETCH; s->steps < end && status == ablowitz_ladik_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (ablowitz_ladik_try(s, (int)now)) {
+        if (ablowitz_ladik_try(s, now)) {
             ablowitz_ladik_copy(s->before, s->x, s);
             s->steps += now;
             s->open = ablowitz_ladik_FLOWS > 1;

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 865bba25f95e55aaccfd1529e44aef47d9630248da6f688666c7399d74792132
+ * body-sha256: 46ab3ecadbd440bb541b181a929b96595fa254f2a65d87c90fb601a1ed4cc5b3
  */
 #include "chiral_magnet.h"
 
@@ -794,7 +794,34 @@ static void chiral_magnet_put_at_bond(const chiral_magnet_solver *s, double *at,
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define chiral_magnet_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define chiral_magnet_THREADS (size_t)omp_get_num_threads()
+#define chiral_magnet_THREAD (size_t)omp_get_thread_num()
+#else
+#define chiral_magnet_PARALLEL
+#define chiral_magnet_THREADS (size_t)1
+#define chiral_magnet_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t chiral_magnet_share(size_t units, size_t *first)
+{
+    const size_t threads = chiral_magnet_THREADS, own = chiral_magnet_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void chiral_magnet_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (chiral_magnet_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     chiral_magnet_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -855,9 +882,9 @@ static void chiral_magnet_prepare_step(const chiral_magnet_params *params, doubl
 
 static int chiral_magnet_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_magnet_params *params,
@@ -934,20 +961,9 @@ static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *cons
 /* One part of H, of one colour. */
 static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * chiral_magnet_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = chiral_magnet_share(s->rows * chiral_magnet_pieces(s), &first);
     chiral_magnet_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    chiral_magnet_wait();
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
@@ -961,32 +977,46 @@ static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, co
         for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_colour(s, flow, coef, far);
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void chiral_magnet_flow(const chiral_magnet_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} chiral_magnet_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void chiral_magnet_find_flow(const chiral_magnet_solver *s, size_t steps, int number,
+    chiral_magnet_flow *flow)
 {
-    const int joined = flow == chiral_magnet_FLOWS, row = joined ? chiral_magnet_JOINED
-        : chiral_magnet_flow_rows[flow];
-    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : flow],
-        s->coef + row * chiral_magnet_ROW, s->far > 0);
+    const int joined = number == chiral_magnet_FLOWS, row = joined ? chiral_magnet_JOINED
+        : chiral_magnet_flow_rows[number];
+    flow->part = chiral_magnet_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * chiral_magnet_ROW;
+}
+
+static void chiral_magnet_make_flow(const chiral_magnet_solver *s, size_t steps, int number)
+{
+    chiral_magnet_flow flow;
+    chiral_magnet_find_flow(s, steps, number, &flow);
+    chiral_magnet_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void chiral_magnet_steps(const chiral_magnet_solver *s, int steps)
+static void chiral_magnet_steps(const chiral_magnet_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    chiral_magnet_PARALLEL
     {
-        if (steps == 0) chiral_magnet_flow(s, chiral_magnet_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            chiral_magnet_flow(s, chiral_magnet_FLOWS > 1 && (step > 0 || s->open) ? chiral_magnet_FLOWS : 0);
-            for (int flow = 1; flow < chiral_magnet_FLOWS - 1; ++flow) chiral_magnet_flow(s, flow);
+        if (steps == 0) chiral_magnet_make_flow(s, s->steps - 1, chiral_magnet_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            chiral_magnet_make_flow(s, step, chiral_magnet_FLOWS > 1 && (step > s->steps || s->open)
+                ? chiral_magnet_FLOWS : 0);
+            for (int flow = 1; flow < chiral_magnet_FLOWS - 1; ++flow) chiral_magnet_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int chiral_magnet_try(chiral_magnet_solver *s, int steps)
+static int chiral_magnet_try(chiral_magnet_solver *s, size_t steps)
 {
     chiral_magnet_steps(s, steps);
     if (chiral_magnet_all_hold(s, s->x)) return 1;
@@ -1002,7 +1032,7 @@ chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, 
     const size_t end = s->steps + steps;
     for (size_t stretch = chiral_magnet_STRETCH; s->steps < end && status == chiral_magnet_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (chiral_magnet_try(s, (int)now)) {
+        if (chiral_magnet_try(s, now)) {
             chiral_magnet_copy(s->before, s->x, s);
             s->steps += now;
             s->open = chiral_magnet_FLOWS > 1;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d880a744039187d322cbd34aa3ea574012395d7663d7d39bfb25f982e91c898d
+ * body-sha256: 120362fb8b96210b27f3dd4c124c3e500737a4593fb906741f76bd7981504892
  */
 #include "dnls.h"
 
@@ -115,7 +115,7 @@ static inline void dnls_locate(const dnls_solver *s, size_t index, dnls_row *row
     row->length = s->length;
 }
 
-enum { dnls_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { dnls_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t dnls_pieces(const dnls_solver *s)
@@ -295,7 +295,33 @@ static void dnls_vector_field_row(const dnls_params *params, const dnls_row *row
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define dnls_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define dnls_THREADS (size_t)omp_get_num_threads()
+#define dnls_THREAD (size_t)omp_get_thread_num()
+#else
+#define dnls_PARALLEL
+#define dnls_THREADS (size_t)1
+#define dnls_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t dnls_share(size_t units, size_t *first)
+{
+    const size_t threads = dnls_THREADS, own = dnls_THREAD, each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void dnls_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (dnls_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     dnls_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -353,9 +379,9 @@ static void dnls_prepare_step(const dnls_params *params, double h, double *coef)
 
 static int dnls_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t sizes[dnls_AXES],
@@ -420,46 +446,48 @@ static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], 
 /* One part of H. */
 static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * dnls_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = dnls_share(s->rows * dnls_pieces(s), &first);
     dnls_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    dnls_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void dnls_flow(const dnls_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} dnls_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void dnls_find_flow(const dnls_solver *s, size_t steps, int number, dnls_flow *flow)
 {
-    const int joined = flow == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[flow];
-    dnls_sweep_part(s, dnls_flow_parts[joined ? 0 : flow], s->coef + row * dnls_ROW, s->far > 0);
+    const int joined = number == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[number];
+    flow->part = dnls_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * dnls_ROW;
+}
+
+static void dnls_make_flow(const dnls_solver *s, size_t steps, int number)
+{
+    dnls_flow flow;
+    dnls_find_flow(s, steps, number, &flow);
+    dnls_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void dnls_steps(const dnls_solver *s, int steps)
+static void dnls_steps(const dnls_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    dnls_PARALLEL
     {
-        if (steps == 0) dnls_flow(s, dnls_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            dnls_flow(s, dnls_FLOWS > 1 && (step > 0 || s->open) ? dnls_FLOWS : 0);
-            for (int flow = 1; flow < dnls_FLOWS - 1; ++flow) dnls_flow(s, flow);
+        if (steps == 0) dnls_make_flow(s, s->steps - 1, dnls_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            dnls_make_flow(s, step, dnls_FLOWS > 1 && (step > s->steps || s->open) ? dnls_FLOWS : 0);
+            for (int flow = 1; flow < dnls_FLOWS - 1; ++flow) dnls_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int dnls_try(dnls_solver *s, int steps)
+static int dnls_try(dnls_solver *s, size_t steps)
 {
     dnls_steps(s, steps);
     if (dnls_all_hold(s, s->x)) return 1;
@@ -475,7 +503,7 @@ dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_STRETCH; s->steps < end && status == dnls_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (dnls_try(s, (int)now)) {
+        if (dnls_try(s, now)) {
             dnls_copy(s->before, s->x, s);
             s->steps += now;
             s->open = dnls_FLOWS > 1;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 63f11522c3373c56b712a55296f771cebf78d27f40d96394bbdce3761384de43
+ * body-sha256: c64c8c2f559d1dcc9e94de7b247f539194ebb259ba3023dfd120792160f52ffe
  */
 #include "dnls_disorder.h"
 
@@ -151,7 +151,7 @@ static inline void dnls_disorder_locate(const dnls_disorder_solver *s, size_t in
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { dnls_disorder_PIECE = 2048 };
+enum { dnls_disorder_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t dnls_disorder_pieces(const dnls_disorder_solver *s)
@@ -355,7 +355,34 @@ static void dnls_disorder_put_parameters(dnls_disorder_solver *s, const dnls_dis
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define dnls_disorder_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define dnls_disorder_THREADS (size_t)omp_get_num_threads()
+#define dnls_disorder_THREAD (size_t)omp_get_thread_num()
+#else
+#define dnls_disorder_PARALLEL
+#define dnls_disorder_THREADS (size_t)1
+#define dnls_disorder_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t dnls_disorder_share(size_t units, size_t *first)
+{
+    const size_t threads = dnls_disorder_THREADS, own = dnls_disorder_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void dnls_disorder_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (dnls_disorder_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     dnls_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -426,9 +453,9 @@ static void dnls_disorder_prepare_step(const dnls_disorder_params *params, doubl
 
 static int dnls_disorder_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_disorder_params *params,
@@ -499,48 +526,51 @@ static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *cons
 /* One part of H. */
 static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * dnls_disorder_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = dnls_disorder_share(s->rows * dnls_disorder_pieces(s), &first);
     dnls_disorder_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    dnls_disorder_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void dnls_disorder_flow(const dnls_disorder_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} dnls_disorder_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void dnls_disorder_find_flow(const dnls_disorder_solver *s, size_t steps, int number,
+    dnls_disorder_flow *flow)
 {
-    const int joined = flow == dnls_disorder_FLOWS, row = joined ? dnls_disorder_JOINED
-        : dnls_disorder_flow_rows[flow];
-    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : flow],
-        s->coef + row * dnls_disorder_ROW, s->far > 0);
+    const int joined = number == dnls_disorder_FLOWS, row = joined ? dnls_disorder_JOINED
+        : dnls_disorder_flow_rows[number];
+    flow->part = dnls_disorder_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * dnls_disorder_ROW;
+}
+
+static void dnls_disorder_make_flow(const dnls_disorder_solver *s, size_t steps, int number)
+{
+    dnls_disorder_flow flow;
+    dnls_disorder_find_flow(s, steps, number, &flow);
+    dnls_disorder_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void dnls_disorder_steps(const dnls_disorder_solver *s, int steps)
+static void dnls_disorder_steps(const dnls_disorder_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    dnls_disorder_PARALLEL
     {
-        if (steps == 0) dnls_disorder_flow(s, dnls_disorder_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            dnls_disorder_flow(s, dnls_disorder_FLOWS > 1 && (step > 0 || s->open) ? dnls_disorder_FLOWS : 0);
-            for (int flow = 1; flow < dnls_disorder_FLOWS - 1; ++flow) dnls_disorder_flow(s, flow);
+        if (steps == 0) dnls_disorder_make_flow(s, s->steps - 1, dnls_disorder_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            dnls_disorder_make_flow(s, step, dnls_disorder_FLOWS > 1 && (step > s->steps || s->open)
+                ? dnls_disorder_FLOWS : 0);
+            for (int flow = 1; flow < dnls_disorder_FLOWS - 1; ++flow) dnls_disorder_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int dnls_disorder_try(dnls_disorder_solver *s, int steps)
+static int dnls_disorder_try(dnls_disorder_solver *s, size_t steps)
 {
     dnls_disorder_steps(s, steps);
     if (dnls_disorder_all_hold(s, s->x)) return 1;
@@ -556,7 +586,7 @@ dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, 
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_disorder_STRETCH; s->steps < end && status == dnls_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (dnls_disorder_try(s, (int)now)) {
+        if (dnls_disorder_try(s, now)) {
             dnls_disorder_copy(s->before, s->x, s);
             s->steps += now;
             s->open = dnls_disorder_FLOWS > 1;

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 40c2da49c05e4da0d1a4da13a2abbb406e1377c821034ff35e30a35e1ba39593
+ * body-sha256: 7303f3a8563654f75c8a1908b116f858f617ec6d3247a11fddc606ab5c43906f
  */
 #include "food_web.h"
 
@@ -475,7 +475,34 @@ static void food_web_put_at_bond(const food_web_solver *s, double *at, const dou
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define food_web_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define food_web_THREADS (size_t)omp_get_num_threads()
+#define food_web_THREAD (size_t)omp_get_thread_num()
+#else
+#define food_web_PARALLEL
+#define food_web_THREADS (size_t)1
+#define food_web_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t food_web_share(size_t units, size_t *first)
+{
+    const size_t threads = food_web_THREADS, own = food_web_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void food_web_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (food_web_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     food_web_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -547,9 +574,9 @@ static void food_web_prepare_step(const food_web_params *params, double h, doubl
 
 static int food_web_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
@@ -624,20 +651,9 @@ static void food_web_copy(double *const to[food_web_DIM], double *const from[foo
 /* One part of H, of one colour. */
 static void food_web_sweep_colour(const food_web_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * food_web_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = food_web_share(s->rows * food_web_pieces(s), &first);
     food_web_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    food_web_wait();
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
@@ -651,30 +667,44 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         for (int flow = last - 1; flow > 0; --flow) food_web_sweep_colour(s, flow, coef, far);
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void food_web_flow(const food_web_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} food_web_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void food_web_find_flow(const food_web_solver *s, size_t steps, int number, food_web_flow *flow)
 {
-    const int joined = flow == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[flow];
-    food_web_sweep_part(s, food_web_flow_parts[joined ? 0 : flow], s->coef + row * food_web_ROW, s->far > 0);
+    const int joined = number == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[number];
+    flow->part = food_web_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * food_web_ROW;
+}
+
+static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
+{
+    food_web_flow flow;
+    food_web_find_flow(s, steps, number, &flow);
+    food_web_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void food_web_steps(const food_web_solver *s, int steps)
+static void food_web_steps(const food_web_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    food_web_PARALLEL
     {
-        if (steps == 0) food_web_flow(s, food_web_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            food_web_flow(s, food_web_FLOWS > 1 && (step > 0 || s->open) ? food_web_FLOWS : 0);
-            for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_flow(s, flow);
+        if (steps == 0) food_web_make_flow(s, s->steps - 1, food_web_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            food_web_make_flow(s, step, food_web_FLOWS > 1 && (step > s->steps || s->open) ? food_web_FLOWS
+                : 0);
+            for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int food_web_try(food_web_solver *s, int steps)
+static int food_web_try(food_web_solver *s, size_t steps)
 {
     food_web_steps(s, steps);
     if (food_web_all_hold(s, s->x)) return 1;
@@ -690,7 +720,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (food_web_try(s, (int)now)) {
+        if (food_web_try(s, now)) {
             food_web_copy(s->before, s->x, s);
             s->steps += now;
             s->open = food_web_FLOWS > 1;

@@ -20,9 +20,10 @@
  *   3. The lattice
  *   4. The solver
  *   5. The flows
- *   6. What is seen at sites
- *   7. Steps by hand
- * body-sha256: 11e47b1f8a962feab98eb4fc5bb12f7464b7653ceae1b1781528463f0774a8c2
+ *   6. Several flows at once
+ *   7. What is seen at sites
+ *   8. Steps by hand
+ * body-sha256: ac425f160ca5aa54fccb21bec596343268a40883c5ede5611c00e100d697cf23
  */
 #include "fput.h"
 
@@ -38,12 +39,13 @@
 /* ---- The model ---- */
 const fput_params fput_default_params = { 0.25, 0.1 };
 
-enum { fput_HALO = 1 };           /* sites that are copied beside a row */
-enum { fput_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
-enum { fput_ROW = 4 };            /* coefficients of one flow */
+enum { fput_HALO = 1 }; /* sites that are copied beside a row */
+enum { fput_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { fput_ROW = 4 }; /* coefficients of one flow */
 enum { fput_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
-enum { fput_FLOWS = 13 };         /* in a step */
-enum { fput_JOINED = 13 };        /* the row of the last flow of a step and the first of the next together */
+enum { fput_FLOWS = 13 }; /* in a step */
+enum { fput_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
+enum { fput_SPAN = 1 }; /* slices beside one that a flow reads: pieces of a row, or of the first axis */
 
 /* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t fput_least[fput_AXES] = { 2 };
@@ -118,7 +120,7 @@ static inline void fput_locate(const fput_solver *s, size_t index, fput_row *row
     row->length = s->length;
 }
 
-enum { fput_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { fput_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t fput_pieces(const fput_solver *s)
@@ -255,7 +257,33 @@ static void fput_vector_field_row(const fput_params *params, const fput_row *row
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define fput_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define fput_THREADS (size_t)omp_get_num_threads()
+#define fput_THREAD (size_t)omp_get_thread_num()
+#else
+#define fput_PARALLEL
+#define fput_THREADS (size_t)1
+#define fput_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t fput_share(size_t units, size_t *first)
+{
+    const size_t threads = fput_THREADS, own = fput_THREAD, each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void fput_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (fput_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     fput_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -313,9 +341,9 @@ static void fput_prepare_step(const fput_params *params, double h, double *coef)
 
 static int fput_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 fput_status fput_init(fput_solver *s, const fput_params *params, const size_t sizes[fput_AXES],
@@ -381,46 +409,111 @@ static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], 
 /* One part of H. */
 static void fput_sweep_part(const fput_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * fput_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = fput_share(s->rows * fput_pieces(s), &first);
     fput_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
+    fput_wait();
+}
+
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} fput_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void fput_find_flow(const fput_solver *s, size_t steps, int number, fput_flow *flow)
+{
+    const int joined = number == fput_FLOWS, row = joined ? fput_JOINED : fput_flow_rows[number];
+    flow->part = fput_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * fput_ROW;
+}
+
+static void fput_make_flow(const fput_solver *s, size_t steps, int number)
+{
+    fput_flow flow;
+    fput_find_flow(s, steps, number, &flow);
+    fput_sweep_part(s, flow.part, flow.coef, s->far > 0);
+}
+
+/* ---- Several flows at once ---- */
+/* Where the fields do not fit into caches, several flows go over the lattice together, slice by slice, each
+   so far behind the one before it as that reads: so a slice is fetched once for all. Each thread has slices
+   of its own. Beside their ends flow k leaves k fput_SPAN of them out, to be made when all threads have come
+   so far. What a flow reads is what it reads where flows are made one by one: the bits are the same. */
+enum { fput_DEEPEST = 16, fput_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
+
+/* The slices of the lattice, each of so many units: of one row its pieces. */
+static size_t fput_slices(const fput_solver *s, size_t *units)
+{
+    *units = 1;
+    return fput_pieces(s);
+}
+
+/* How many flows are made at once. */
+static size_t fput_depth(const fput_solver *s)
+{
+    size_t units;
+    const size_t slices = fput_slices(s, &units), bytes = s->rows * (size_t)s->width * fput_ARRAYS
+        * sizeof(double);
+    const size_t held = fput_CACHE / (bytes / slices) / fput_SPAN,
+        room = slices / fput_THREADS / (2 * fput_SPAN);
+    const size_t depth = held < room ? held : room;
+    if (bytes <= fput_CACHE || depth < 2) return 1;
+    return depth < fput_DEEPEST ? depth : fput_DEEPEST;
+}
+
+static void fput_make_slices(const fput_solver *s, const fput_flow *flow, size_t from, size_t to)
+{
+    size_t units;
+    (void)fput_slices(s, &units);
+    fput_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+}
+
+/* So many flows, one after the other. */
+static void fput_make_wave(const fput_solver *s, const fput_flow *flows, size_t count)
+{
+    size_t units, from;
+    const size_t slices = fput_slices(s, &units), to = fput_share(slices, &from), next = to == slices ? 0
+        : to;
+    for (size_t front = from; front < to; ++front)
+        for (size_t k = 0; k < count && front >= from + 2 * k * fput_SPAN; ++k)
+            fput_make_slices(s, flows + k, front - k * fput_SPAN, front - k * fput_SPAN + 1);
+    fput_wait();
+    for (size_t k = 1; k < count; ++k) {
+        fput_make_slices(s, flows + k, to - k * fput_SPAN, to);
+        fput_make_slices(s, flows + k, next, next + k * fput_SPAN);
     }
-#endif
+    fput_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void fput_flow(const fput_solver *s, int flow)
+/* The flows of some steps, joined, without the last. */
+static void fput_make_waves(const fput_solver *s, size_t steps)
 {
-    const int joined = flow == fput_FLOWS, row = joined ? fput_JOINED : fput_flow_rows[flow];
-    fput_sweep_part(s, fput_flow_parts[joined ? 0 : flow], s->coef + row * fput_ROW, s->far > 0);
-}
-
-/* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void fput_steps(const fput_solver *s, int steps)
-{
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
-    {
-        if (steps == 0) fput_flow(s, fput_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            fput_flow(s, fput_FLOWS > 1 && (step > 0 || s->open) ? fput_FLOWS : 0);
-            for (int flow = 1; flow < fput_FLOWS - 1; ++flow) fput_flow(s, flow);
+    const size_t each = fput_FLOWS - 1, depth = fput_depth(s);
+    fput_flow flows[fput_DEEPEST];
+    for (size_t done = 0; done < steps * each;) {
+        size_t count = 0;
+        for (; count < depth && done < steps * each; ++count, ++done) {
+            const int number = (int)(done % each), joined = number == 0 && (done > 0 || s->open);
+            fput_find_flow(s, s->steps + done / each, joined ? fput_FLOWS : number, flows + count);
         }
+        if (count > 1) fput_make_wave(s, flows, count);
+        else fput_sweep_part(s, flows->part, flows->coef, s->far > 0);
+    }
+}
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void fput_steps(const fput_solver *s, size_t steps)
+{
+    fput_PARALLEL
+    {
+        if (steps == 0) fput_make_flow(s, s->steps - 1, fput_FLOWS - 1);
+        fput_make_waves(s, steps);
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int fput_try(fput_solver *s, int steps)
+static int fput_try(fput_solver *s, size_t steps)
 {
     fput_steps(s, steps);
     if (fput_all_hold(s, s->x)) return 1;
@@ -436,7 +529,7 @@ fput_status fput_integrate(fput_solver *s, double h, size_t steps)
     const size_t end = s->steps + steps;
     for (size_t stretch = fput_STRETCH; s->steps < end && status == fput_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (fput_try(s, (int)now)) {
+        if (fput_try(s, now)) {
             fput_copy(s->before, s->x, s);
             s->steps += now;
             s->open = fput_FLOWS > 1;

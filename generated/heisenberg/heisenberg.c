@@ -20,9 +20,10 @@
  *   3. The lattice
  *   4. The solver
  *   5. The flows
- *   6. What is seen at sites
- *   7. Steps by hand
- * body-sha256: 11bdc96b36a67329e9b49d769600109c9c8635dc79e5e5c8840880cd2a1ff4fb
+ *   6. Several flows at once
+ *   7. What is seen at sites
+ *   8. Steps by hand
+ * body-sha256: cf024e22cf0bd12e83dab8ee844947a175062ff9d3b095774e52fe1a8f6e3063
  */
 #include "heisenberg.h"
 
@@ -44,6 +45,7 @@ enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { heisenberg_FLOWS = 5 }; /* in a step */
 enum { heisenberg_JOINED = 5 }; /* the row of the last flow of a step and the first of the next together */
+enum { heisenberg_SPAN = 1 }; /* slices beside one that a flow reads: pieces of a row, or of the first axis */
 
 /* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
@@ -132,7 +134,7 @@ static inline void heisenberg_locate(const heisenberg_solver *s, size_t index, h
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { heisenberg_PIECE = 2048 };
+enum { heisenberg_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t heisenberg_pieces(const heisenberg_solver *s)
@@ -490,7 +492,34 @@ static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_par
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define heisenberg_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define heisenberg_THREADS (size_t)omp_get_num_threads()
+#define heisenberg_THREAD (size_t)omp_get_thread_num()
+#else
+#define heisenberg_PARALLEL
+#define heisenberg_THREADS (size_t)1
+#define heisenberg_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t heisenberg_share(size_t units, size_t *first)
+{
+    const size_t threads = heisenberg_THREADS, own = heisenberg_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void heisenberg_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (heisenberg_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     heisenberg_STRETCH = 32,   /* steps before the state is looked at: what is not finite stays so */
@@ -584,9 +613,9 @@ static void heisenberg_prepare_step(const heisenberg_params *params, double h, d
 
 static int heisenberg_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params *params,
@@ -655,48 +684,115 @@ static void heisenberg_copy(double *const to[heisenberg_DIM], double *const from
 /* One part of H. */
 static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * heisenberg_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = heisenberg_share(s->rows * heisenberg_pieces(s), &first);
     heisenberg_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
+    heisenberg_wait();
+}
+
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} heisenberg_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void heisenberg_find_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
+{
+    const int joined = number == heisenberg_FLOWS, row = joined ? heisenberg_JOINED
+        : heisenberg_flow_rows[number];
+    flow->part = heisenberg_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * heisenberg_ROW;
+}
+
+static void heisenberg_make_flow(const heisenberg_solver *s, size_t steps, int number)
+{
+    heisenberg_flow flow;
+    heisenberg_find_flow(s, steps, number, &flow);
+    heisenberg_sweep_part(s, flow.part, flow.coef, s->far > 0);
+}
+
+/* ---- Several flows at once ---- */
+/* Where the fields do not fit into caches, several flows go over the lattice together, slice by slice, each
+   so far behind the one before it as that reads: so a slice is fetched once for all. Each thread has slices
+   of its own. Beside their ends flow k leaves k heisenberg_SPAN of them out, to be made when all threads have
+   come so far. What a flow reads is what it reads where flows are made one by one: the bits are the same. */
+enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
+
+/* The slices of the lattice, each of so many units: of one row its pieces. */
+static size_t heisenberg_slices(const heisenberg_solver *s, size_t *units)
+{
+    *units = s->rows / s->sizes[0] * heisenberg_pieces(s);
+    return s->sizes[0];
+}
+
+/* How many flows are made at once. */
+static size_t heisenberg_depth(const heisenberg_solver *s)
+{
+    size_t units;
+    const size_t slices = heisenberg_slices(s, &units), bytes = s->rows * (size_t)s->width * heisenberg_ARRAYS
+        * sizeof(double);
+    const size_t held = heisenberg_CACHE / (bytes / slices) / heisenberg_SPAN,
+        room = slices / heisenberg_THREADS / (2 * heisenberg_SPAN);
+    const size_t depth = held < room ? held : room;
+    if (bytes <= heisenberg_CACHE || depth < 2) return 1;
+    return depth < heisenberg_DEEPEST ? depth : heisenberg_DEEPEST;
+}
+
+static void heisenberg_make_slices(const heisenberg_solver *s, const heisenberg_flow *flow, size_t from,
+    size_t to)
+{
+    size_t units;
+    (void)heisenberg_slices(s, &units);
+    heisenberg_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+}
+
+/* So many flows, one after the other. */
+static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_flow *flows, size_t count)
+{
+    size_t units, from;
+    const size_t slices = heisenberg_slices(s, &units), to = heisenberg_share(slices, &from), next = to ==
+        slices ? 0 : to;
+    for (size_t front = from; front < to; ++front)
+        for (size_t k = 0; k < count && front >= from + 2 * k * heisenberg_SPAN; ++k)
+            heisenberg_make_slices(s, flows + k, front - k * heisenberg_SPAN, front - k * heisenberg_SPAN
+                + 1);
+    heisenberg_wait();
+    for (size_t k = 1; k < count; ++k) {
+        heisenberg_make_slices(s, flows + k, to - k * heisenberg_SPAN, to);
+        heisenberg_make_slices(s, flows + k, next, next + k * heisenberg_SPAN);
     }
-#endif
+    heisenberg_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void heisenberg_flow(const heisenberg_solver *s, int flow)
+/* The flows of some steps, joined, without the last. */
+static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 {
-    const int joined = flow == heisenberg_FLOWS, row = joined ? heisenberg_JOINED
-        : heisenberg_flow_rows[flow];
-    heisenberg_sweep_part(s, heisenberg_flow_parts[joined ? 0 : flow], s->coef + row * heisenberg_ROW,
-        s->far > 0);
-}
-
-/* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void heisenberg_steps(const heisenberg_solver *s, int steps)
-{
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
-    {
-        if (steps == 0) heisenberg_flow(s, heisenberg_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            heisenberg_flow(s, heisenberg_FLOWS > 1 && (step > 0 || s->open) ? heisenberg_FLOWS : 0);
-            for (int flow = 1; flow < heisenberg_FLOWS - 1; ++flow) heisenberg_flow(s, flow);
+    const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s);
+    heisenberg_flow flows[heisenberg_DEEPEST];
+    for (size_t done = 0; done < steps * each;) {
+        size_t count = 0;
+        for (; count < depth && done < steps * each; ++count, ++done) {
+            const int number = (int)(done % each), joined = number == 0 && (done > 0 || s->open);
+            heisenberg_find_flow(s, s->steps + done / each, joined ? heisenberg_FLOWS : number,
+                flows + count);
         }
+        if (count > 1) heisenberg_make_wave(s, flows, count);
+        else heisenberg_sweep_part(s, flows->part, flows->coef, s->far > 0);
+    }
+}
+/* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void heisenberg_steps(const heisenberg_solver *s, size_t steps)
+{
+    heisenberg_PARALLEL
+    {
+        if (steps == 0) heisenberg_make_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
+        heisenberg_make_waves(s, steps);
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int heisenberg_try(heisenberg_solver *s, int steps)
+static int heisenberg_try(heisenberg_solver *s, size_t steps)
 {
     heisenberg_steps(s, steps);
     if (heisenberg_all_hold(s, s->x)) return 1;
@@ -724,7 +820,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
         if (s->far > 0 && s->far < now) now = s->far;
-        if (heisenberg_try(s, (int)now)) {
+        if (heisenberg_try(s, now)) {
             heisenberg_copy(s->before, s->x, s);
             s->steps += now;
             s->open = heisenberg_FLOWS > 1;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 2d08bc826979658c4a8c136aa3731a9a07b1aacbdc2edac2abd6ccf4cfa7120a
+ * body-sha256: a73411eb17e76e1304102ad3d5fcc6e0623590450e406f5508c1596122f141e1
  */
 #include "heisenberg_plane.h"
 
@@ -155,7 +155,7 @@ static inline void heisenberg_plane_locate(const heisenberg_plane_solver *s, siz
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { heisenberg_plane_PIECE = 2048 };
+enum { heisenberg_plane_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t heisenberg_plane_pieces(const heisenberg_plane_solver *s)
@@ -397,7 +397,34 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define heisenberg_plane_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define heisenberg_plane_THREADS (size_t)omp_get_num_threads()
+#define heisenberg_plane_THREAD (size_t)omp_get_thread_num()
+#else
+#define heisenberg_plane_PARALLEL
+#define heisenberg_plane_THREADS (size_t)1
+#define heisenberg_plane_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t heisenberg_plane_share(size_t units, size_t *first)
+{
+    const size_t threads = heisenberg_plane_THREADS, own = heisenberg_plane_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void heisenberg_plane_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (heisenberg_plane_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     heisenberg_plane_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -480,9 +507,9 @@ static void heisenberg_plane_prepare_step(const heisenberg_plane_params *params,
 
 static int heisenberg_plane_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
@@ -555,49 +582,52 @@ static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
 static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef,
     int far)
 {
-    const size_t units = s->rows * heisenberg_plane_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = heisenberg_plane_share(s->rows * heisenberg_plane_pieces(s), &first);
     heisenberg_plane_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    heisenberg_plane_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void heisenberg_plane_flow(const heisenberg_plane_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} heisenberg_plane_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void heisenberg_plane_find_flow(const heisenberg_plane_solver *s, size_t steps, int number,
+    heisenberg_plane_flow *flow)
 {
-    const int joined = flow == heisenberg_plane_FLOWS, row = joined ? heisenberg_plane_JOINED
-        : heisenberg_plane_flow_rows[flow];
-    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : flow],
-        s->coef + row * heisenberg_plane_ROW, s->far > 0);
+    const int joined = number == heisenberg_plane_FLOWS, row = joined ? heisenberg_plane_JOINED
+        : heisenberg_plane_flow_rows[number];
+    flow->part = heisenberg_plane_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * heisenberg_plane_ROW;
+}
+
+static void heisenberg_plane_make_flow(const heisenberg_plane_solver *s, size_t steps, int number)
+{
+    heisenberg_plane_flow flow;
+    heisenberg_plane_find_flow(s, steps, number, &flow);
+    heisenberg_plane_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void heisenberg_plane_steps(const heisenberg_plane_solver *s, int steps)
+static void heisenberg_plane_steps(const heisenberg_plane_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    heisenberg_plane_PARALLEL
     {
-        if (steps == 0) heisenberg_plane_flow(s, heisenberg_plane_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            heisenberg_plane_flow(s, heisenberg_plane_FLOWS > 1 && (step > 0 || s->open)
+        if (steps == 0) heisenberg_plane_make_flow(s, s->steps - 1, heisenberg_plane_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            heisenberg_plane_make_flow(s, step, heisenberg_plane_FLOWS > 1 && (step > s->steps || s->open)
                 ? heisenberg_plane_FLOWS : 0);
-            for (int flow = 1; flow < heisenberg_plane_FLOWS - 1; ++flow) heisenberg_plane_flow(s, flow);
+            for (int flow = 1; flow < heisenberg_plane_FLOWS - 1; ++flow)
+                heisenberg_plane_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int heisenberg_plane_try(heisenberg_plane_solver *s, int steps)
+static int heisenberg_plane_try(heisenberg_plane_solver *s, size_t steps)
 {
     heisenberg_plane_steps(s, steps);
     if (heisenberg_plane_all_hold(s, s->x)) return 1;
@@ -613,7 +643,7 @@ heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, d
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_plane_STRETCH; s->steps < end && status == heisenberg_plane_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (heisenberg_plane_try(s, (int)now)) {
+        if (heisenberg_plane_try(s, now)) {
             heisenberg_plane_copy(s->before, s->x, s);
             s->steps += now;
             s->open = heisenberg_plane_FLOWS > 1;

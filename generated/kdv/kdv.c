@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 531cf81c9e86b29c5bc36cd24d84c806570efab3a247fc90cd940e81981e8785
+ * body-sha256: 15ebe598370a5bb1c555a5dc6a9bf8ed9cab26232c3440188bd55a24855adf5b
  */
 #include "kdv.h"
 
@@ -118,7 +118,7 @@ static inline void kdv_locate(const kdv_solver *s, size_t index, kdv_row *row)
     row->start = row->out = s->x;
 }
 
-enum { kdv_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { kdv_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t kdv_pieces(const kdv_solver *s)
@@ -353,7 +353,24 @@ static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, p
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define kdv_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define kdv_THREADS (size_t)omp_get_num_threads()
+#define kdv_THREAD (size_t)omp_get_thread_num()
+#define kdv_ONE_BY_ONE _Pragma("omp critical")
+#else
+#define kdv_PARALLEL
+#define kdv_THREADS (size_t)1
+#define kdv_THREAD (size_t)0
+#define kdv_ONE_BY_ONE
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t kdv_share(size_t units, size_t *first)
+{
+    const size_t threads = kdv_THREADS, own = kdv_THREAD, each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
 
 enum {
     kdv_LEAD = (kdv_HALO + 7) / 8 * 8,
@@ -429,9 +446,9 @@ static void kdv_prepare_step(const kdv_params *params, double h, double *coef)
 
 static int kdv_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[kdv_AXES], const double *x0,
@@ -493,28 +510,6 @@ static void kdv_copy(double *const to[kdv_DIM], double *const from[kdv_DIM], con
 }
 
 /* ---- The stages ---- */
-#ifdef _OPENMP
-#define kdv_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define kdv_ONE_BY_ONE _Pragma("omp critical")
-#else
-#define kdv_PARALLEL
-#define kdv_ONE_BY_ONE
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t kdv_share(size_t units, size_t *first)
-{
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-#else
-    *first = 0;
-    return units;
-#endif
-}
-
 static double kdv_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y

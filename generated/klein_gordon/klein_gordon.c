@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b485ae708a0eaec4c9586a8bafab103192d94ef9d0adf8f5a46e8af5ca8e5e64
+ * body-sha256: 22b6d7970c2d6c5dd731b87ec5ed32e0c8b6dc9f0d4642f40aa5917776739d22
  */
 #include "klein_gordon.h"
 
@@ -115,7 +115,7 @@ static inline void klein_gordon_locate(const klein_gordon_solver *s, size_t inde
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { klein_gordon_PIECE = 2048 };
+enum { klein_gordon_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t klein_gordon_pieces(const klein_gordon_solver *s)
@@ -243,7 +243,34 @@ static void klein_gordon_vector_field_row(const klein_gordon_params *params, con
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define klein_gordon_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define klein_gordon_THREADS (size_t)omp_get_num_threads()
+#define klein_gordon_THREAD (size_t)omp_get_thread_num()
+#else
+#define klein_gordon_PARALLEL
+#define klein_gordon_THREADS (size_t)1
+#define klein_gordon_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t klein_gordon_share(size_t units, size_t *first)
+{
+    const size_t threads = klein_gordon_THREADS, own = klein_gordon_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void klein_gordon_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (klein_gordon_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     klein_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -302,9 +329,9 @@ static void klein_gordon_prepare_step(const klein_gordon_params *params, double 
 
 static int klein_gordon_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon_params *params,
@@ -372,48 +399,51 @@ static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const 
 /* One part of H. */
 static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * klein_gordon_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = klein_gordon_share(s->rows * klein_gordon_pieces(s), &first);
     klein_gordon_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    klein_gordon_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void klein_gordon_flow(const klein_gordon_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} klein_gordon_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void klein_gordon_find_flow(const klein_gordon_solver *s, size_t steps, int number,
+    klein_gordon_flow *flow)
 {
-    const int joined = flow == klein_gordon_FLOWS, row = joined ? klein_gordon_JOINED
-        : klein_gordon_flow_rows[flow];
-    klein_gordon_sweep_part(s, klein_gordon_flow_parts[joined ? 0 : flow], s->coef + row * klein_gordon_ROW,
-        s->far > 0);
+    const int joined = number == klein_gordon_FLOWS, row = joined ? klein_gordon_JOINED
+        : klein_gordon_flow_rows[number];
+    flow->part = klein_gordon_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * klein_gordon_ROW;
+}
+
+static void klein_gordon_make_flow(const klein_gordon_solver *s, size_t steps, int number)
+{
+    klein_gordon_flow flow;
+    klein_gordon_find_flow(s, steps, number, &flow);
+    klein_gordon_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void klein_gordon_steps(const klein_gordon_solver *s, int steps)
+static void klein_gordon_steps(const klein_gordon_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    klein_gordon_PARALLEL
     {
-        if (steps == 0) klein_gordon_flow(s, klein_gordon_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            klein_gordon_flow(s, klein_gordon_FLOWS > 1 && (step > 0 || s->open) ? klein_gordon_FLOWS : 0);
-            for (int flow = 1; flow < klein_gordon_FLOWS - 1; ++flow) klein_gordon_flow(s, flow);
+        if (steps == 0) klein_gordon_make_flow(s, s->steps - 1, klein_gordon_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            klein_gordon_make_flow(s, step, klein_gordon_FLOWS > 1 && (step > s->steps || s->open)
+                ? klein_gordon_FLOWS : 0);
+            for (int flow = 1; flow < klein_gordon_FLOWS - 1; ++flow) klein_gordon_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int klein_gordon_try(klein_gordon_solver *s, int steps)
+static int klein_gordon_try(klein_gordon_solver *s, size_t steps)
 {
     klein_gordon_steps(s, steps);
     if (klein_gordon_all_hold(s, s->x)) return 1;
@@ -429,7 +459,7 @@ klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, siz
     const size_t end = s->steps + steps;
     for (size_t stretch = klein_gordon_STRETCH; s->steps < end && status == klein_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (klein_gordon_try(s, (int)now)) {
+        if (klein_gordon_try(s, now)) {
             klein_gordon_copy(s->before, s->x, s);
             s->steps += now;
             s->open = klein_gordon_FLOWS > 1;

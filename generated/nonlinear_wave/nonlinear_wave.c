@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 909f8d442b566f6fb07f6ff2674d130f249d72d09664b349707073f281087c17
+ * body-sha256: 3271e2cfaf90ddc1124d712265f4cd516fc6fd3aed792759006f9dbacfbceab3
  */
 #include "nonlinear_wave.h"
 
@@ -119,7 +119,7 @@ static inline void nonlinear_wave_locate(const nonlinear_wave_solver *s, size_t 
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { nonlinear_wave_PIECE = 2048 };
+enum { nonlinear_wave_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t nonlinear_wave_pieces(const nonlinear_wave_solver *s)
@@ -250,7 +250,34 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define nonlinear_wave_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define nonlinear_wave_THREADS (size_t)omp_get_num_threads()
+#define nonlinear_wave_THREAD (size_t)omp_get_thread_num()
+#else
+#define nonlinear_wave_PARALLEL
+#define nonlinear_wave_THREADS (size_t)1
+#define nonlinear_wave_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t nonlinear_wave_share(size_t units, size_t *first)
+{
+    const size_t threads = nonlinear_wave_THREADS, own = nonlinear_wave_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void nonlinear_wave_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (nonlinear_wave_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     nonlinear_wave_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -309,9 +336,9 @@ static void nonlinear_wave_prepare_step(const nonlinear_wave_params *params, dou
 
 static int nonlinear_wave_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlinear_wave_params *params,
@@ -381,49 +408,52 @@ static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *co
 /* One part of H. */
 static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * nonlinear_wave_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = nonlinear_wave_share(s->rows * nonlinear_wave_pieces(s), &first);
     nonlinear_wave_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    nonlinear_wave_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void nonlinear_wave_flow(const nonlinear_wave_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} nonlinear_wave_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void nonlinear_wave_find_flow(const nonlinear_wave_solver *s, size_t steps, int number,
+    nonlinear_wave_flow *flow)
 {
-    const int joined = flow == nonlinear_wave_FLOWS, row = joined ? nonlinear_wave_JOINED
-        : nonlinear_wave_flow_rows[flow];
-    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : flow],
-        s->coef + row * nonlinear_wave_ROW, s->far > 0);
+    const int joined = number == nonlinear_wave_FLOWS, row = joined ? nonlinear_wave_JOINED
+        : nonlinear_wave_flow_rows[number];
+    flow->part = nonlinear_wave_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * nonlinear_wave_ROW;
+}
+
+static void nonlinear_wave_make_flow(const nonlinear_wave_solver *s, size_t steps, int number)
+{
+    nonlinear_wave_flow flow;
+    nonlinear_wave_find_flow(s, steps, number, &flow);
+    nonlinear_wave_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void nonlinear_wave_steps(const nonlinear_wave_solver *s, int steps)
+static void nonlinear_wave_steps(const nonlinear_wave_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    nonlinear_wave_PARALLEL
     {
-        if (steps == 0) nonlinear_wave_flow(s, nonlinear_wave_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            nonlinear_wave_flow(s, nonlinear_wave_FLOWS > 1 && (step > 0 || s->open) ? nonlinear_wave_FLOWS
-                : 0);
-            for (int flow = 1; flow < nonlinear_wave_FLOWS - 1; ++flow) nonlinear_wave_flow(s, flow);
+        if (steps == 0) nonlinear_wave_make_flow(s, s->steps - 1, nonlinear_wave_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            nonlinear_wave_make_flow(s, step, nonlinear_wave_FLOWS > 1 && (step > s->steps || s->open)
+                ? nonlinear_wave_FLOWS : 0);
+            for (int flow = 1; flow < nonlinear_wave_FLOWS - 1; ++flow)
+                nonlinear_wave_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int nonlinear_wave_try(nonlinear_wave_solver *s, int steps)
+static int nonlinear_wave_try(nonlinear_wave_solver *s, size_t steps)
 {
     nonlinear_wave_steps(s, steps);
     if (nonlinear_wave_all_hold(s, s->x)) return 1;
@@ -439,7 +469,7 @@ nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double 
     const size_t end = s->steps + steps;
     for (size_t stretch = nonlinear_wave_STRETCH; s->steps < end && status == nonlinear_wave_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (nonlinear_wave_try(s, (int)now)) {
+        if (nonlinear_wave_try(s, now)) {
             nonlinear_wave_copy(s->before, s->x, s);
             s->steps += now;
             s->open = nonlinear_wave_FLOWS > 1;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: f53bc1c5aebae5bf41a74e39f91d2be5df0fe31435bacf58e5214080700fd342
+ * body-sha256: 45e5f34f1a96370f72a29811b90a592c336b0efa9a714fef422aba6dce0d993d
  */
 #include "outer_planets.h"
 
@@ -357,7 +357,34 @@ static void outer_planets_put_parameters(outer_planets_solver *s, const outer_pl
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define outer_planets_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
+#define outer_planets_THREADS (size_t)omp_get_num_threads()
+#define outer_planets_THREAD (size_t)omp_get_thread_num()
+#else
+#define outer_planets_PARALLEL
+#define outer_planets_THREADS (size_t)1
+#define outer_planets_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t outer_planets_share(size_t units, size_t *first)
+{
+    const size_t threads = outer_planets_THREADS, own = outer_planets_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void outer_planets_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (outer_planets_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     outer_planets_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -429,9 +456,9 @@ static void outer_planets_prepare_step(const outer_planets_params *params, doubl
 
 static int outer_planets_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_planets_params *params,
@@ -504,48 +531,51 @@ static void outer_planets_copy(double *const to[outer_planets_DIM], double *cons
 /* One part of H. */
 static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * outer_planets_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = outer_planets_share(s->rows * outer_planets_pieces(s), &first);
     outer_planets_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    outer_planets_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void outer_planets_flow(const outer_planets_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} outer_planets_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void outer_planets_find_flow(const outer_planets_solver *s, size_t steps, int number,
+    outer_planets_flow *flow)
 {
-    const int joined = flow == outer_planets_FLOWS, row = joined ? outer_planets_JOINED
-        : outer_planets_flow_rows[flow];
-    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : flow],
-        s->coef + row * outer_planets_ROW, s->far > 0);
+    const int joined = number == outer_planets_FLOWS, row = joined ? outer_planets_JOINED
+        : outer_planets_flow_rows[number];
+    flow->part = outer_planets_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * outer_planets_ROW;
+}
+
+static void outer_planets_make_flow(const outer_planets_solver *s, size_t steps, int number)
+{
+    outer_planets_flow flow;
+    outer_planets_find_flow(s, steps, number, &flow);
+    outer_planets_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void outer_planets_steps(const outer_planets_solver *s, int steps)
+static void outer_planets_steps(const outer_planets_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 512)
-#endif
+    outer_planets_PARALLEL
     {
-        if (steps == 0) outer_planets_flow(s, outer_planets_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            outer_planets_flow(s, outer_planets_FLOWS > 1 && (step > 0 || s->open) ? outer_planets_FLOWS : 0);
-            for (int flow = 1; flow < outer_planets_FLOWS - 1; ++flow) outer_planets_flow(s, flow);
+        if (steps == 0) outer_planets_make_flow(s, s->steps - 1, outer_planets_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            outer_planets_make_flow(s, step, outer_planets_FLOWS > 1 && (step > s->steps || s->open)
+                ? outer_planets_FLOWS : 0);
+            for (int flow = 1; flow < outer_planets_FLOWS - 1; ++flow) outer_planets_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int outer_planets_try(outer_planets_solver *s, int steps)
+static int outer_planets_try(outer_planets_solver *s, size_t steps)
 {
     outer_planets_steps(s, steps);
     if (outer_planets_all_hold(s, s->x)) return 1;
@@ -561,7 +591,7 @@ outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, 
     const size_t end = s->steps + steps;
     for (size_t stretch = outer_planets_STRETCH; s->steps < end && status == outer_planets_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (outer_planets_try(s, (int)now)) {
+        if (outer_planets_try(s, now)) {
             outer_planets_copy(s->before, s->x, s);
             s->steps += now;
             s->open = outer_planets_FLOWS > 1;

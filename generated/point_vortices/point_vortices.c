@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: f70c1693c643cb968531e548e2fe7c702c06819c50c91bd0b893fe73c5245799
+ * body-sha256: cc1f2ea1c724468d6410fc62bf2bb6e24e24a4267572dfd2967b1c459aa94288
  */
 #include "point_vortices.h"
 
@@ -441,7 +441,25 @@ static void point_vortices_put_parameters(point_vortices_solver *s, const point_
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define point_vortices_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
+#define point_vortices_THREADS (size_t)omp_get_num_threads()
+#define point_vortices_THREAD (size_t)omp_get_thread_num()
+#define point_vortices_ONE_BY_ONE _Pragma("omp critical")
+#else
+#define point_vortices_PARALLEL
+#define point_vortices_THREADS (size_t)1
+#define point_vortices_THREAD (size_t)0
+#define point_vortices_ONE_BY_ONE
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t point_vortices_share(size_t units, size_t *first)
+{
+    const size_t threads = point_vortices_THREADS, own = point_vortices_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
 
 enum {
     point_vortices_LEAD = (point_vortices_HALO + 7) / 8 * 8,
@@ -539,9 +557,9 @@ static void point_vortices_prepare_step(const point_vortices_params *params, dou
 
 static int point_vortices_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 point_vortices_status point_vortices_init(point_vortices_solver *s, const point_vortices_params *params,
@@ -614,28 +632,6 @@ static void point_vortices_copy(double *const to[point_vortices_DIM], double *co
 }
 
 /* ---- The stages ---- */
-#ifdef _OPENMP
-#define point_vortices_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
-#define point_vortices_ONE_BY_ONE _Pragma("omp critical")
-#else
-#define point_vortices_PARALLEL
-#define point_vortices_ONE_BY_ONE
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t point_vortices_share(size_t units, size_t *first)
-{
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-#else
-    *first = 0;
-    return units;
-#endif
-}
-
 static double point_vortices_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b3de7140b631a565f8467e8eef8e245ec1df1834386de14412e4bde6d08cf08c
+ * body-sha256: ecdd213bf284001356662a3688d5f3595e9ed7437ed1d15f4cd0668bd4adb357
  */
 #include "sine_gordon.h"
 
@@ -116,7 +116,7 @@ static inline void sine_gordon_locate(const sine_gordon_solver *s, size_t index,
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { sine_gordon_PIECE = 2048 };
+enum { sine_gordon_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t sine_gordon_pieces(const sine_gordon_solver *s)
@@ -279,7 +279,34 @@ static void sine_gordon_vector_field_row(const sine_gordon_params *params, const
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define sine_gordon_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define sine_gordon_THREADS (size_t)omp_get_num_threads()
+#define sine_gordon_THREAD (size_t)omp_get_thread_num()
+#else
+#define sine_gordon_PARALLEL
+#define sine_gordon_THREADS (size_t)1
+#define sine_gordon_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t sine_gordon_share(size_t units, size_t *first)
+{
+    const size_t threads = sine_gordon_THREADS, own = sine_gordon_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void sine_gordon_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (sine_gordon_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     sine_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -338,9 +365,9 @@ static void sine_gordon_prepare_step(const sine_gordon_params *params, double h,
 
 static int sine_gordon_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_params *params,
@@ -408,48 +435,51 @@ static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const fr
 /* One part of H. */
 static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * sine_gordon_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = sine_gordon_share(s->rows * sine_gordon_pieces(s), &first);
     sine_gordon_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    sine_gordon_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void sine_gordon_flow(const sine_gordon_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} sine_gordon_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void sine_gordon_find_flow(const sine_gordon_solver *s, size_t steps, int number,
+    sine_gordon_flow *flow)
 {
-    const int joined = flow == sine_gordon_FLOWS, row = joined ? sine_gordon_JOINED
-        : sine_gordon_flow_rows[flow];
-    sine_gordon_sweep_part(s, sine_gordon_flow_parts[joined ? 0 : flow], s->coef + row * sine_gordon_ROW,
-        s->far > 0);
+    const int joined = number == sine_gordon_FLOWS, row = joined ? sine_gordon_JOINED
+        : sine_gordon_flow_rows[number];
+    flow->part = sine_gordon_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * sine_gordon_ROW;
+}
+
+static void sine_gordon_make_flow(const sine_gordon_solver *s, size_t steps, int number)
+{
+    sine_gordon_flow flow;
+    sine_gordon_find_flow(s, steps, number, &flow);
+    sine_gordon_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void sine_gordon_steps(const sine_gordon_solver *s, int steps)
+static void sine_gordon_steps(const sine_gordon_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    sine_gordon_PARALLEL
     {
-        if (steps == 0) sine_gordon_flow(s, sine_gordon_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            sine_gordon_flow(s, sine_gordon_FLOWS > 1 && (step > 0 || s->open) ? sine_gordon_FLOWS : 0);
-            for (int flow = 1; flow < sine_gordon_FLOWS - 1; ++flow) sine_gordon_flow(s, flow);
+        if (steps == 0) sine_gordon_make_flow(s, s->steps - 1, sine_gordon_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            sine_gordon_make_flow(s, step, sine_gordon_FLOWS > 1 && (step > s->steps || s->open)
+                ? sine_gordon_FLOWS : 0);
+            for (int flow = 1; flow < sine_gordon_FLOWS - 1; ++flow) sine_gordon_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int sine_gordon_try(sine_gordon_solver *s, int steps)
+static int sine_gordon_try(sine_gordon_solver *s, size_t steps)
 {
     sine_gordon_steps(s, steps);
     if (sine_gordon_all_hold(s, s->x)) return 1;
@@ -465,7 +495,7 @@ sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t
     const size_t end = s->steps + steps;
     for (size_t stretch = sine_gordon_STRETCH; s->steps < end && status == sine_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (sine_gordon_try(s, (int)now)) {
+        if (sine_gordon_try(s, now)) {
             sine_gordon_copy(s->before, s->x, s);
             s->steps += now;
             s->open = sine_gordon_FLOWS > 1;

@@ -30,7 +30,7 @@
  *   8. Krylov spaces
  *   9. Newton's method where sweeps fail
  *   10. What is seen at sites
- * body-sha256: 5ad83064d11f1829967cb35467c84203c33fc366a7fb4fdb7d103938b66012c4
+ * body-sha256: cc665f3c9b33f4ad0cfeba56e8e82d15dac3cd965986af759cc0897d185da469
  */
 #include "thermal_heisenberg.h"
 
@@ -158,7 +158,7 @@ static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s,
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { thermal_heisenberg_PIECE = 2048 };
+enum { thermal_heisenberg_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t thermal_heisenberg_pieces(const thermal_heisenberg_solver *s)
@@ -757,7 +757,25 @@ thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define thermal_heisenberg_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define thermal_heisenberg_THREADS (size_t)omp_get_num_threads()
+#define thermal_heisenberg_THREAD (size_t)omp_get_thread_num()
+#define thermal_heisenberg_ONE_BY_ONE _Pragma("omp critical")
+#else
+#define thermal_heisenberg_PARALLEL
+#define thermal_heisenberg_THREADS (size_t)1
+#define thermal_heisenberg_THREAD (size_t)0
+#define thermal_heisenberg_ONE_BY_ONE
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t thermal_heisenberg_share(size_t units, size_t *first)
+{
+    const size_t threads = thermal_heisenberg_THREADS, own = thermal_heisenberg_THREAD,
+        each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
 
 enum {
     thermal_heisenberg_LEAD = (thermal_heisenberg_HALO + 7) / 8 * 8,
@@ -851,9 +869,9 @@ static void thermal_heisenberg_prepare_step(const thermal_heisenberg_params *par
 
 static int thermal_heisenberg_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
@@ -942,28 +960,6 @@ static void thermal_heisenberg_copy(double *const to[thermal_heisenberg_DIM],
 }
 
 /* ---- The stages ---- */
-#ifdef _OPENMP
-#define thermal_heisenberg_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define thermal_heisenberg_ONE_BY_ONE _Pragma("omp critical")
-#else
-#define thermal_heisenberg_PARALLEL
-#define thermal_heisenberg_ONE_BY_ONE
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t thermal_heisenberg_share(size_t units, size_t *first)
-{
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-#else
-    *first = 0;
-    return units;
-#endif
-}
-
 static double thermal_heisenberg_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y

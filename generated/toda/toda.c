@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 72a5a3a78a83a6c192687925b3dd0d209f42bb9930a36152c6de33052702b04b
+ * body-sha256: 98ce1e80d5a3c97b50c54350b669b94737e74c4435a3bdcfd6388028bab64da6
  */
 #include "toda.h"
 
@@ -111,7 +111,7 @@ static inline void toda_locate(const toda_solver *s, size_t index, toda_row *row
     row->length = s->length;
 }
 
-enum { toda_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { toda_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t toda_pieces(const toda_solver *s)
@@ -269,7 +269,33 @@ static void toda_vector_field_row(const toda_params *params, const toda_row *row
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define toda_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define toda_THREADS (size_t)omp_get_num_threads()
+#define toda_THREAD (size_t)omp_get_thread_num()
+#else
+#define toda_PARALLEL
+#define toda_THREADS (size_t)1
+#define toda_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t toda_share(size_t units, size_t *first)
+{
+    const size_t threads = toda_THREADS, own = toda_THREAD, each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void toda_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (toda_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     toda_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -327,9 +353,9 @@ static void toda_prepare_step(const toda_params *params, double h, double *coef)
 
 static int toda_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 toda_status toda_init(toda_solver *s, const toda_params *params, const size_t sizes[toda_AXES],
@@ -394,46 +420,48 @@ static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], 
 /* One part of H. */
 static void toda_sweep_part(const toda_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * toda_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = toda_share(s->rows * toda_pieces(s), &first);
     toda_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    toda_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void toda_flow(const toda_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} toda_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void toda_find_flow(const toda_solver *s, size_t steps, int number, toda_flow *flow)
 {
-    const int joined = flow == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[flow];
-    toda_sweep_part(s, toda_flow_parts[joined ? 0 : flow], s->coef + row * toda_ROW, s->far > 0);
+    const int joined = number == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[number];
+    flow->part = toda_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * toda_ROW;
+}
+
+static void toda_make_flow(const toda_solver *s, size_t steps, int number)
+{
+    toda_flow flow;
+    toda_find_flow(s, steps, number, &flow);
+    toda_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void toda_steps(const toda_solver *s, int steps)
+static void toda_steps(const toda_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    toda_PARALLEL
     {
-        if (steps == 0) toda_flow(s, toda_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            toda_flow(s, toda_FLOWS > 1 && (step > 0 || s->open) ? toda_FLOWS : 0);
-            for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_flow(s, flow);
+        if (steps == 0) toda_make_flow(s, s->steps - 1, toda_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            toda_make_flow(s, step, toda_FLOWS > 1 && (step > s->steps || s->open) ? toda_FLOWS : 0);
+            for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int toda_try(toda_solver *s, int steps)
+static int toda_try(toda_solver *s, size_t steps)
 {
     toda_steps(s, steps);
     if (toda_all_hold(s, s->x)) return 1;
@@ -449,7 +477,7 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (toda_try(s, (int)now)) {
+        if (toda_try(s, now)) {
             toda_copy(s->before, s->x, s);
             s->steps += now;
             s->open = toda_FLOWS > 1;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d13ebcfa0c2bbdf22ae6495f4aff0fc5d4cf39848f79d0b3d32a2de89f2726e2
+ * body-sha256: b33b49e92a5bc9edbe75d450bdcadbfa5f8f563f5bf93cb6a9bf909bbcc42329
  */
 #include "volterra.h"
 
@@ -140,7 +140,7 @@ static inline void volterra_locate(const volterra_solver *s, size_t index, volte
         row->colour = (int)((row->colour + place[a] * volterra_colours[a]) % volterra_COLOUR_COUNT);
 }
 
-enum { volterra_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { volterra_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t volterra_pieces(const volterra_solver *s)
@@ -291,7 +291,34 @@ static void volterra_vector_field_row(const volterra_params *params, const volte
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define volterra_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define volterra_THREADS (size_t)omp_get_num_threads()
+#define volterra_THREAD (size_t)omp_get_thread_num()
+#else
+#define volterra_PARALLEL
+#define volterra_THREADS (size_t)1
+#define volterra_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t volterra_share(size_t units, size_t *first)
+{
+    const size_t threads = volterra_THREADS, own = volterra_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void volterra_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (volterra_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     volterra_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -350,9 +377,9 @@ static void volterra_prepare_step(const volterra_params *params, double h, doubl
 
 static int volterra_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
@@ -419,46 +446,49 @@ static void volterra_copy(double *const to[volterra_DIM], double *const from[vol
 /* One part of H. */
 static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * volterra_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = volterra_share(s->rows * volterra_pieces(s), &first);
     volterra_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    volterra_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void volterra_flow(const volterra_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} volterra_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void volterra_find_flow(const volterra_solver *s, size_t steps, int number, volterra_flow *flow)
 {
-    const int joined = flow == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[flow];
-    volterra_sweep_part(s, volterra_flow_parts[joined ? 0 : flow], s->coef + row * volterra_ROW, s->far > 0);
+    const int joined = number == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[number];
+    flow->part = volterra_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * volterra_ROW;
+}
+
+static void volterra_make_flow(const volterra_solver *s, size_t steps, int number)
+{
+    volterra_flow flow;
+    volterra_find_flow(s, steps, number, &flow);
+    volterra_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void volterra_steps(const volterra_solver *s, int steps)
+static void volterra_steps(const volterra_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    volterra_PARALLEL
     {
-        if (steps == 0) volterra_flow(s, volterra_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            volterra_flow(s, volterra_FLOWS > 1 && (step > 0 || s->open) ? volterra_FLOWS : 0);
-            for (int flow = 1; flow < volterra_FLOWS - 1; ++flow) volterra_flow(s, flow);
+        if (steps == 0) volterra_make_flow(s, s->steps - 1, volterra_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            volterra_make_flow(s, step, volterra_FLOWS > 1 && (step > s->steps || s->open) ? volterra_FLOWS
+                : 0);
+            for (int flow = 1; flow < volterra_FLOWS - 1; ++flow) volterra_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int volterra_try(volterra_solver *s, int steps)
+static int volterra_try(volterra_solver *s, size_t steps)
 {
     volterra_steps(s, steps);
     if (volterra_all_hold(s, s->x)) return 1;
@@ -474,7 +504,7 @@ volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
     const size_t end = s->steps + steps;
     for (size_t stretch = volterra_STRETCH; s->steps < end && status == volterra_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (volterra_try(s, (int)now)) {
+        if (volterra_try(s, now)) {
             volterra_copy(s->before, s->x, s);
             s->steps += now;
             s->open = volterra_FLOWS > 1;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 2391edb6efc4bbb417bdaaf295c811e55cc6dae0ce07db383bfe89048882083b
+ * body-sha256: d26c704f4b2549f8af346e6b68ab2db51c4942009809148a177eb17b7224f779
  */
 #include "xxz_disorder.h"
 
@@ -119,7 +119,7 @@ static inline void xxz_disorder_locate(const xxz_disorder_solver *s, size_t inde
 }
 
 /* sites of a row that are worked at in one go, with any number of threads */
-enum { xxz_disorder_PIECE = 2048 };
+enum { xxz_disorder_PIECE = 1024 };
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
 static size_t xxz_disorder_pieces(const xxz_disorder_solver *s)
@@ -342,7 +342,34 @@ static void xxz_disorder_put_parameters(xxz_disorder_solver *s, const xxz_disord
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#define xxz_disorder_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#define xxz_disorder_THREADS (size_t)omp_get_num_threads()
+#define xxz_disorder_THREAD (size_t)omp_get_thread_num()
+#else
+#define xxz_disorder_PARALLEL
+#define xxz_disorder_THREADS (size_t)1
+#define xxz_disorder_THREAD (size_t)0
 #endif
+
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t xxz_disorder_share(size_t units, size_t *first)
+{
+    const size_t threads = xxz_disorder_THREADS, own = xxz_disorder_THREAD, each = units / threads,
+        more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+/* Until all threads are here. */
+static void xxz_disorder_wait(void)
+{
+#ifdef _OPENMP
+    /* of one thread, too, a barrier may ask the operating system to wake the others */
+    if (xxz_disorder_THREADS > 1) {
+#pragma omp barrier
+    }
+#endif
+}
 
 enum {
     xxz_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
@@ -413,9 +440,9 @@ static void xxz_disorder_prepare_step(const xxz_disorder_params *params, double 
 
 static int xxz_disorder_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder_params *params,
@@ -484,48 +511,51 @@ static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const 
 /* One part of H. */
 static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef, int far)
 {
-    const size_t units = s->rows * xxz_disorder_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = xxz_disorder_share(s->rows * xxz_disorder_pieces(s), &first);
     xxz_disorder_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    xxz_disorder_wait();
 }
 
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void xxz_disorder_flow(const xxz_disorder_solver *s, int flow)
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
+} xxz_disorder_flow;
+
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void xxz_disorder_find_flow(const xxz_disorder_solver *s, size_t steps, int number,
+    xxz_disorder_flow *flow)
 {
-    const int joined = flow == xxz_disorder_FLOWS, row = joined ? xxz_disorder_JOINED
-        : xxz_disorder_flow_rows[flow];
-    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[joined ? 0 : flow], s->coef + row * xxz_disorder_ROW,
-        s->far > 0);
+    const int joined = number == xxz_disorder_FLOWS, row = joined ? xxz_disorder_JOINED
+        : xxz_disorder_flow_rows[number];
+    flow->part = xxz_disorder_flow_parts[joined ? 0 : number];
+    (void)steps;
+    flow->coef = s->coef + row * xxz_disorder_ROW;
+}
+
+static void xxz_disorder_make_flow(const xxz_disorder_solver *s, size_t steps, int number)
+{
+    xxz_disorder_flow flow;
+    xxz_disorder_find_flow(s, steps, number, &flow);
+    xxz_disorder_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
-static void xxz_disorder_steps(const xxz_disorder_solver *s, int steps)
+static void xxz_disorder_steps(const xxz_disorder_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#pragma omp parallel if (s->sites > 4096)
-#endif
+    xxz_disorder_PARALLEL
     {
-        if (steps == 0) xxz_disorder_flow(s, xxz_disorder_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            xxz_disorder_flow(s, xxz_disorder_FLOWS > 1 && (step > 0 || s->open) ? xxz_disorder_FLOWS : 0);
-            for (int flow = 1; flow < xxz_disorder_FLOWS - 1; ++flow) xxz_disorder_flow(s, flow);
+        if (steps == 0) xxz_disorder_make_flow(s, s->steps - 1, xxz_disorder_FLOWS - 1);
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            xxz_disorder_make_flow(s, step, xxz_disorder_FLOWS > 1 && (step > s->steps || s->open)
+                ? xxz_disorder_FLOWS : 0);
+            for (int flow = 1; flow < xxz_disorder_FLOWS - 1; ++flow) xxz_disorder_make_flow(s, step, flow);
         }
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int xxz_disorder_try(xxz_disorder_solver *s, int steps)
+static int xxz_disorder_try(xxz_disorder_solver *s, size_t steps)
 {
     xxz_disorder_steps(s, steps);
     if (xxz_disorder_all_hold(s, s->x)) return 1;
@@ -541,7 +571,7 @@ xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, siz
     const size_t end = s->steps + steps;
     for (size_t stretch = xxz_disorder_STRETCH; s->steps < end && status == xxz_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
-        if (xxz_disorder_try(s, (int)now)) {
+        if (xxz_disorder_try(s, now)) {
             xxz_disorder_copy(s->before, s->x, s);
             s->steps += now;
             s->open = xxz_disorder_FLOWS > 1;

@@ -86,6 +86,9 @@ TEXTS = {
     "poisson: {brackets: {x: {y: 1/G}}}\nhamiltonian: {sites: G*(x**2 + 2*y**2), "
     'pairs: "-G[a]*G[b]*log(1 + (x[a] - x[b])**2 + (y[a] - y[b])**2)/2"}',
 }
+#: Neighbours of neighbours, along the axis that flows follow one another by.
+BEYOND = "phigen: 1\nname: beyond\norder: 2\nlattice: {axes: [i, j], boundary: periodic}\n"
+BEYOND += f'{CANONICAL}hamiltonian: "p**2/2 + q**2/2 - q*q[i+2]/3 - q*q[j+1]/4"\n'
 #: What is integrated by the series.
 SERIES = ("twisted", "dragged", "pond", "stretched", "tangle", "vortices")
 #: Of graphs: a triangle with two tails, a double bond, and a site of its own.
@@ -360,6 +363,18 @@ def test_long_rows_in_pieces_make_the_same_steps() -> None:
     x = start("xxz", (5000,))
     by = [solver("xxz", 2, t).integrate(x, 0.1, 3, 3).x[-1] for t in ("c", "numpy")]
     np.testing.assert_allclose(by[0], by[1], atol=1e-14)
+
+
+@pytest.mark.parametrize(("name", "sizes"), [("xxz", (104,)), ("volterra", (48,)), ("beyond", (10, 16))])
+def test_flows_that_are_made_at_once_make_the_steps_of_flow_after_flow(name: str, sizes: tuple[int, ...]) -> None:
+    """Copies of a lattice side by side, too large for that, move as it does alone, with any number of threads."""
+    order = 2 if name == "beyond" else 4
+    found = lattice_solver_of(compile_spec(specs.loads(BEYOND)), "c") if order == 2 else solver(name, order, "c")
+    x = np.abs(0.5 + 0.3 * np.random.default_rng(2).normal(size=(len(found.interface.coordinates), *sizes)))
+    alone = found.integrate(x, 0.05, 5, 5).x[-1]
+    copies = [1, 270_000 // alone.size, *[1] * (len(sizes) - 1)]
+    for together in with_threads(lambda: found.integrate(np.tile(x, copies), 0.05, 5, 5).x[-1]):
+        assert np.array_equal(together, np.tile(alone, copies))
 
 
 def test_frames_go_to_files(tmp_path: Any) -> None:

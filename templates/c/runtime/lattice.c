@@ -18,8 +18,45 @@
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#if PHI_PAIRS
+#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
+#else
+#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
+#endif
+#define PHI_THREADS (size_t)omp_get_num_threads()
+#define PHI_THREAD (size_t)omp_get_thread_num()
+#if PHI_SERIES
+#define PHI_ONE_BY_ONE _Pragma("omp critical")
+#endif
+#else
+#define PHI_PARALLEL
+#define PHI_THREADS (size_t)1
+#define PHI_THREAD (size_t)0
+#if PHI_SERIES
+#define PHI_ONE_BY_ONE
+#endif
 #endif
 
+/* The part of so many units that a thread works at, from *first on; returns its end. */
+static size_t phi_share(size_t units, size_t *first)
+{
+    const size_t threads = PHI_THREADS, own = PHI_THREAD, each = units / threads, more = units % threads;
+    *first = each * own + (own < more ? own : more);
+    return *first + each + (own < more);
+}
+
+#if !PHI_SERIES
+/* Until all threads are here. */
+static void phi_wait(void)
+{
+#ifdef _OPENMP
+    if (PHI_THREADS > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
+#pragma omp barrier
+    }
+#endif
+}
+
+#endif
 enum {
 #if !PHI_SERIES
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
@@ -192,9 +229,9 @@ static void phi_prepare_step(const phi_params *params, double h, double *coef)
 
 static int phi_finite(const double *values, size_t count)
 {
-    double zero = 0.0;
-    for (size_t k = 0; k < count; ++k) zero += 0.0 * values[k];
-    return zero == 0.0;
+    int finite = 1;
+    for (size_t k = 0; k < count; ++k) finite &= isfinite(values[k]) != 0;
+    return finite;
 }
 
 #if PHI_GRAPH

@@ -14,14 +14,7 @@ static void phi_sweep_colour(const phi_solver *s, int part, const double *coef, 
 static void phi_sweep_part(const phi_solver *s, int part, const double *coef, int far)
 #endif
 {
-    const size_t units = s->rows * phi_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t first = units / threads * own + (own < units % threads ? own : units % threads);
-    const size_t end = units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads);
-#else
-    const size_t first = 0, end = units;
-#endif
+    size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
 #if PHI_TANGENT
     for (size_t k = 0; k < s->vectors; ++k) { /* of what a part moves only the site itself is read: no thread need wait */
         double *v[PHI_DIM];
@@ -30,11 +23,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
     }
 #endif
     phi_sweep_rows(s, part, coef, far, first, end);
-#ifdef _OPENMP
-    if (threads > 1) { /* of one thread, too, a barrier may ask the operating system to wake the others */
-#pragma omp barrier
-    }
-#endif
+    phi_wait();
 }
 
 #if PHI_BY_COLOUR
@@ -54,85 +43,79 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef, in
 }
 
 #endif
+/* A part of H, and the coefficients of its flow. */
+typedef struct {
+    int part;
+    const double *coef;
 #if PHI_RENEWED
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void phi_flow(const phi_solver *s, size_t steps, int flow)
-{
-    const int joined = flow == PHI_FLOWS;
-    double coef[PHI_ROW];
-    phi_renew(s, joined ? PHI_JOINED : phi_flow_rows[flow], steps, coef);
-    phi_sweep_part(s, phi_flow_parts[joined ? 0 : flow], coef, s->far > 0);
-}
-
-#else
-/* The flow of that number in a step; after those of a step the last and the first together. */
-static void phi_flow(const phi_solver *s, int flow)
-{
-    const int joined = flow == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[flow];
-    phi_sweep_part(s, phi_flow_parts[joined ? 0 : flow], s->coef + row * PHI_ROW, s->far > 0);
-}
+    double own[PHI_ROW];
 #endif
+} phi_flow;
 
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void phi_find_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
+{
+    const int joined = number == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[number];
+    flow->part = phi_flow_parts[joined ? 0 : number];
+#if PHI_RENEWED
+    phi_renew(s, row, steps, flow->own);
+    flow->coef = flow->own;
+#else
+    (void)steps;
+    flow->coef = s->coef + row * PHI_ROW;
+#endif
+}
+
+static void phi_make_flow(const phi_solver *s, size_t steps, int number)
+{
+    phi_flow flow;
+    phi_find_flow(s, steps, number, &flow);
+    phi_sweep_part(s, flow.part, flow.coef, s->far > 0);
+}
+
+#if PHI_WAVES
+#include "lattice_waves.c"
+#endif
 #if PHI_NOISE
 /* The increments of a part of a step after so many, at all sites. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
-    const size_t units = s->rows * phi_pieces(s);
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    phi_draw_rows(s, steps, part, units / threads * own + (own < units % threads ? own : units % threads),
-        units / threads * (own + 1) + (own + 1 < units % threads ? own + 1 : units % threads));
-    if (threads > 1) {
-#pragma omp barrier
-    }
-#else
-    phi_draw_rows(s, steps, part, 0, units);
-#endif
+    size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+    phi_draw_rows(s, steps, part, first, end);
+    phi_wait();
 }
 
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
 #else
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 #endif
-static void phi_steps(const phi_solver *s, int steps)
+static void phi_steps(const phi_solver *s, size_t steps)
 {
-#ifdef _OPENMP
-#if PHI_PAIRS
-#pragma omp parallel if (s->sites > 512)
-#else
-#pragma omp parallel if (s->sites > 4096)
-#endif
-#endif
+    PHI_PARALLEL
     {
 #if PHI_NOISE
-        for (size_t step = s->steps; step < s->steps + (size_t)steps; ++step) {
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
             for (int flow = 0; flow < PHI_FLOWS; ++flow) {
                 if (flow == 0 || flow == PHI_FLOWS - PHI_SOURCES) phi_draw(s, step, flow > 0);
-#if PHI_RENEWED
-                phi_flow(s, step, flow);
-#else
-                phi_flow(s, flow);
-#endif
+                phi_make_flow(s, step, flow);
             }
         }
-#elif PHI_RENEWED
-        if (steps == 0) phi_flow(s, s->steps - 1, PHI_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + (size_t)steps; ++step) {
-            phi_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
-            for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_flow(s, step, flow);
-        }
 #else
-        if (steps == 0) phi_flow(s, PHI_FLOWS - 1);
-        for (int step = 0; step < steps; ++step) {
-            phi_flow(s, PHI_FLOWS > 1 && (step > 0 || s->open) ? PHI_FLOWS : 0);
-            for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_flow(s, flow);
+        if (steps == 0) phi_make_flow(s, s->steps - 1, PHI_FLOWS - 1);
+#if PHI_WAVES
+        phi_make_waves(s, steps);
+#else
+        for (size_t step = s->steps; step < s->steps + steps; ++step) {
+            phi_make_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
+            for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_make_flow(s, step, flow);
         }
+#endif
 #endif
     }
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
-static int phi_try(phi_solver *s, int steps)
+static int phi_try(phi_solver *s, size_t steps)
 {
     phi_steps(s, steps);
     if (phi_all_hold(s, s->x)) return 1;
@@ -164,7 +147,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NEAR
         if (s->far > 0 && s->far < now) now = s->far;
 #endif
-        if (phi_try(s, (int)now)) {
+        if (phi_try(s, now)) {
             phi_copy(s->before, s->x, s);
             s->steps += now;
 #if !PHI_NOISE

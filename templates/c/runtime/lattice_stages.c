@@ -8,32 +8,6 @@
 #include "sweeps.h"
 
 /* ---- The stages ---- */
-#ifdef _OPENMP
-#if PHI_PAIRS
-#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
-#else
-#define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#endif
-#define PHI_ONE_BY_ONE _Pragma("omp critical")
-#else
-#define PHI_PARALLEL
-#define PHI_ONE_BY_ONE
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t phi_share(size_t units, size_t *first)
-{
-#ifdef _OPENMP
-    const size_t threads = (size_t)omp_get_num_threads(), own = (size_t)omp_get_thread_num();
-    const size_t each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-#else
-    *first = 0;
-    return units;
-#endif
-}
-
 static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. */

@@ -149,7 +149,7 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #if PHI_GATHER
 enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 #else
-enum { PHI_PIECE = 2048 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { PHI_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
 #endif
 
 /* The pieces of a row; the last is the longest, so that no copied end reaches into another. */

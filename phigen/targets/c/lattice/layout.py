@@ -115,9 +115,16 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BANDED": banded,
         "KRYLOV": step.equation is not None and (not banded or program.extras.tangent),
         "BY_HAND": step.is_by_hand and program.offers("by-hand"),
+        "WAVES": waves(program, step),
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
+
+
+def waves(program: Program, step: Sweeps) -> bool:
+    """Whether several flows are made at once: of grids, where what a flow reads lies beside."""
+    split = step.equation is None and step.partners is None
+    return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 
 def bounds(weight: str) -> list[tuple[int, int]]:

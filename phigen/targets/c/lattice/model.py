@@ -99,6 +99,10 @@ def model(program: Program, step: Sweeps) -> str:
             ("FLOWS", len(flows), "in a step"),
             ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
         ]
+    if switches(program, step, layout)["WAVES"]:
+        far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
+        span = 1 if len(sites.axes) == 1 else max(1, *far)
+        constants += [("SPAN", span, "slices beside one that a flow reads: pieces of a row, or of the first axis")]
     constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * bool(layout.weights)
     if sites.colours > 1:
         constants += [("COLOUR_COUNT", sites.colours, "colours of sites")]

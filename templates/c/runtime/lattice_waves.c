@@ -1,0 +1,79 @@
+#ifndef PHI_FILE_LATTICE_WAVES
+#define PHI_FILE_LATTICE_WAVES
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "sweeps.h"
+
+/* ---- Several flows at once ---- */
+/* Where the fields do not fit into caches, several flows go over the lattice together, slice by slice, each so far behind the one
+   before it as that reads: so a slice is fetched once for all. Each thread has slices of its own. Beside their ends flow
+   k leaves k PHI_SPAN of them out, to be made when all threads have come so far. What a flow reads is what it reads where flows
+   are made one by one: the bits are the same. */
+enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
+
+/* The slices of the lattice, each of so many units: of one row its pieces. */
+static size_t phi_slices(const phi_solver *s, size_t *units)
+{
+#if PHI_ONE_ROW
+    *units = 1;
+    return phi_pieces(s);
+#else
+    *units = s->rows / s->sizes[0] * phi_pieces(s);
+    return s->sizes[0];
+#endif
+}
+
+/* How many flows are made at once. */
+static size_t phi_depth(const phi_solver *s)
+{
+    size_t units;
+    const size_t slices = phi_slices(s, &units), bytes = s->rows * (size_t)s->width * PHI_ARRAYS * sizeof(double);
+    const size_t held = PHI_CACHE / (bytes / slices) / PHI_SPAN, room = slices / PHI_THREADS / (2 * PHI_SPAN);
+    const size_t depth = held < room ? held : room;
+#if PHI_TANGENT
+    if (s->vectors > 0) return 1;
+#endif
+    if (bytes <= PHI_CACHE || depth < 2) return 1;
+    return depth < PHI_DEEPEST ? depth : PHI_DEEPEST;
+}
+
+static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t from, size_t to)
+{
+    size_t units;
+    (void)phi_slices(s, &units);
+    phi_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+}
+
+/* So many flows, one after the other. */
+static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t count)
+{
+    size_t units, from;
+    const size_t slices = phi_slices(s, &units), to = phi_share(slices, &from), next = to == slices ? 0 : to;
+    for (size_t front = from; front < to; ++front)
+        for (size_t k = 0; k < count && front >= from + 2 * k * PHI_SPAN; ++k)
+            phi_make_slices(s, flows + k, front - k * PHI_SPAN, front - k * PHI_SPAN + 1);
+    phi_wait();
+    for (size_t k = 1; k < count; ++k) {
+        phi_make_slices(s, flows + k, to - k * PHI_SPAN, to);
+        phi_make_slices(s, flows + k, next, next + k * PHI_SPAN);
+    }
+    phi_wait();
+}
+
+/* The flows of some steps, joined, without the last. */
+static void phi_make_waves(const phi_solver *s, size_t steps)
+{
+    const size_t each = PHI_FLOWS - 1, depth = phi_depth(s);
+    phi_flow flows[PHI_DEEPEST];
+    for (size_t done = 0; done < steps * each;) {
+        size_t count = 0;
+        for (; count < depth && done < steps * each; ++count, ++done) {
+            const int number = (int)(done % each), joined = number == 0 && (done > 0 || s->open);
+            phi_find_flow(s, s->steps + done / each, joined ? PHI_FLOWS : number, flows + count);
+        }
+        if (count > 1) phi_make_wave(s, flows, count);
+        else phi_sweep_part(s, flows->part, flows->coef, s->far > 0);
+    }
+}
+#endif
