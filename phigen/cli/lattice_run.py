@@ -58,7 +58,7 @@ def run_lattice(
     compilation = compilation_of(spec, order, extras, scheme=scheme)
     assert compilation.cell is not None
     start = start_of(spec, run)
-    parameters = _parameters(start, settings)
+    parameters = parameters_of(start, settings)
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
     kept = output.with_name(output.name + ".checkpoint") if output else None
     if kept and not resume:
@@ -132,7 +132,8 @@ def expect_no(**options: object) -> None:
             raise click.BadParameter(_ABSENT.format(option=f"--{name}"), param_hint=f"--{name}")
 
 
-def _parameters(start: Start, settings: Iterable[str]) -> dict[str, Any]:
+def parameters_of(start: Start, settings: Iterable[str]) -> dict[str, Any]:
+    """The parameters of a run, with those of the command line put in."""
     parameters: dict[str, Any] = dict(start.parameters)
     for setting in settings:
         name, _, text = (part.strip() for part in setting.partition("="))

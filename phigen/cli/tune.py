@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import prepared
+from phigen.cli.experiment import prepared, run_of
 from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option
 from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
 from phigen.errors import CheckError, SpecError
 
 if TYPE_CHECKING:
     from phigen.cli.experiment import Experiment
+    from phigen.compilation import Compilation
     from phigen.geometry.system import System
+    from phigen.spec.model import Run
     from phigen.tuning.problem import Problem
 
 
@@ -51,7 +53,7 @@ def command(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy.
+    """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy, of lattices too.
 
     Builds candidates, compiles them as C (without a compiler: as NumPy), measures error and time of each over a piece
     of a run of the spec, confirms the best over the whole horizon if that is affordable, and prints the lines to paste
@@ -74,21 +76,29 @@ def command(
     if spec.time:
         message = "phigen tune does not compare settings where H depends on the time"
         raise SpecError([spec.diagnostic(("time",), message, "phigen verify and phigen run measure what is chosen")])
-    experiment = prepared(spec, name, settings=settings)
+    if spec.forces and measure == "energy":
+        place = ("damping",) if ("damping",) in spec.locations else ("forces",)
+        message = "forces change the energy, whose error is none of the method"
+        raise SpecError([spec.diagnostic(place, message, "--measure orbit compares with a reference solution")])
+    run = run_of(spec, name)
+    experiment = None if spec.lattice else prepared(spec, name, settings=settings)
     compilation = compile_proved(spec)
     chosen_target("auto", console.note)
-    problem = problem_of(compilation.system, experiment, horizon)
+    if experiment:
+        run, problem = experiment.run, problem_of(compilation.system, experiment, horizon)
+    else:
+        problem = _of_lattice(console, compilation, run, settings, horizon, measure)
     found = tune(compilation, problem, measure, accuracy, budget, console.note)
     if as_json:
-        out_json(described(found, spec, experiment.run))
+        out_json(described(found, spec, run))
     elif found.winner:
-        print_tuning(found, spec, experiment.run)
+        print_tuning(found, spec, run)
     elif found.monitors:
-        print_monitors(found.monitors, found, experiment.run)
+        print_monitors(found.monitors, found, run)
     if plot:
         from phigen.drawing import figures
 
-        figures.save(figures.tuning_figure(found, f"{spec.name}, run {experiment.run.name}"), str(plot))
+        figures.save(figures.tuning_figure(found, f"{spec.name}, run {run.name}"), str(plot))
         console.note(f"wrote {plot}")
     if not found.winner:
         raise CheckError(unreached(found))
@@ -105,8 +115,35 @@ def problem_of(system: System, experiment: Experiment, horizon: float | None) ->
 
     from phigen.tuning.problem import Problem
 
-    run = experiment.run
+    start = np.array(experiment.initial)
+    return Problem(system, start, experiment.parameters, *_times(experiment.run, horizon))
+
+
+def _of_lattice(
+    console: Console, compilation: Compilation, run: Run, settings: tuple[str, ...], horizon: float | None, measure: str
+) -> Problem:
+    """The problem of a run of a lattice, on fewer sites where it has many."""
+    from phigen.cli.lattice_run import parameters_of
+    from phigen.lattice.states import start_of
+    from phigen.tuning.lattices import MOST_COMPARED, lattice_problem
+
+    changed = {s.partition("=")[0].strip() for s in settings}
+    values = parameters_of(start_of(compilation.spec, run), settings)
+    chosen = {name: value for name, value in values.items() if name in changed}
+    found = lattice_problem(compilation, run, chosen, *_times(run, horizon))
+    if found.sizes != found.whole:
+        few, many = ("×".join(map(str, sizes)) for sizes in (found.sizes, found.whole))
+        console.note(f"measured on {few} of the {many} sites: errors are relative, and times in proportion")
+    if measure == "orbit" and len(found.start) > MOST_COMPARED:
+        message = f"orbits are compared up to {MOST_COMPARED} numbers, and this run has {len(found.start)}"
+        raise SpecError(
+            [compilation.spec.diagnostic(("runs", run.name), message, "--measure energy, or smaller sizes")]
+        )
+    return found
+
+
+def _times(run: Run, horizon: float | None) -> tuple[float, float, float]:
+    """A first guess at the step, the time that a run takes, and its direction."""
     step = float(run.step)
     span = abs(step) * run.steps if horizon is None else horizon
-    start = np.array(experiment.initial)
-    return Problem(system, start, experiment.parameters, min(abs(step), span), span, math.copysign(1.0, step))
+    return min(abs(step), span), span, math.copysign(1.0, step)

@@ -127,11 +127,9 @@ def scheme_of(curve: Curve) -> str:
     """How the order is reached."""
     if curve.setting is None:
         return "explicit"
-    composition = curve.setting.composition
+    composition = curve.composition or curve.setting.composition
     if curve.stages == 0:
         return "exact flow"
-    if curve.setting.is_splitting:
-        composition = curve.composition
     return f"{composition}, {curve.stages} stages" if composition not in ("none", "auto") else "direct"
 
 
@@ -159,6 +157,9 @@ def remarks(found: Tuning) -> Iterator[str]:
             f"The orbit itself is off by {found.orbit_error:.1e} of its size at most up to t = {found.piece:.4g}: "
             "--measure orbit bounds that."
         )
+    if found.sizes:
+        sites = "×".join(map(str, found.sizes))
+        yield f"Measured on {sites} sites. Classical methods are in NumPy, with the vector field of the solver."
     for label, peer in ((p.curve.label, p) for p in found.peers if p.cost < best.cost):
         share = peer.cost / best.cost
         yield f"{label} is cheaper: {share:.2g} of the time. It keeps neither Casimirs nor the geometry of phase space."
@@ -200,7 +201,8 @@ def run_lines_of(found: Tuning, run: Run) -> list[str]:
     assert found.winner is not None
     step = found.winner.point.step
     steps = max(1, round(found.horizon / step))
-    return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // _ROWS)}"]
+    rows = max(1, run.steps // run.stride) if found.sizes else _ROWS  # states of lattices are large
+    return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // rows)}"]
 
 
 def unreached(found: Tuning) -> str:
@@ -230,6 +232,7 @@ def described(found: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
         "accuracy": found.accuracy,
         "unit": asdict(found.unit),
         "horizon": found.horizon,
+        **({"sizes": found.sizes} if found.sizes else {}),
         "scanned": found.piece,
         "finished": found.finished,
         "orbit_error": found.orbit_error,

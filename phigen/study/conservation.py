@@ -22,7 +22,7 @@ from phigen.symbolic.expression import Expression, gradient
 #: A value below this part of its terms counts as zero.
 SMALL = 1e-3
 
-RELATIVE, TERMS, ABSOLUTE = "relative", "of its terms", "absolute"
+RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
 
 #: The quantity that every system has.
 ENERGY = "energy"
@@ -35,7 +35,7 @@ def rounding(steps: int) -> float:
 
 @dataclass(frozen=True)
 class Unit:
-    """What errors of a quantity are divided by: ``size``, of the ``kind`` `RELATIVE`, `TERMS` or `ABSOLUTE`.
+    """What errors of a quantity are divided by: ``size``, of the ``kind`` `RELATIVE`, `TERMS`, `SITES` or `ABSOLUTE`.
 
     ``terms`` are those of the quantity at the start, which rounding is in proportion to, in this unit. ``moves`` tells
     that the quantity is no invariant, since time, forces or noise change it: what it differs by is no error.
@@ -105,8 +105,9 @@ def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapp
 
 def stated(found: Mapping[str, Unit]) -> str:
     """What errors are relative to, in a sentence; ``found`` are units by the names of quantities."""
-    said = ["relative to the value at the start"]
+    said = ["relative to the value at the start"] * any(unit.kind != SITES for unit in found.values())
     for kind, how in (
+        (SITES, "relative to the sum of the magnitudes of the energies of the sites at the start"),
         (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| there, since {0} is nearly 0"),
         (ABSOLUTE, "absolute, since {0} is 0 there"),
     ):

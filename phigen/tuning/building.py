@@ -24,7 +24,7 @@ from phigen.geometry.system import System
 from phigen.runtime import cache
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import Interface
-from phigen.scheme.steps import Splitting
+from phigen.scheme.steps import Splitting, Sweeps
 from phigen.spec.model import Spec
 from phigen.targets.header import split
 from phigen.tuning.settings import Setting
@@ -88,11 +88,12 @@ def built(compilation: Compilation, setting: Setting, start: float) -> Built:
     """A compilation, compiled as C where there is a compiler; ``start`` is when the work on it began."""
     program, target = compilation.program, chosen_target("auto")
     files = emit(program, target, f"phigen build {program.name}.yaml")
-    if target == "c":
-        cache.build(files)
     step = program.step
-    stages = step.schedule.stages if isinstance(step, Splitting) else len(program.fractions)
-    composition = step.composition if isinstance(step, Splitting) else ""
+    if target == "c":
+        cache.build(files, threads=isinstance(step, Sweeps))
+    flows = step.schedule if isinstance(step, Splitting) or (isinstance(step, Sweeps) and not step.equation) else None
+    stages = flows.stages if flows else len(program.fractions)
+    composition = step.composition if isinstance(step, Splitting | Sweeps) else ""
     return Built(
         setting, files, interface_of(program), compilation.label, program.order, compilation.exact,
         compilation.symmetric, bool(program.gauge), stages, composition,

@@ -34,10 +34,10 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.numeric import DomainError
 from phigen.tuning.building import Built, Refusal, build_all
-from phigen.tuning.problem import Problem
+from phigen.tuning.problem import ROWS, Problem
 from phigen.tuning.scales import MOST_TURN, fastest_rate
 from phigen.tuning.settings import SPLITTING, Setting
-from phigen.tuning.trials import ROUNDING, ROWS
+from phigen.tuning.trials import ROUNDING
 
 #: Monitors are of use where the greatest speed is so many times the median one.
 UNEVEN = 3.0

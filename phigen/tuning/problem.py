@@ -2,40 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
+from phigen.api import chosen_target, solver_of
+from phigen.compilation import Compilation
 from phigen.geometry.system import System
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import BackendError, row_steps
 from phigen.runtime.session import rows_along
+from phigen.study import race
 from phigen.study.conservation import Unit, units
-from phigen.study.race import Runner
 from phigen.symbolic.arrays import Floats, evaluate
+from phigen.tuning.settings import Setting, charts
+
+#: States at which the energy of one run is looked at, at most.
+ROWS = 8_000
 
 
 @dataclass(frozen=True)
 class Problem:
     """What is solved: the numbers of a run, and for how long. ``step`` is that of the run, a first guess.
 
-    Steps and times are positive here; ``direction`` is −1 for a run back in time.
+    Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice.
     """
 
     system: System
     start: Floats
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, Any]
     step: float
     horizon: float
     direction: float = 1.0
+    sizes: tuple[int, ...] = ()
 
     @property
     def unit(self) -> Unit:
         """What errors of the energy are counted in."""
         (found,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
         return found
+
+    @property
+    def most_rows(self) -> int:
+        """States at which the energy of one run is looked at, at most."""
+        return ROWS
+
+    @property
+    def evens_out(self) -> bool:
+        """Whether monitors may be tried, which make uneven motion even."""
+        return not self.system.driven
+
+    def method(self, solver: Backend) -> Candidate:
+        """A solver as a method."""
+        return Candidate(solver, self)
+
+    def guesses(self, own: Setting) -> list[Setting]:
+        """Settings to begin with."""
+        return charts(self.system, own)
+
+    def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
+        """Classical methods from a ``state`` that may change, in C where there is a compiler."""
+        target = chosen_target("auto")
+        if target == "c":
+            return race.compiled(compilation, names, state, self.parameters)
+        return race.interpreted(solver_of(compilation, target), names, state, self.parameters)
 
     def energies(self, states: Floats) -> Floats:
         """H of states (rows, DIM)."""
@@ -90,7 +122,7 @@ class Candidate:
 class Classical:
     """A classical method in compiled C as a method; ``state`` is where its runner starts."""
 
-    runner: Runner
+    runner: race.Runner
     state: Floats
     problem: Problem
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from phigen.compilation import Compilation
 from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson
 from phigen.geometry.system import System
+from phigen.lattice.series import SeriesPlan
 from phigen.scheme import choosing
 from phigen.scheme.composition import COMPOSITIONS
 from phigen.spec import limits
@@ -25,8 +26,8 @@ ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 SPLITTING = "splitting"
 
 #: Kinds that need formulas of the user, and those with choices of their own.
-_FORMULAS = ("custom", "group-map", "spray")
-_CHOICES = ("auto", "canonical-euler", "product", "pullback")
+FORMULAS = ("custom", "group-map", "spray")
+CHOICES = ("auto", "canonical-euler", "product", "pullback")
 _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("pullback", "cayley"))
 
 
@@ -113,12 +114,24 @@ def own_setting(compilation: Compilation) -> Setting:
     """What a spec says now, in the words of what it was compiled to."""
     spec, realisation, order = compilation.spec, compilation.realisation, compilation.order.order
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
+    if isinstance(compilation.sweeps, SeriesPlan):
+        return _of_series(spec, compilation.sweeps, order)
     if realisation is None:
         return Setting(SPLITTING, order, gauge, spec.composition)
     choice = spec.birealisation
-    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in _FORMULAS
+    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in FORMULAS
     composed = len(compilation.program.fractions) > 1
     return Setting(realisation.kind if plain else OWN, order, gauge, spec.composition if composed else "none")
+
+
+def _of_series(spec: Spec, plan: SeriesPlan, order: int) -> Setting:
+    """That of a lattice, whose series has order 2, and is composed for others."""
+    composition = "auto" if spec.composition == "none" else spec.composition
+    if plan.realisation.site is None:
+        return Setting("auto", order, OWN, composition)
+    choice, kind = spec.birealisation, plan.realisation.kind
+    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in FORMULAS
+    return Setting(kind if plain else OWN, order, OWN, composition)
 
 
 def charts(system: System, own: Setting) -> list[Setting]:
@@ -128,7 +141,7 @@ def charts(system: System, own: Setting) -> list[Setting]:
     maps are those of a closed form. Which of the others apply, building them shows.
     """
     linear = isinstance(system.shape, Constant | Canonical | LiePoisson | Affine)
-    plain = [kind for kind in BIREALISATIONS if kind not in (*_FORMULAS, *_CHOICES)]
+    plain = [kind for kind in BIREALISATIONS if kind not in (*FORMULAS, *CHOICES)]
     named = [Setting(kind, 4) for kind in plain if not (kind == "karasev" and linear)]
     nested = [Setting(kind, 4, of=of) for kind, of in _NESTED]
     # The other side is the adjoint, whose errors are the same in reversed time.
@@ -141,13 +154,13 @@ def charts(system: System, own: Setting) -> list[Setting]:
 
 def direct(setting: Setting) -> str:
     """The composition of the plain methods of its kind."""
-    return "auto" if setting.is_splitting else "none"
+    return "auto" if setting.is_splitting or setting.composition == "auto" else "none"
 
 
 def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
     """The same bi-realisation at about the same order otherwise: without gauge, or composed."""
     found = [replace(best, gauge="none")] if gauged else []
-    if symmetric and not best.is_splitting:
+    if symmetric and direct(best) == "none":
         recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}
         order = max((k for k in recommended if k <= best.order), default=min(recommended))
         found.append(replace(best, composition=recommended[order], order=order))

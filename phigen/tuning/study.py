@@ -12,11 +12,11 @@ from phigen.compilation import Compilation
 from phigen.study.conservation import Unit
 from phigen.tuning import search
 from phigen.tuning.monitors import Monitors, candidates, compare, is_uneven, settings
-from phigen.tuning.problem import Candidate, Problem, steps_in
+from phigen.tuning.problem import ROWS, Candidate, Problem, steps_in
 from phigen.tuning.search import Curve
 from phigen.tuning.settings import Setting
 from phigen.tuning.timing import nanoseconds_per_step
-from phigen.tuning.trials import ROWS, Point
+from phigen.tuning.trials import Point
 from phigen.tuning.tuner import Clock, Notify, Tuner
 
 #: The share of the budget that one confirming run may take, how many times as much if it must, the attempts at a step.
@@ -55,7 +55,7 @@ class Tuning:
     ``horizon``. ``refused`` tells why other candidates were not measured; ``finished`` whether no more seemed worth
     trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
     ``unit`` is what errors of the energy are counted in; ``monitors`` what monitors would gain, where the spec has none
-    and the motion is fast at times.
+    and the motion is fast at times. ``sizes`` are those of the lattice that was measured, nothing of other systems.
     """
 
     measure: str
@@ -72,6 +72,7 @@ class Tuning:
     orbit_error: float | None = None
     unit: Unit = field(default_factory=Unit)
     monitors: Monitors | None = None
+    sizes: tuple[int, ...] = ()
 
     @property
     def winner(self) -> Finalist | None:
@@ -111,7 +112,7 @@ def tune(
         next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
         {s: why for s, why in tuner.refused.items() if why}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
-        monitored(tuner, own),
+        monitored(tuner, own), problem.sizes,
     )  # fmt: skip
 
 
@@ -119,7 +120,7 @@ def monitored(tuner: Tuner, own: Curve) -> Monitors | None:
     """What monitors gain over the time of a scan; None where that is not asked, as the motion is even."""
     compilation, problem = tuner.compilation, tuner.problem
     spec, system, setting = compilation.spec, compilation.system, own.setting
-    if spec.monitor is not None or system.driven or setting is None:
+    if spec.monitor is not None or not problem.evens_out or setting is None:
         return None
     h = min(p.step for p in own.points)
     states = tuner.methods[setting].rows(h, steps_in(tuner.piece, h), max(1, steps_in(tuner.piece, h) // ROWS))

@@ -12,8 +12,8 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Method, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: States at which the energy of one run is looked at, at most; and times at which an orbit is compared.
-ROWS, MARKS = 8_000, 256
+#: Times at which an orbit is compared.
+MARKS = 256
 #: One rounding moves the energy by about this much, relatively; over n steps they add up like a random walk.
 ROUNDING = 1.1e-16
 #: Errors that grow faster than this power of time are those of chaotic motion; and slower than that they are linear,
@@ -66,7 +66,7 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
 
     def measure(method: Method, h: float, span: float) -> Point | None:
         steps = steps_in(span, h)
-        stride = max(1, steps // ROWS)
+        stride = max(1, steps // problem.most_rows)
         states = method.rows(h, steps, stride)
         if states is None:
             return None

@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from phigen.api import chosen_target, solver_of
 from phigen.compilation import Compilation
 from phigen.errors import CheckError, StepError
 from phigen.study import race
@@ -17,7 +16,7 @@ from phigen.tuning.problem import Candidate, Classical, Method, Problem, steps_i
 from phigen.tuning.references import Reference, agreed, orbit_error
 from phigen.tuning.scales import scales
 from phigen.tuning.search import Curve
-from phigen.tuning.settings import SPLITTING, Setting, charts, direct, own_setting
+from phigen.tuning.settings import SPLITTING, Setting, direct, own_setting
 from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, orbit_measure
 
 #: The share of the budget after which nothing more is built, that which one round of building may take, that which a
@@ -50,7 +49,7 @@ class Tuner:
     """The state of a search. ``measures`` maps True to the measure of Poisson maps, False to that of other methods.
 
     ``piece`` is the time over which candidates are scanned, ``most`` the largest step that is of use, ``referring``
-    whether orbits are compared with a reference; ``target`` is C where there is a compiler.
+    whether orbits are compared with a reference.
     """
 
     def __init__(
@@ -63,7 +62,6 @@ class Tuner:
     ) -> None:
         self.compilation, self.problem, self.accuracy = compilation, problem, accuracy
         self.clock, self.note = clock, note
-        self.target = chosen_target("auto")
         self.tried: dict[Setting, Curve] = {}
         self.refused: dict[Setting, str] = {}
         self.methods: dict[Setting | str, Method] = {}
@@ -83,7 +81,7 @@ class Tuner:
         compilation = self.compilation
         setting = own_setting(compilation)
         made = built(compilation, setting, time.perf_counter() - sum(compilation.seconds.values()))
-        method = Candidate(made.solver(), self.problem)
+        method = self.problem.method(made.solver())
         self.piece, self.most = scales(self.problem, method)
         if measure == "orbit":
             self._refer(setting, method)
@@ -95,7 +93,7 @@ class Tuner:
     def search(self, own: Curve) -> bool:
         """Try candidates until none promises more, True, or the time is up."""
         assert own.setting is not None
-        guesses = charts(self.compilation.system, own.setting)
+        guesses = self.problem.guesses(own.setting)
         limit = GUESSING * self.clock.budget
         wanted = [s for s in guesses if expected_seconds(s, [own]) < limit]
         while wanted and self.clock.left(SEARCHING) > 0:
@@ -123,8 +121,9 @@ class Tuner:
             return []
         found = []
         for name, (label, order) in PEERS.items():
-            label = f"{label} in {'C' if self.target == 'c' else 'Python'}"
-            self.methods[label] = self._classical(name)
+            method = self._classical(name)
+            label = f"{label} in {self._raced.language}"
+            self.methods[label] = method
             points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, bounded=False)
             found.append(Curve(label, order, points, bounded=False))
         return found
@@ -146,7 +145,7 @@ class Tuner:
             elif outcome.fingerprint in self._known:
                 self.refused[setting] = ""
             else:
-                curve = self.add(outcome, Candidate(outcome.solver(), self.problem), WORTH * self.least)
+                curve = self.add(outcome, self.problem.method(outcome.solver()), WORTH * self.least)
                 cost = curve.cost(self.accuracy)
                 told = f"{1e-6 * cost * self.problem.horizon:.3g} ms" if math.isfinite(cost) else "not reached"
                 self.note(f"{curve.title}: {told}")
@@ -184,15 +183,15 @@ class Tuner:
             lambda: time.perf_counter() < until,
         )  # fmt: skip
 
-    def _classical(self, name: str) -> Classical:
+    @property
+    def _raced(self) -> race.Race:
+        """The classical methods, made when they are first asked for."""
         if self._race is None:
-            parameters = self.problem.parameters
-            if self.target == "c":
-                self._race = race.compiled(self.compilation, list(PEERS), self._state, parameters)
-            else:
-                solver = solver_of(self.compilation, self.target)
-                self._race = race.interpreted(solver, list(PEERS), self._state, parameters)
-        return Classical(self._race.runners[name], self._state, self.problem)
+            self._race = self.problem.classical(self.compilation, list(PEERS), self._state)
+        return self._race
+
+    def _classical(self, name: str) -> Classical:
+        return Classical(self._raced.runners[name], self._state, self.problem)
 
     def _refer(self, setting: Setting, method: Candidate) -> None:
         """Measure orbits from now on: against a solver of higher order, where there is one, confirmed by DOP853."""
@@ -203,7 +202,7 @@ class Tuner:
             outcomes = build_all(self.compilation.spec, self.compilation.system, others, until)
             self._made |= {s: outcome for s, outcome in outcomes if isinstance(outcome, Built)}
             known = [self._made[s] for s in others if s in self._made]
-            method = Candidate(known[-1].solver(), problem) if known else method
+            method = problem.method(known[-1].solver()) if known else method
         reference = self._reference(method)
         self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over t = 0 … {self.piece:.6g}")
         self.referring = True
@@ -254,13 +253,16 @@ def _expect_linear(measure: Measure, method: Method, problem: Problem, piece: fl
 
 
 def expected_seconds(setting: Setting, tried: Iterable[Curve]) -> float:
-    """How long building may take, from lower orders of the same family: it grows like a power of the order; else 0."""
+    """How long building may take, from lower orders of the same family: it grows like a power of the order; else 0.
+
+    The code of compositions is of one length, but for the table of their stages.
+    """
     known = sorted((c.order, c.seconds) for c in tried if c.setting and c.setting.family == setting.family)
     below = [(order, seconds) for order, seconds in known if order < setting.order]
     if not below:
         return 0.0
     order, seconds = below[-1]
-    growth = 2.0
-    if len(below) > 1:
+    growth = 2.0 if setting.composition == "none" else 1.0
+    if len(below) > 1 and growth > 1:
         growth = min(max((seconds / below[-2][1]) ** (2 / (order - below[-2][0])), 1.5), 8.0)
     return seconds * math.pow(growth, (setting.order - order) / 2)

@@ -106,7 +106,7 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
 
 @pytest.mark.parametrize(
     "command",
-    [["verify", "--plot", "a.svg"], ["tune"], ["run", "--until", "2"]],
+    [["verify", "--plot", "a.svg"], ["run", "--until", "2"]],
 )
 def test_what_lattices_do_not_have_is_refused(phigen, chain, command):
     done = phigen(*command, chain)

@@ -87,3 +87,52 @@ def test_without_compiler_numpy_is_timed(phigen, without_compiler):
     found = json.loads(done.stdout)
     assert found["winner"]["error"] <= 1e-8
     assert {c["method"] for c in found["classical"]} <= {"RK4 in Python", "DOP853 in Python"}
+
+
+CHAIN = """phigen: 1
+name: chain
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+parameters: {a: 0.5, m: {value: 1 + i/N_i, at: sites, positive: true}}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: "p**2/(2*m) + (q[i+1] - q)**2/2 + a*q**4/4"
+order: 2
+runs:
+  wave:
+    sizes: [24]
+    initial: {q: sin(2*pi*i/N_i), p: 0}
+    step: 0.05
+    steps: 2000
+    stride: 100
+"""
+
+
+def test_lattices_are_tuned_by_the_same_search(phigen, in_tmp):
+    Path("chain.yaml").write_text(CHAIN, encoding="utf-8")
+    asked = ["--accuracy", "1e-6", "--horizon", "40", "--budget", "1", "--json"]
+    done = phigen("tune", "chain.yaml", *asked)
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    best = found["winner"]
+    assert found["sizes"] == [24]
+    assert found["unit"]["kind"] == "of its sites"
+    assert best["error"] <= 1e-6
+    assert best["seconds_per_unit_time"] <= 1.1 * min(f["seconds_per_unit_time"] for f in found["finalists"])
+    Path("chain.yaml").write_text(paste(CHAIN, found), encoding="utf-8")
+    run = json.loads(phigen("run", "chain.yaml", "--json").stdout)
+    assert (run["step"], run["order"], run["frames"] // 10) == (best["step"], best["order"], 2)
+    assert run["errors"]["energy"] == pytest.approx(best["measured_error"], rel=0.5)
+
+
+REFUSED = {
+    "noise: {kick: {hamiltonian: q, amplitude: 0.1}}": "where there is noise",
+    "damping: 0.1": "--measure orbit",
+    "time: t": "where H depends on the time",
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_what_has_no_error_of_the_energy_is_not_tuned_by_it(phigen, in_tmp, line):
+    Path("chain.yaml").write_text(CHAIN.replace("order: 2", line), encoding="utf-8")
+    done = phigen("tune", "chain.yaml")
+    assert (done.exit_code, REFUSED[line] in done.stderr) == (1, True)

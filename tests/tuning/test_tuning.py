@@ -179,6 +179,8 @@ def test_expected_time_of_building_grows_as_that_of_lower_orders_did():
     curves = [Curve("cayley", k, (), Setting("cayley", k), seconds=s) for k, s in ((4, 1.0), (6, 4.0))]
     assert expected_seconds(Setting("cayley", 8), curves) == pytest.approx(16.0)
     assert expected_seconds(Setting("exponential", 8), curves) == 0.0
+    split = [Curve("splitting", 4, (), Setting(SPLITTING, 4, composition="auto"), seconds=3.0)]
+    assert expected_seconds(Setting(SPLITTING, 8, composition="auto"), split) == 3.0
 
 
 def test_of_equally_cheap_methods_the_lowest_order_comes_first():

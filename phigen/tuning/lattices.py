@@ -1,0 +1,197 @@
+"""Lattices of one size as problems like any other: states are flat, and methods are those of their solvers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from phigen.api import lattice_solver_of
+from phigen.compilation import Compilation
+from phigen.errors import SpecError
+from phigen.lattice.cell import GRID, Cell
+from phigen.lattice.states import Start, start_of
+from phigen.runtime.lattice import LatticeBackend, LatticeSession
+from phigen.spec.model import Run, Spec
+from phigen.spec.names import BIREALISATIONS
+from phigen.study import classical, race
+from phigen.study.conservation import SITES, Unit
+from phigen.symbolic.arrays import Floats
+from phigen.tuning.problem import Candidate, Problem
+from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct
+
+#: Sites above which a smaller grid of the same kind is measured.
+MOST_SITES = 10_000
+#: Numbers of states that are looked at in one run, at most, and of one that is compared with a reference.
+MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
+
+
+@dataclass
+class FlatSession:
+    """A lattice on its way whose states are flat. See `phigen.runtime.session.Course`."""
+
+    session: LatticeSession
+
+    @property
+    def steps(self) -> int:
+        """Good steps since the start."""
+        return self.session.steps
+
+    def state(self) -> Floats:
+        """A copy of the state (DIM,)."""
+        return self.session.state().reshape(-1)
+
+    def advance(self, h: float, steps: int) -> None:
+        """Make so many steps."""
+        self.session.advance(h, steps)
+
+    def branch(self) -> FlatSession:
+        """Nobody asks a lattice for that."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class FlatLattice:
+    """The solver of a lattice of one size as one of so many numbers. See `phigen.runtime.backend.Backend`."""
+
+    backend: LatticeBackend
+    shape: tuple[int, ...]
+    _seen: list[LatticeSession] = field(default_factory=list)
+
+    def start(self, x0: Floats, parameters: Mapping[str, Any]) -> FlatSession:
+        """A session at x0 (DIM,)."""
+        return FlatSession(self.backend.start(x0.reshape(self.shape), parameters))
+
+    def vector_field(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
+        """The right-hand side at states (rows, DIM)."""
+        return np.array([self._at(x, parameters).vector_field().reshape(-1) for x in states])
+
+    def energies(self, states: Floats, parameters: Mapping[str, Any]) -> Floats:
+        """H of states (rows, DIM)."""
+        return np.array([self._at(x, parameters).hamiltonian() for x in states])
+
+    def unit(self, x: Floats, parameters: Mapping[str, Any]) -> float:
+        """The sum of the magnitudes of the energies of the sites."""
+        return float(np.abs(self._at(x, parameters).density()).sum())
+
+    def _at(self, x: Floats, parameters: Mapping[str, Any]) -> LatticeSession:
+        """One session for all that is looked at, of one problem."""
+        state = x.reshape(self.shape)
+        if not self._seen:
+            self._seen.append(self.backend.start(state, parameters))
+            return self._seen[0]
+        try:
+            self._seen[0].place(state)
+        except TypeError:  # profile small
+            return self.backend.start(state, parameters)
+        return self._seen[0]
+
+
+@dataclass(frozen=True)
+class LatticeProblem(Problem):
+    """A lattice of some sizes, whose parameters have arrays over sites and bonds; ``seer`` knows its energies.
+
+    ``whole`` are the sizes of the run, where a smaller one stands for it.
+    """
+
+    cell: Cell = field(kw_only=True)
+    whole: tuple[int, ...] = field(kw_only=True)
+    seer: FlatLattice = field(kw_only=True)
+
+    @property
+    def unit(self) -> Unit:
+        """What errors of the energy are counted in."""
+        return Unit(self.seer.unit(self.start, self.parameters) or 1.0, SITES)
+
+    @property
+    def most_rows(self) -> int:
+        """Their energies need them in memory."""
+        return min(super().most_rows, max(64, MOST_NUMBERS // len(self.start)))
+
+    @property
+    def evens_out(self) -> bool:
+        """Monitors are not for lattices."""
+        return False
+
+    def energies(self, states: Floats) -> Floats:
+        """H of states (rows, DIM); those that are not finite have none."""
+        finite = np.isfinite(states).all(axis=1)
+        found = np.full(len(states), np.nan)
+        found[finite] = self.seer.energies(states[finite], self.parameters)
+        return found
+
+    def method(self, solver: Any) -> Candidate:
+        """A solver as a method."""
+        flat: Any = FlatLattice(solver, self.seer.shape)
+        return Candidate(flat, self)
+
+    def guesses(self, own: Setting) -> list[Setting]:
+        """Splittings, and the series with each bi-realisation that might apply at a site."""
+        local = self.cell.is_local
+        kinds = [k for k in BIREALISATIONS if k not in (*FORMULAS, *CHOICES, "karasev")] if local else ["auto"]
+        split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
+        first = [replace(own, order=order, composition=direct(own)) for order in (2, 4)]
+        others = [*split, *(Setting(kind, 4, OWN, "auto") for kind in kinds)]
+        return [s for s in (*first, *(s for s in others if s.chart != own.chart)) if s != own]
+
+    def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
+        """Classical methods in NumPy, on the vector field of the solver."""
+
+        def slope(x: Floats) -> Floats:
+            found: Floats = self.seer.vector_field(x[None], self.parameters)[0]
+            return found
+
+        def runner(name: str) -> race.Runner:
+            def run(h: float, steps: int, repeats: int) -> Floats | None:
+                for _ in range(repeats):
+                    found: Floats = classical.integrate(name, slope, state, h, steps, steps)[-1]
+                return found if np.isfinite(found).all() else None
+
+            return run
+
+        return race.Race({name: runner(name) for name in names}, lambda repeats: None, "NumPy")
+
+
+def lattice_problem(
+    compilation: Compilation, run: Run, settings: Mapping[str, float], step: float, span: float, direction: float
+) -> LatticeProblem:
+    """The problem of a run with some parameters changed; of one with many sites on a smaller grid, where one can begin.
+
+    Raises `SpecError` where the run cannot begin at all.
+    """
+    spec, cell = compilation.spec, compilation.cell
+    assert cell is not None
+    solver = lattice_solver_of(compilation)
+    start = start_of(spec, run)
+    about = solver.interface
+    few = _fewer(start.sizes, about.least, about.periods) if cell.relation == GRID else start.sizes
+    found = start if few == start.sizes else _begun(spec, run, few) or start
+    flat = FlatLattice(solver.backend, found.state.shape)
+    values = solver.values({**found.arguments, **settings}, {}, found.sizes)
+    return LatticeProblem(
+        compilation.system, found.state.reshape(-1), values, step, span, direction, found.sizes,
+        cell=cell, whole=start.sizes, seer=flat,
+    )  # fmt: skip
+
+
+def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -> tuple[int, ...]:
+    """The sizes, the largest halved again and again while there are too many sites."""
+    found = list(sizes)
+    while np.prod(found) > MOST_SITES:
+        axis = int(np.argmax(found))
+        half = -(-found[axis] // 2 // periods[axis]) * periods[axis]
+        if half < max(least[axis], 4) or half >= found[axis]:
+            break
+        found[axis] = half
+    return tuple(found)
+
+
+def _begun(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:
+    """A run with other sizes; None where its arrays are those of its own."""
+    assert run.lattice is not None
+    try:
+        return start_of(spec, replace(run, lattice=replace(run.lattice, sizes=sizes)))
+    except SpecError:
+        return None

@@ -1,0 +1,112 @@
+"""Lattices as problems of `phigen tune`: the same searches, on flat states."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from phigen import spec as specs
+from phigen.api import lattice_solver_of
+from phigen.compiler import compile_spec
+from phigen.tuning import lattices
+from phigen.tuning.building import Built, build
+from phigen.tuning.problem import Classical
+from phigen.tuning.scales import fastest_rate
+from phigen.tuning.settings import OWN, SPLITTING, Setting, own_setting
+from phigen.tuning.trials import energy_measure
+
+CHAIN = """phigen: 1
+name: chain
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+parameters: {m: {value: 1 + i/N_i, at: sites, positive: true}, a: 0.5}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: "p**2/(2*m) + (q[i+1] - q)**2/2 + a*q**4/4"
+order: 4
+runs: {wave: {sizes: [24], initial: {q: sin(2*pi*i/N_i), p: 0}, step: 0.05, steps: 2000}}
+"""
+KDV = """phigen: 1
+name: kdv
+lattice: {axes: [i], boundary: periodic}
+coordinates: [u]
+poisson: {brackets: {u: {"u[i+1]": 1/2}}}
+hamiltonian: -u**3/6 + (u[i+1] - u)**2/2
+scheme: series
+order: 4
+"""
+
+
+@pytest.fixture(autouse=True)
+def in_numpy(monkeypatch):
+    monkeypatch.setattr(lattices, "lattice_solver_of", lambda made: lattice_solver_of(made, "numpy"))
+    monkeypatch.setattr("phigen.tuning.building.chosen_target", lambda target: "numpy")
+
+
+@cache
+def compiled():
+    return compile_spec(specs.loads(CHAIN))
+
+
+def problem(sizes=(24,), **settings):
+    run = compiled().spec.runs["wave"]
+    run = replace(run, lattice=replace(run.lattice, sizes=sizes))
+    return lattices.lattice_problem(compiled(), run, settings, 0.05, 10.0, 1.0)
+
+
+def candidate(found):
+    return found.method(lattice_solver_of(compiled(), "numpy").backend)
+
+
+def test_errors_of_the_energy_fall_with_the_order_in_units_of_the_sites():
+    found = problem()
+    coarse, fine = (energy_measure(found)(candidate(found), h, 10.0).measured for h in (0.2, 0.1))
+    assert np.log2(coarse / fine) == pytest.approx(4, abs=0.5)
+    x = found.start.reshape(2, 24)
+    density = lattice_solver_of(compiled(), "numpy").density(x, parameters=found.parameters)
+    assert found.unit.size == pytest.approx(np.abs(density).sum())
+    assert problem(a=0.7).parameters["a"] == 0.7
+
+
+def test_classical_methods_follow_the_same_motion():
+    found = problem()
+    given = found.start.copy()
+    raced = found.classical(compiled(), ["rk4", "dop853"], given)
+    ours = candidate(found).rows(0.02, 50, 50)[-1]
+    theirs = [Classical(raced.runners[name], given, found).rows(0.02, 50, 50)[-1] for name in ("rk4", "dop853")]
+    assert np.abs(theirs[1] - ours).max() < 1e-7 < np.abs(found.start - ours).max()
+    assert np.abs(theirs[0] - theirs[1]).max() < 1e-7
+
+
+def test_the_fastest_rate_of_many_sites_is_found_without_all_eigenvalues():
+    omega = np.linspace(0.1, 3.0, 200)
+    x = np.zeros((1, 400))
+
+    def field(states):
+        q, p = states[:, :200], states[:, 200:]
+        return np.hstack([omega * p, -omega * q])
+
+    assert fastest_rate(field, x) == pytest.approx(3.0, rel=0.15)
+
+
+def test_large_grids_are_measured_on_fewer_sites_where_their_start_is_known():
+    found = problem((60_000,))
+    assert found.whole == (60_000,)
+    assert found.sizes[0] <= lattices.MOST_SITES
+    assert found.start.reshape(2, -1).shape[1] == found.sizes[0]
+    assert found.most_rows * len(found.start) <= 1.1 * lattices.MOST_NUMBERS
+
+
+def test_settings_of_lattices_mean_what_is_built():
+    own, made = own_setting(compiled()), None
+    assert own.is_splitting
+    assert {s.kind for s in problem().guesses(own)} >= {"constant", "cayley", SPLITTING}
+    for setting in (Setting(SPLITTING, 6, "none", "auto"), Setting("constant", 6, OWN, "auto")):
+        made = build(compiled().spec, None, setting)
+        assert isinstance(made, Built)
+        assert (made.order, made.stages > 1, made.exact) == (6, True, True)
+        lines = "\n".join(setting.lines())
+        again = compile_spec(specs.loads(CHAIN.replace("order: 4\n", f"{lines}\n")))
+        assert (again.label, again.order.order) == (made.kind, 6)
+    series = own_setting(compile_spec(specs.loads(KDV)))
+    assert (series.kind, series.composition, series.lines()[0]) == ("auto", "auto", "scheme: series")
