@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 20d4fd78654581213b175ab884ed726633c9d3f8b014239f4eb31b192696b73a
+ * body-sha256: c28ea29f6a4e314b822969ff50da983562d000df93446a99cee92ae84666bd8f
  */
 #include "ablowitz_ladik.h"
 
@@ -120,10 +120,11 @@ static inline void ablowitz_ladik_locate(const ablowitz_ladik_solver *s, size_t 
     row->length = s->length;
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { ablowitz_ladik_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t ablowitz_ladik_pieces(const ablowitz_ladik_solver *s)
 {
     return s->length < 2 * ablowitz_ladik_PIECE ? 1 : (size_t)s->length / ablowitz_ladik_PIECE;
@@ -137,12 +138,10 @@ typedef struct {
 /* The piece of that number. */
 static inline ablowitz_ladik_piece ablowitz_ladik_piece_of(const ablowitz_ladik_solver *s, size_t unit)
 {
-    const size_t pieces = ablowitz_ladik_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     ablowitz_ladik_piece piece;
-    ablowitz_ladik_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * ablowitz_ladik_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + ablowitz_ladik_PIECE;
+    ablowitz_ladik_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * ablowitz_ladik_PIECE;
+    piece.to = unit == ablowitz_ladik_pieces(s) - 1 ? s->length : piece.from + ablowitz_ladik_PIECE;
     return piece;
 }
 
@@ -390,20 +389,29 @@ static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrd
             rows *= sizes[a];
         }
     }
-    size_t wide = ablowitz_ladik_LEAD + (sizes[ablowitz_ladik_AXES - 1] + ablowitz_ladik_HALO + 7) / 8 * 8;
+    size_t wide = ablowitz_ladik_LEAD + ((sizes[ablowitz_ladik_AXES - 1] + 7) / 8 * 8 + ablowitz_ladik_HALO
+        + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t ablowitz_ladik_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / ablowitz_ladik_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
-    const size_t doubles = ablowitz_ladik_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + ablowitz_ladik_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = ablowitz_ladik_RESERVED * ablowitz_ladik_block(rows, width);
+    return doubles * sizeof(double) + rows * ablowitz_ladik_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -454,7 +462,7 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + ablowitz_ladik_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = ablowitz_ladik_block(rows, width);
     double *end = aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

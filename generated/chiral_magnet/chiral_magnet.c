@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 46ab3ecadbd440bb541b181a929b96595fa254f2a65d87c90fb601a1ed4cc5b3
+ * body-sha256: 5711f8ab22334c366c741621475131b6b81a8460ae6fe5d077278b411fd6c6e7
  */
 #include "chiral_magnet.h"
 
@@ -134,7 +134,8 @@ static inline void chiral_magnet_locate(const chiral_magnet_solver *s, size_t in
 
 enum { chiral_magnet_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t chiral_magnet_pieces(const chiral_magnet_solver *s)
 {
     return s->length < 2 * chiral_magnet_PIECE ? 1 : (size_t)s->length / chiral_magnet_PIECE;
@@ -148,12 +149,10 @@ typedef struct {
 /* The piece of that number. */
 static inline chiral_magnet_piece chiral_magnet_piece_of(const chiral_magnet_solver *s, size_t unit)
 {
-    const size_t pieces = chiral_magnet_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     chiral_magnet_piece piece;
-    chiral_magnet_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * chiral_magnet_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + chiral_magnet_PIECE;
+    chiral_magnet_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * chiral_magnet_PIECE;
+    piece.to = unit == chiral_magnet_pieces(s) - 1 ? s->length : piece.from + chiral_magnet_PIECE;
     return piece;
 }
 
@@ -844,21 +843,29 @@ static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdif
             rows *= sizes[a];
         }
     }
-    size_t wide = chiral_magnet_LEAD + (sizes[chiral_magnet_AXES - 1] + chiral_magnet_HALO + 7) / 8 * 8;
+    size_t wide = chiral_magnet_LEAD + ((sizes[chiral_magnet_AXES - 1] + 7) / 8 * 8 + chiral_magnet_HALO + 7)
+        / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t chiral_magnet_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / chiral_magnet_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bonds)
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : chiral_magnet_shape(sizes, &width);
-    const size_t doubles = chiral_magnet_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + chiral_magnet_LINES * sizeof(ptrdiff_t);
     if (rows == 0 || !chiral_magnet_few(sizes[0], bonds)) return 0;
-    return row + chiral_magnet_graph_size(sizes[0], bonds) + 128;
+    size_t doubles = chiral_magnet_RESERVED * chiral_magnet_block(rows, width);
+    return doubles * sizeof(double) + chiral_magnet_graph_size(sizes[0], bonds) + 128;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -911,7 +918,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + chiral_magnet_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = chiral_magnet_block(rows, width);
     double *end = aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

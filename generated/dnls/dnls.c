@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 120362fb8b96210b27f3dd4c124c3e500737a4593fb906741f76bd7981504892
+ * body-sha256: 0e4af5c1f1ba6d9f23a66c93167f289cacf94f2df2ff75a9dc17e56434903acb
  */
 #include "dnls.h"
 
@@ -115,9 +115,11 @@ static inline void dnls_locate(const dnls_solver *s, size_t index, dnls_row *row
     row->length = s->length;
 }
 
-enum { dnls_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
+enum { dnls_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t dnls_pieces(const dnls_solver *s)
 {
     return s->length < 2 * dnls_PIECE ? 1 : (size_t)s->length / dnls_PIECE;
@@ -131,12 +133,10 @@ typedef struct {
 /* The piece of that number. */
 static inline dnls_piece dnls_piece_of(const dnls_solver *s, size_t unit)
 {
-    const size_t pieces = dnls_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     dnls_piece piece;
-    dnls_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * dnls_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + dnls_PIECE;
+    dnls_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * dnls_PIECE;
+    piece.to = unit == dnls_pieces(s) - 1 ? s->length : piece.from + dnls_PIECE;
     return piece;
 }
 
@@ -342,20 +342,28 @@ static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
             rows *= sizes[a];
         }
     }
-    size_t wide = dnls_LEAD + (sizes[dnls_AXES - 1] + dnls_HALO + 7) / 8 * 8;
+    size_t wide = dnls_LEAD + ((sizes[dnls_AXES - 1] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t dnls_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / dnls_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
-    const size_t doubles = dnls_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + dnls_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = dnls_RESERVED * dnls_block(rows, width);
+    return doubles * sizeof(double) + rows * dnls_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -404,7 +412,7 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = dnls_block(rows, width);
     double *end = aligned - dnls_LEAD + dnls_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

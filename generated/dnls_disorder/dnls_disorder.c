@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: c64c8c2f559d1dcc9e94de7b247f539194ebb259ba3023dfd120792160f52ffe
+ * body-sha256: abd10887abadfafdf4382a3dfc8706f478b12e416bea22555ea256e81f02e6fc
  */
 #include "dnls_disorder.h"
 
@@ -150,10 +150,11 @@ static inline void dnls_disorder_locate(const dnls_disorder_solver *s, size_t in
     }
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { dnls_disorder_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t dnls_disorder_pieces(const dnls_disorder_solver *s)
 {
     return s->length < 2 * dnls_disorder_PIECE ? 1 : (size_t)s->length / dnls_disorder_PIECE;
@@ -167,12 +168,10 @@ typedef struct {
 /* The piece of that number. */
 static inline dnls_disorder_piece dnls_disorder_piece_of(const dnls_disorder_solver *s, size_t unit)
 {
-    const size_t pieces = dnls_disorder_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     dnls_disorder_piece piece;
-    dnls_disorder_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * dnls_disorder_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + dnls_disorder_PIECE;
+    dnls_disorder_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * dnls_disorder_PIECE;
+    piece.to = unit == dnls_disorder_pieces(s) - 1 ? s->length : piece.from + dnls_disorder_PIECE;
     return piece;
 }
 
@@ -404,20 +403,29 @@ static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdif
             rows *= sizes[a];
         }
     }
-    size_t wide = dnls_disorder_LEAD + (sizes[dnls_disorder_AXES - 1] + dnls_disorder_HALO + 7) / 8 * 8;
+    size_t wide = dnls_disorder_LEAD + ((sizes[dnls_disorder_AXES - 1] + 7) / 8 * 8 + dnls_disorder_HALO + 7)
+        / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t dnls_disorder_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / dnls_disorder_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
-    const size_t doubles = dnls_disorder_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + dnls_disorder_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = dnls_disorder_RESERVED * dnls_disorder_block(rows, width);
+    return doubles * sizeof(double) + rows * dnls_disorder_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -480,7 +488,7 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + dnls_disorder_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = dnls_disorder_block(rows, width);
     double *end = aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 7303f3a8563654f75c8a1908b116f858f617ec6d3247a11fddc606ab5c43906f
+ * body-sha256: a835997f274a6716f8f9d90cb56023c8a3d9f25c9f2857ad3c20ff5154bae75d
  */
 #include "food_web.h"
 
@@ -136,7 +136,8 @@ static inline void food_web_locate(const food_web_solver *s, size_t index, food_
 
 enum { food_web_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t food_web_pieces(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
@@ -150,12 +151,10 @@ typedef struct {
 /* The piece of that number. */
 static inline food_web_piece food_web_piece_of(const food_web_solver *s, size_t unit)
 {
-    const size_t pieces = food_web_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     food_web_piece piece;
-    food_web_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * food_web_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + food_web_PIECE;
+    food_web_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * food_web_PIECE;
+    piece.to = unit == food_web_pieces(s) - 1 ? s->length : piece.from + food_web_PIECE;
     return piece;
 }
 
@@ -525,21 +524,28 @@ static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width
             rows *= sizes[a];
         }
     }
-    size_t wide = food_web_LEAD + (sizes[food_web_AXES - 1] + food_web_HALO + 7) / 8 * 8;
+    size_t wide = food_web_LEAD + ((sizes[food_web_AXES - 1] + 7) / 8 * 8 + food_web_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t food_web_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / food_web_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : food_web_shape(sizes, &width);
-    const size_t doubles = food_web_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + food_web_LINES * sizeof(ptrdiff_t);
     if (rows == 0 || !food_web_few(sizes[0], bonds)) return 0;
-    return row + food_web_graph_size(sizes[0], bonds) + 128;
+    size_t doubles = food_web_RESERVED * food_web_block(rows, width);
+    return doubles * sizeof(double) + food_web_graph_size(sizes[0], bonds) + 128;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -602,7 +608,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + food_web_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = food_web_block(rows, width);
     double *end = aligned - food_web_LEAD + food_web_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -23,7 +23,7 @@
  *   6. Several flows at once
  *   7. What is seen at sites
  *   8. Steps by hand
- * body-sha256: ac425f160ca5aa54fccb21bec596343268a40883c5ede5611c00e100d697cf23
+ * body-sha256: dcab33f682036c7781cddb1e9070fad22647db3748ab3db4e577b1e4ad4e3733
  */
 #include "fput.h"
 
@@ -120,9 +120,11 @@ static inline void fput_locate(const fput_solver *s, size_t index, fput_row *row
     row->length = s->length;
 }
 
-enum { fput_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
+enum { fput_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t fput_pieces(const fput_solver *s)
 {
     return s->length < 2 * fput_PIECE ? 1 : (size_t)s->length / fput_PIECE;
@@ -136,12 +138,10 @@ typedef struct {
 /* The piece of that number. */
 static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
 {
-    const size_t pieces = fput_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     fput_piece piece;
-    fput_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * fput_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + fput_PIECE;
+    fput_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * fput_PIECE;
+    piece.to = unit == fput_pieces(s) - 1 ? s->length : piece.from + fput_PIECE;
     if (piece.from < s->from) piece.from = s->from;
     if (piece.to > s->to) piece.to = s->to;
     return piece;
@@ -304,20 +304,28 @@ static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
             rows *= sizes[a];
         }
     }
-    size_t wide = fput_LEAD + (sizes[fput_AXES - 1] + fput_HALO + 7) / 8 * 8;
+    size_t wide = fput_LEAD + ((sizes[fput_AXES - 1] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t fput_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / fput_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t fput_work_size(const size_t sizes[fput_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
-    const size_t doubles = fput_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + fput_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = fput_RESERVED * fput_block(rows, width);
+    return doubles * sizeof(double) + rows * fput_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -367,7 +375,7 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = fput_block(rows, width);
     double *end = aligned - fput_LEAD + fput_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -23,7 +23,7 @@
  *   6. Several flows at once
  *   7. What is seen at sites
  *   8. Steps by hand
- * body-sha256: cf024e22cf0bd12e83dab8ee844947a175062ff9d3b095774e52fe1a8f6e3063
+ * body-sha256: ec14eb5340fe12287b9c7427da4c284e7b4542dde1239c4e0efcf07afa785dfb
  */
 #include "heisenberg.h"
 
@@ -133,29 +133,31 @@ static inline void heisenberg_locate(const heisenberg_solver *s, size_t index, h
     row->length = s->length;
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { heisenberg_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t heisenberg_pieces(const heisenberg_solver *s)
 {
-    return s->length < 2 * heisenberg_PIECE ? 1 : (size_t)s->length / heisenberg_PIECE;
+    (void)s;
+    return 1;
 }
 
 typedef struct {
     heisenberg_row row;
     ptrdiff_t from, to;
+    ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
 } heisenberg_piece;
 
 /* The piece of that number. */
 static inline heisenberg_piece heisenberg_piece_of(const heisenberg_solver *s, size_t unit)
 {
-    const size_t pieces = heisenberg_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     heisenberg_piece piece;
-    heisenberg_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * heisenberg_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + heisenberg_PIECE;
+    heisenberg_locate(s, unit, &piece.row);
+    piece.from = 0;
+    piece.to = s->length;
+    piece.wide = (s->length + 7) & ~(ptrdiff_t)7;
     return piece;
 }
 
@@ -366,37 +368,85 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
     }
 }
 
+/* The flow of H_1, for large arguments of functions, for the pieces of rows from first on, before end. */
+static void heisenberg_rows1_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end; ++unit) {
+        const heisenberg_piece at = heisenberg_piece_of(s, unit);
+        heisenberg_sweep1_far(coef, &at.row, at.from, at.wide);
+        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+    }
+}
+
+/* The flow of H_1, for the pieces of rows from first on, before end. */
+static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end; ++unit) {
+        const heisenberg_piece at = heisenberg_piece_of(s, unit);
+        heisenberg_sweep1_near(coef, &at.row, at.from, at.wide);
+        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+    }
+}
+
+/* The flow of H_2, for large arguments of functions, for the pieces of rows from first on, before end. */
+static void heisenberg_rows2_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end; ++unit) {
+        const heisenberg_piece at = heisenberg_piece_of(s, unit);
+        heisenberg_sweep2_far(coef, &at.row, at.from, at.wide);
+        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+    }
+}
+
+/* The flow of H_2, for the pieces of rows from first on, before end. */
+static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end; ++unit) {
+        const heisenberg_piece at = heisenberg_piece_of(s, unit);
+        heisenberg_sweep2_near(coef, &at.row, at.from, at.wide);
+        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+    }
+}
+
+/* The flow of H_3, for large arguments of functions, for the pieces of rows from first on, before end. */
+static void heisenberg_rows3_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end; ++unit) {
+        const heisenberg_piece at = heisenberg_piece_of(s, unit);
+        heisenberg_sweep3_far(coef, &at.row, at.from, at.wide);
+        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    }
+}
+
+/* The flow of H_3, for the pieces of rows from first on, before end. */
+static void heisenberg_rows3_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end; ++unit) {
+        const heisenberg_piece at = heisenberg_piece_of(s, unit);
+        heisenberg_sweep3_near(coef, &at.row, at.from, at.wide);
+        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+    }
+}
+
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
 static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const double *coef, int far,
     size_t first, size_t end)
 {
     switch (part) {
     case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const heisenberg_piece at = heisenberg_piece_of(s, unit);
-            if (far) heisenberg_sweep1_far(coef, &at.row, at.from, at.to);
-            else heisenberg_sweep1_near(coef, &at.row, at.from, at.to);
-            heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-            heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-        }
+        (far ? heisenberg_rows1_far : heisenberg_rows1_near)(s, coef, first, end);
         break;
     case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const heisenberg_piece at = heisenberg_piece_of(s, unit);
-            if (far) heisenberg_sweep2_far(coef, &at.row, at.from, at.to);
-            else heisenberg_sweep2_near(coef, &at.row, at.from, at.to);
-            heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-        }
+        (far ? heisenberg_rows2_far : heisenberg_rows2_near)(s, coef, first, end);
         break;
     default: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const heisenberg_piece at = heisenberg_piece_of(s, unit);
-            if (far) heisenberg_sweep3_far(coef, &at.row, at.from, at.to);
-            else heisenberg_sweep3_near(coef, &at.row, at.from, at.to);
-            heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
+        (far ? heisenberg_rows3_far : heisenberg_rows3_near)(s, coef, first, end);
         break;
     }
 }
@@ -542,20 +592,28 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
             rows *= sizes[a];
         }
     }
-    size_t wide = heisenberg_LEAD + (sizes[heisenberg_AXES - 1] + heisenberg_HALO + 7) / 8 * 8;
+    size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t heisenberg_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / heisenberg_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : heisenberg_shape(sizes, &width);
-    const size_t doubles = heisenberg_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + heisenberg_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = heisenberg_RESERVED * heisenberg_block(rows, width);
+    return doubles * sizeof(double) + rows * heisenberg_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -639,7 +697,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = heisenberg_block(rows, width);
     double *end = aligned - heisenberg_LEAD + heisenberg_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
@@ -722,7 +780,7 @@ enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 }; /* flows at once; 
 /* The slices of the lattice, each of so many units: of one row its pieces. */
 static size_t heisenberg_slices(const heisenberg_solver *s, size_t *units)
 {
-    *units = s->rows / s->sizes[0] * heisenberg_pieces(s);
+    *units = s->rows / s->sizes[0];
     return s->sizes[0];
 }
 

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: a73411eb17e76e1304102ad3d5fcc6e0623590450e406f5508c1596122f141e1
+ * body-sha256: 5945b85911c7ed2920d0aeea30c006e29fc090f07844f37945c3c70562e1e958
  */
 #include "heisenberg_plane.h"
 
@@ -154,29 +154,31 @@ static inline void heisenberg_plane_locate(const heisenberg_plane_solver *s, siz
     }
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { heisenberg_plane_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t heisenberg_plane_pieces(const heisenberg_plane_solver *s)
 {
-    return s->length < 2 * heisenberg_plane_PIECE ? 1 : (size_t)s->length / heisenberg_plane_PIECE;
+    (void)s;
+    return 1;
 }
 
 typedef struct {
     heisenberg_plane_row row;
     ptrdiff_t from, to;
+    ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
 } heisenberg_plane_piece;
 
 /* The piece of that number. */
 static inline heisenberg_plane_piece heisenberg_plane_piece_of(const heisenberg_plane_solver *s, size_t unit)
 {
-    const size_t pieces = heisenberg_plane_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     heisenberg_plane_piece piece;
-    heisenberg_plane_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * heisenberg_plane_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + heisenberg_plane_PIECE;
+    heisenberg_plane_locate(s, unit, &piece.row);
+    piece.from = 0;
+    piece.to = s->length;
+    piece.wide = (s->length + 7) & ~(ptrdiff_t)7;
     return piece;
 }
 
@@ -300,7 +302,7 @@ static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int pa
     case 1: /* H_1 */
         for (size_t unit = first; unit < end; ++unit) {
             const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-            heisenberg_plane_sweep1(coef, &at.row, at.from, at.to);
+            heisenberg_plane_sweep1(coef, &at.row, at.from, at.wide);
             heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
             heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
         }
@@ -308,7 +310,7 @@ static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int pa
     case 2: /* H_2 */
         for (size_t unit = first; unit < end; ++unit) {
             const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-            heisenberg_plane_sweep2(coef, &at.row, at.from, at.to);
+            heisenberg_plane_sweep2(coef, &at.row, at.from, at.wide);
             heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
         }
@@ -316,7 +318,7 @@ static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int pa
     default: /* H_3 */
         for (size_t unit = first; unit < end; ++unit) {
             const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-            heisenberg_plane_sweep3(coef, &at.row, at.from, at.to);
+            heisenberg_plane_sweep3(coef, &at.row, at.from, at.wide);
             heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
         }
@@ -446,21 +448,29 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
             rows *= sizes[a];
         }
     }
-    size_t wide = heisenberg_plane_LEAD + (sizes[heisenberg_plane_AXES - 1] + heisenberg_plane_HALO + 7) / 8
-        * 8;
+    size_t wide = heisenberg_plane_LEAD + ((sizes[heisenberg_plane_AXES - 1] + 7) / 8 * 8
+        + heisenberg_plane_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t heisenberg_plane_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / heisenberg_plane_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : heisenberg_plane_shape(sizes, &width);
-    const size_t doubles = heisenberg_plane_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + heisenberg_plane_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = heisenberg_plane_RESERVED * heisenberg_plane_block(rows, width);
+    return doubles * sizeof(double) + rows * heisenberg_plane_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -535,7 +545,7 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + heisenberg_plane_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = heisenberg_plane_block(rows, width);
     double *end = aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     for (size_t r = 0; r < rows; ++r)

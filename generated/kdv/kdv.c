@@ -23,7 +23,7 @@
  *   6. Elimination in a band
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: 15ebe598370a5bb1c555a5dc6a9bf8ed9cab26232c3440188bd55a24855adf5b
+ * body-sha256: d3fdac7edfb4a64ab2d660ea959a6bf4c846a8c2939603acd8af80511fa09931
  */
 #include "kdv.h"
 
@@ -118,9 +118,11 @@ static inline void kdv_locate(const kdv_solver *s, size_t index, kdv_row *row)
     row->start = row->out = s->x;
 }
 
-enum { kdv_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
+enum { kdv_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t kdv_pieces(const kdv_solver *s)
 {
     return s->length < 2 * kdv_PIECE ? 1 : (size_t)s->length / kdv_PIECE;
@@ -134,12 +136,10 @@ typedef struct {
 /* The piece of that number. */
 static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
 {
-    const size_t pieces = kdv_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     kdv_piece piece;
-    kdv_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * kdv_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + kdv_PIECE;
+    kdv_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * kdv_PIECE;
+    piece.to = unit == kdv_pieces(s) - 1 ? s->length : piece.from + kdv_PIECE;
     return piece;
 }
 
@@ -395,22 +395,30 @@ static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
             rows *= sizes[a];
         }
     }
-    size_t wide = kdv_LEAD + (sizes[kdv_AXES - 1] + kdv_HALO + 7) / 8 * 8;
+    size_t wide = kdv_LEAD + ((sizes[kdv_AXES - 1] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t kdv_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / kdv_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t kdv_work_size(const size_t sizes[kdv_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : kdv_shape(sizes, &width);
-    const size_t doubles = kdv_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + kdv_LINES * sizeof(ptrdiff_t);
+    if (rows == 0) return 0;
+    size_t doubles = kdv_RESERVED * kdv_block(rows, width);
     kdv_matrix matrix;
-    const size_t more = rows == 0 ? 0 : kdv_matrix_of(sizes[0], NULL, &matrix) * sizeof(double);
-    return rows == 0 ? 0 : rows * row + more + 64;
+    doubles += kdv_matrix_of(sizes[0], NULL, &matrix);
+    return doubles * sizeof(double) + rows * kdv_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -470,7 +478,7 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + kdv_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = kdv_block(rows, width);
     double *end = aligned - kdv_LEAD + kdv_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 22b6d7970c2d6c5dd731b87ec5ed32e0c8b6dc9f0d4642f40aa5917776739d22
+ * body-sha256: 776d70ffccf62196519cf139ee75828e61fcf4524292464525b25067065ec28b
  */
 #include "klein_gordon.h"
 
@@ -114,10 +114,11 @@ static inline void klein_gordon_locate(const klein_gordon_solver *s, size_t inde
     row->length = s->length;
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { klein_gordon_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t klein_gordon_pieces(const klein_gordon_solver *s)
 {
     return s->length < 2 * klein_gordon_PIECE ? 1 : (size_t)s->length / klein_gordon_PIECE;
@@ -131,12 +132,10 @@ typedef struct {
 /* The piece of that number. */
 static inline klein_gordon_piece klein_gordon_piece_of(const klein_gordon_solver *s, size_t unit)
 {
-    const size_t pieces = klein_gordon_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     klein_gordon_piece piece;
-    klein_gordon_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * klein_gordon_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + klein_gordon_PIECE;
+    klein_gordon_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * klein_gordon_PIECE;
+    piece.to = unit == klein_gordon_pieces(s) - 1 ? s->length : piece.from + klein_gordon_PIECE;
     return piece;
 }
 
@@ -292,20 +291,29 @@ static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_
             rows *= sizes[a];
         }
     }
-    size_t wide = klein_gordon_LEAD + (sizes[klein_gordon_AXES - 1] + klein_gordon_HALO + 7) / 8 * 8;
+    size_t wide = klein_gordon_LEAD + ((sizes[klein_gordon_AXES - 1] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8
+        * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t klein_gordon_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / klein_gordon_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
-    const size_t doubles = klein_gordon_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + klein_gordon_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = klein_gordon_RESERVED * klein_gordon_block(rows, width);
+    return doubles * sizeof(double) + rows * klein_gordon_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -355,7 +363,7 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = klein_gordon_block(rows, width);
     double *end = aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3271e2cfaf90ddc1124d712265f4cd516fc6fd3aed792759006f9dbacfbceab3
+ * body-sha256: 61944e6cbcd9edbf692a8976247dc2cfbb934ea39423bb5430b3dcd1babcf2ed
  */
 #include "nonlinear_wave.h"
 
@@ -118,10 +118,11 @@ static inline void nonlinear_wave_locate(const nonlinear_wave_solver *s, size_t 
     row->length = s->length;
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { nonlinear_wave_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t nonlinear_wave_pieces(const nonlinear_wave_solver *s)
 {
     return s->length < 2 * nonlinear_wave_PIECE ? 1 : (size_t)s->length / nonlinear_wave_PIECE;
@@ -135,12 +136,10 @@ typedef struct {
 /* The piece of that number. */
 static inline nonlinear_wave_piece nonlinear_wave_piece_of(const nonlinear_wave_solver *s, size_t unit)
 {
-    const size_t pieces = nonlinear_wave_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     nonlinear_wave_piece piece;
-    nonlinear_wave_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * nonlinear_wave_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + nonlinear_wave_PIECE;
+    nonlinear_wave_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * nonlinear_wave_PIECE;
+    piece.to = unit == nonlinear_wave_pieces(s) - 1 ? s->length : piece.from + nonlinear_wave_PIECE;
     return piece;
 }
 
@@ -299,20 +298,29 @@ static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrd
             rows *= sizes[a];
         }
     }
-    size_t wide = nonlinear_wave_LEAD + (sizes[nonlinear_wave_AXES - 1] + nonlinear_wave_HALO + 7) / 8 * 8;
+    size_t wide = nonlinear_wave_LEAD + ((sizes[nonlinear_wave_AXES - 1] + 7) / 8 * 8 + nonlinear_wave_HALO
+        + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t nonlinear_wave_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / nonlinear_wave_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
-    const size_t doubles = nonlinear_wave_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + nonlinear_wave_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = nonlinear_wave_RESERVED * nonlinear_wave_block(rows, width);
+    return doubles * sizeof(double) + rows * nonlinear_wave_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -363,7 +371,7 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + nonlinear_wave_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = nonlinear_wave_block(rows, width);
     double *end = aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 45e5f34f1a96370f72a29811b90a592c336b0efa9a714fef422aba6dce0d993d
+ * body-sha256: eada05aee50f80c78462fd0a9f944b6250a3f71a61b9081942597b5d83d0100b
  */
 #include "outer_planets.h"
 
@@ -117,7 +117,8 @@ static inline void outer_planets_locate(const outer_planets_solver *s, size_t in
 
 enum { outer_planets_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t outer_planets_pieces(const outer_planets_solver *s)
 {
     return s->length < 2 * outer_planets_PIECE ? 1 : (size_t)s->length / outer_planets_PIECE;
@@ -131,12 +132,10 @@ typedef struct {
 /* The piece of that number. */
 static inline outer_planets_piece outer_planets_piece_of(const outer_planets_solver *s, size_t unit)
 {
-    const size_t pieces = outer_planets_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     outer_planets_piece piece;
-    outer_planets_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * outer_planets_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + outer_planets_PIECE;
+    outer_planets_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * outer_planets_PIECE;
+    piece.to = unit == outer_planets_pieces(s) - 1 ? s->length : piece.from + outer_planets_PIECE;
     return piece;
 }
 
@@ -407,20 +406,29 @@ static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdif
             rows *= sizes[a];
         }
     }
-    size_t wide = outer_planets_LEAD + (sizes[outer_planets_AXES - 1] + outer_planets_HALO + 7) / 8 * 8;
+    size_t wide = outer_planets_LEAD + ((sizes[outer_planets_AXES - 1] + 7) / 8 * 8 + outer_planets_HALO + 7)
+        / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t outer_planets_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / outer_planets_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : outer_planets_shape(sizes, &width);
-    const size_t doubles = outer_planets_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + outer_planets_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = outer_planets_RESERVED * outer_planets_block(rows, width);
+    return doubles * sizeof(double) + rows * outer_planets_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -483,7 +491,7 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + outer_planets_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = outer_planets_block(rows, width);
     double *end = aligned - outer_planets_LEAD + outer_planets_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

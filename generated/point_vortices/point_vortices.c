@@ -24,7 +24,7 @@
  *   6. Krylov spaces
  *   7. Newton's method where sweeps fail
  *   8. What is seen at sites
- * body-sha256: cc1f2ea1c724468d6410fc62bf2bb6e24e24a4267572dfd2967b1c459aa94288
+ * body-sha256: 4a6313d94fd5fba33005ea4234491a4261fabf863a2c24eb1974a8a0eca8a6ae
  */
 #include "point_vortices.h"
 
@@ -113,7 +113,8 @@ static inline void point_vortices_locate(const point_vortices_solver *s, size_t 
 
 enum { point_vortices_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t point_vortices_pieces(const point_vortices_solver *s)
 {
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;
@@ -127,12 +128,10 @@ typedef struct {
 /* The piece of that number. */
 static inline point_vortices_piece point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
-    const size_t pieces = point_vortices_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     point_vortices_piece piece;
-    point_vortices_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * point_vortices_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + point_vortices_PIECE;
+    point_vortices_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * point_vortices_PIECE;
+    piece.to = unit == point_vortices_pieces(s) - 1 ? s->length : piece.from + point_vortices_PIECE;
     return piece;
 }
 
@@ -492,21 +491,30 @@ static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrd
             rows *= sizes[a];
         }
     }
-    size_t wide = point_vortices_LEAD + (sizes[point_vortices_AXES - 1] + point_vortices_HALO + 7) / 8 * 8;
+    size_t wide = point_vortices_LEAD + ((sizes[point_vortices_AXES - 1] + 7) / 8 * 8 + point_vortices_HALO
+        + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t point_vortices_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / point_vortices_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
-    const size_t doubles = rows == 0 ? 0 : point_vortices_RESERVED * (size_t)width
-        + point_vortices_row_sums(sizes[point_vortices_AXES - 1]);
-    const size_t row = doubles * sizeof(double) + point_vortices_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
+    doubles += rows * point_vortices_row_sums(sizes[point_vortices_AXES - 1]);
+    return doubles * sizeof(double) + rows * point_vortices_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -584,7 +592,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + point_vortices_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = point_vortices_block(rows, width);
     double *end = aligned - point_vortices_LEAD + point_vortices_RESERVED * block;
     s->sums = end;
     end += rows * point_vortices_row_sums(length);

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: ecdd213bf284001356662a3688d5f3595e9ed7437ed1d15f4cd0668bd4adb357
+ * body-sha256: 695ed55e74a6eb2d9b02586176da87033481f45f908a83d29bcae0647fba9d9d
  */
 #include "sine_gordon.h"
 
@@ -115,10 +115,11 @@ static inline void sine_gordon_locate(const sine_gordon_solver *s, size_t index,
     row->length = s->length;
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { sine_gordon_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t sine_gordon_pieces(const sine_gordon_solver *s)
 {
     return s->length < 2 * sine_gordon_PIECE ? 1 : (size_t)s->length / sine_gordon_PIECE;
@@ -132,12 +133,10 @@ typedef struct {
 /* The piece of that number. */
 static inline sine_gordon_piece sine_gordon_piece_of(const sine_gordon_solver *s, size_t unit)
 {
-    const size_t pieces = sine_gordon_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     sine_gordon_piece piece;
-    sine_gordon_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * sine_gordon_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + sine_gordon_PIECE;
+    sine_gordon_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * sine_gordon_PIECE;
+    piece.to = unit == sine_gordon_pieces(s) - 1 ? s->length : piece.from + sine_gordon_PIECE;
     return piece;
 }
 
@@ -328,20 +327,29 @@ static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t 
             rows *= sizes[a];
         }
     }
-    size_t wide = sine_gordon_LEAD + (sizes[sine_gordon_AXES - 1] + sine_gordon_HALO + 7) / 8 * 8;
+    size_t wide = sine_gordon_LEAD + ((sizes[sine_gordon_AXES - 1] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8
+        * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t sine_gordon_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / sine_gordon_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
-    const size_t doubles = sine_gordon_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + sine_gordon_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = sine_gordon_RESERVED * sine_gordon_block(rows, width);
+    return doubles * sizeof(double) + rows * sine_gordon_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -391,7 +399,7 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = sine_gordon_block(rows, width);
     double *end = aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

@@ -30,7 +30,7 @@
  *   8. Krylov spaces
  *   9. Newton's method where sweeps fail
  *   10. What is seen at sites
- * body-sha256: cc665f3c9b33f4ad0cfeba56e8e82d15dac3cd965986af759cc0897d185da469
+ * body-sha256: 82fef0e98e53fcfb047c86a7b78ebd6429441bea481859907bc4d7e475c4fa86
  */
 #include "thermal_heisenberg.h"
 
@@ -157,10 +157,11 @@ static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s,
     }
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { thermal_heisenberg_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t thermal_heisenberg_pieces(const thermal_heisenberg_solver *s)
 {
     return s->length < 2 * thermal_heisenberg_PIECE ? 1 : (size_t)s->length / thermal_heisenberg_PIECE;
@@ -175,12 +176,10 @@ typedef struct {
 static inline thermal_heisenberg_piece thermal_heisenberg_piece_of(const thermal_heisenberg_solver *s,
     size_t unit)
 {
-    const size_t pieces = thermal_heisenberg_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     thermal_heisenberg_piece piece;
-    thermal_heisenberg_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * thermal_heisenberg_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + thermal_heisenberg_PIECE;
+    thermal_heisenberg_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * thermal_heisenberg_PIECE;
+    piece.to = unit == thermal_heisenberg_pieces(s) - 1 ? s->length : piece.from + thermal_heisenberg_PIECE;
     return piece;
 }
 
@@ -806,22 +805,30 @@ static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXE
             rows *= sizes[a];
         }
     }
-    size_t wide = thermal_heisenberg_LEAD + (sizes[thermal_heisenberg_AXES - 1] + thermal_heisenberg_HALO + 7)
-        / 8 * 8;
+    size_t wide = thermal_heisenberg_LEAD + ((sizes[thermal_heisenberg_AXES - 1] + 7) / 8 * 8
+        + thermal_heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t thermal_heisenberg_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / thermal_heisenberg_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : thermal_heisenberg_shape(sizes, &width);
-    const size_t doubles = rows == 0 ? 0 : thermal_heisenberg_RESERVED * (size_t)width
-        + thermal_heisenberg_row_sums(sizes[thermal_heisenberg_AXES - 1]);
-    const size_t row = doubles * sizeof(double) + thermal_heisenberg_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = thermal_heisenberg_RESERVED * thermal_heisenberg_block(rows, width);
+    doubles += rows * thermal_heisenberg_row_sums(sizes[thermal_heisenberg_AXES - 1]);
+    return doubles * sizeof(double) + rows * thermal_heisenberg_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -898,7 +905,7 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + thermal_heisenberg_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = thermal_heisenberg_block(rows, width);
     double *end = aligned - thermal_heisenberg_LEAD + thermal_heisenberg_RESERVED * block;
     s->sums = end;
     end += rows * thermal_heisenberg_row_sums(length);

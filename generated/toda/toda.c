@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 98ce1e80d5a3c97b50c54350b669b94737e74c4435a3bdcfd6388028bab64da6
+ * body-sha256: fb5a06a8fcfecc228a6ab8fc59de5c266aee2594793b9adf742b3d71eeaac399
  */
 #include "toda.h"
 
@@ -111,9 +111,11 @@ static inline void toda_locate(const toda_solver *s, size_t index, toda_row *row
     row->length = s->length;
 }
 
-enum { toda_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
+enum { toda_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t toda_pieces(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
@@ -127,12 +129,10 @@ typedef struct {
 /* The piece of that number. */
 static inline toda_piece toda_piece_of(const toda_solver *s, size_t unit)
 {
-    const size_t pieces = toda_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     toda_piece piece;
-    toda_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * toda_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + toda_PIECE;
+    toda_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * toda_PIECE;
+    piece.to = unit == toda_pieces(s) - 1 ? s->length : piece.from + toda_PIECE;
     return piece;
 }
 
@@ -316,20 +316,28 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
             rows *= sizes[a];
         }
     }
-    size_t wide = toda_LEAD + (sizes[toda_AXES - 1] + toda_HALO + 7) / 8 * 8;
+    size_t wide = toda_LEAD + ((sizes[toda_AXES - 1] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t toda_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / toda_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t toda_work_size(const size_t sizes[toda_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
-    const size_t doubles = toda_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + toda_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = toda_RESERVED * toda_block(rows, width);
+    return doubles * sizeof(double) + rows * toda_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -378,7 +386,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = toda_block(rows, width);
     double *end = aligned - toda_LEAD + toda_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

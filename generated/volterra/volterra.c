@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: b33b49e92a5bc9edbe75d450bdcadbfa5f8f563f5bf93cb6a9bf909bbcc42329
+ * body-sha256: 3c8dfa9f4b030c2861d1640c2585693c94ea58a52bffbddd1d925edc9a6cf10e
  */
 #include "volterra.h"
 
@@ -140,9 +140,11 @@ static inline void volterra_locate(const volterra_solver *s, size_t index, volte
         row->colour = (int)((row->colour + place[a] * volterra_colours[a]) % volterra_COLOUR_COUNT);
 }
 
-enum { volterra_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
+enum { volterra_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t volterra_pieces(const volterra_solver *s)
 {
     return s->length < 2 * volterra_PIECE ? 1 : (size_t)s->length / volterra_PIECE;
@@ -156,12 +158,10 @@ typedef struct {
 /* The piece of that number. */
 static inline volterra_piece volterra_piece_of(const volterra_solver *s, size_t unit)
 {
-    const size_t pieces = volterra_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     volterra_piece piece;
-    volterra_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * volterra_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + volterra_PIECE;
+    volterra_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * volterra_PIECE;
+    piece.to = unit == volterra_pieces(s) - 1 ? s->length : piece.from + volterra_PIECE;
     return piece;
 }
 
@@ -340,20 +340,28 @@ static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width
             rows *= sizes[a];
         }
     }
-    size_t wide = volterra_LEAD + (sizes[volterra_AXES - 1] + volterra_HALO + 7) / 8 * 8;
+    size_t wide = volterra_LEAD + ((sizes[volterra_AXES - 1] + 7) / 8 * 8 + volterra_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t volterra_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / volterra_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
-    const size_t doubles = volterra_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + volterra_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = volterra_RESERVED * volterra_block(rows, width);
+    return doubles * sizeof(double) + rows * volterra_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -403,7 +411,7 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = volterra_block(rows, width);
     double *end = aligned - volterra_LEAD + volterra_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

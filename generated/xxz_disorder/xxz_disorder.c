@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: d26c704f4b2549f8af346e6b68ab2db51c4942009809148a177eb17b7224f779
+ * body-sha256: 63650130f038481e1820c2f95a205868912bb6985cac5a485e2f25d4118b1e2c
  */
 #include "xxz_disorder.h"
 
@@ -118,10 +118,11 @@ static inline void xxz_disorder_locate(const xxz_disorder_solver *s, size_t inde
     row->length = s->length;
 }
 
-/* sites of a row that are worked at in one go, with any number of threads */
+/* sites of a single row that are worked at in one go, with any number of threads */
 enum { xxz_disorder_PIECE = 1024 };
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
+   so that no copied end reaches into another. */
 static size_t xxz_disorder_pieces(const xxz_disorder_solver *s)
 {
     return s->length < 2 * xxz_disorder_PIECE ? 1 : (size_t)s->length / xxz_disorder_PIECE;
@@ -135,12 +136,10 @@ typedef struct {
 /* The piece of that number. */
 static inline xxz_disorder_piece xxz_disorder_piece_of(const xxz_disorder_solver *s, size_t unit)
 {
-    const size_t pieces = xxz_disorder_pieces(s), index = pieces == 1 ? unit : unit / pieces,
-        part = unit - index * pieces;
     xxz_disorder_piece piece;
-    xxz_disorder_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * xxz_disorder_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + xxz_disorder_PIECE;
+    xxz_disorder_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * xxz_disorder_PIECE;
+    piece.to = unit == xxz_disorder_pieces(s) - 1 ? s->length : piece.from + xxz_disorder_PIECE;
     return piece;
 }
 
@@ -391,20 +390,29 @@ static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_
             rows *= sizes[a];
         }
     }
-    size_t wide = xxz_disorder_LEAD + (sizes[xxz_disorder_AXES - 1] + xxz_disorder_HALO + 7) / 8 * 8;
+    size_t wide = xxz_disorder_LEAD + ((sizes[xxz_disorder_AXES - 1] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8
+        * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
 }
 
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
+   what is being written at the same place of another page. */
+static size_t xxz_disorder_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / xxz_disorder_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+}
+
 size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
-    const size_t doubles = xxz_disorder_RESERVED * (size_t)width;
-    const size_t row = doubles * sizeof(double) + xxz_disorder_LINES * sizeof(ptrdiff_t);
-    return rows == 0 ? 0 : rows * row + 64;
+    if (rows == 0) return 0;
+    size_t doubles = xxz_disorder_RESERVED * xxz_disorder_block(rows, width);
+    return doubles * sizeof(double) + rows * xxz_disorder_LINES * sizeof(ptrdiff_t) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
@@ -466,7 +474,7 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     s->width = width;
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = xxz_disorder_block(rows, width);
     double *end = aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block;
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;

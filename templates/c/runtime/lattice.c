@@ -109,11 +109,19 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
             rows *= sizes[a];
         }
     }
-    size_t wide = PHI_LEAD + (sizes[PHI_AXES - 1] + PHI_HALO + 7) / 8 * 8;
+    size_t wide = PHI_LEAD + ((sizes[PHI_AXES - 1] + 7) / 8 * 8 + PHI_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
     return rows;
+}
+
+/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for what is being
+   written at the same place of another page. */
+static size_t phi_block(size_t rows, ptrdiff_t width)
+{
+    const size_t block = rows * (size_t)width, apart = 512 / PHI_ARRAYS / 8 * 8;
+    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
 }
 
 #if PHI_GRAPH
@@ -124,23 +132,23 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
-#if PHI_KRYLOV
-    const size_t doubles = rows == 0 ? 0 : PHI_RESERVED * (size_t)width + phi_row_sums(sizes[PHI_AXES - 1]);
-#else
-    const size_t doubles = PHI_RESERVED * (size_t)width;
-#endif
-    const size_t row = doubles * sizeof(double) + PHI_LINES * sizeof(ptrdiff_t);
 #if PHI_GRAPH
     if (rows == 0 || !phi_few(sizes[0], bonds)) return 0;
-    return row + phi_graph_size(sizes[0], bonds) + 128;
 #else
+    if (rows == 0) return 0;
+#endif
+    size_t doubles = PHI_RESERVED * phi_block(rows, width);
+#if PHI_KRYLOV
+    doubles += rows * phi_row_sums(sizes[PHI_AXES - 1]);
+#endif
 #if PHI_BANDED
     phi_matrix matrix;
-    const size_t more = rows == 0 ? 0 : phi_matrix_of(sizes[0], NULL, &matrix) * sizeof(double);
-    return rows == 0 ? 0 : rows * row + more + 64;
-#else
-    return rows == 0 ? 0 : rows * row + 64;
+    doubles += phi_matrix_of(sizes[0], NULL, &matrix);
 #endif
+#if PHI_GRAPH
+    return doubles * sizeof(double) + phi_graph_size(sizes[0], bonds) + 128;
+#else
+    return doubles * sizeof(double) + rows * PHI_LINES * sizeof(ptrdiff_t) + 64;
 #endif
 }
 
@@ -298,7 +306,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
 #endif
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
-    const size_t block = rows * (size_t)width;
+    const size_t block = phi_block(rows, width);
     double *end = aligned - PHI_LEAD + PHI_RESERVED * block;
 #if PHI_KRYLOV
     s->sums = end;

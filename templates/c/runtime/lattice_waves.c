@@ -19,7 +19,7 @@ static size_t phi_slices(const phi_solver *s, size_t *units)
     *units = 1;
     return phi_pieces(s);
 #else
-    *units = s->rows / s->sizes[0] * phi_pieces(s);
+    *units = s->rows / s->sizes[0];
     return s->sizes[0];
 #endif
 }

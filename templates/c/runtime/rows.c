@@ -149,31 +149,46 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #if PHI_GATHER
 enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 #else
-enum { PHI_PIECE = 1024 }; /* sites of a row that are worked at in one go, with any number of threads */
+enum { PHI_PIECE = 1024 }; /* sites of a single row that are worked at in one go, with any number of threads */
 #endif
 
-/* The pieces of a row; the last is the longest, so that no copied end reaches into another. */
+/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest, so that no
+   copied end reaches into another. */
 static size_t phi_pieces(const phi_solver *s)
 {
+#if PHI_ONE_ROW
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
+#else
+    (void)s;
+    return 1;
+#endif
 }
 
 typedef struct {
     phi_row row;
     ptrdiff_t from, to;
+#if !PHI_ONE_ROW
+    ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
+#endif
 } phi_piece;
 
 /* The piece of that number. */
 static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
 {
-    const size_t pieces = phi_pieces(s), index = pieces == 1 ? unit : unit / pieces, part = unit - index * pieces;
     phi_piece piece;
-    phi_locate(s, index, &piece.row);
-    piece.from = (ptrdiff_t)part * PHI_PIECE;
-    piece.to = part == pieces - 1 ? s->length : piece.from + PHI_PIECE;
-#if PHI_BY_HAND && PHI_ONE_ROW
+#if PHI_ONE_ROW
+    phi_locate(s, 0, &piece.row);
+    piece.from = (ptrdiff_t)unit * PHI_PIECE;
+    piece.to = unit == phi_pieces(s) - 1 ? s->length : piece.from + PHI_PIECE;
+#if PHI_BY_HAND
     if (piece.from < s->from) piece.from = s->from;
     if (piece.to > s->to) piece.to = s->to;
+#endif
+#else
+    phi_locate(s, unit, &piece.row);
+    piece.from = 0;
+    piece.to = s->length;
+    piece.wide = (s->length + 7) & ~(ptrdiff_t)7;
 #endif
     return piece;
 }

@@ -83,10 +83,19 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         shared = same[0].shared if len(same) > 1 and same[0].shared not in names.values() else ""
         names[code] = shared or same[0].name
         yield replace(same[0], name=names[code]).text(program, [loop.purpose for loop in same])
-    cases = [_case(program, layout, k, parts[k], forms, names) for k, forms in enumerate(made)]
-    coloured, unused = bool(step.by_colour), ["far"] * all(len(forms) == 1 for forms in made)
-    flow, what = ("flow", "A flow") if coloured else ("part", "The flow of a part of H")
-    varied = rows is None
+    unused, varied = ["far"] * all(len(forms) == 1 for forms in made), rows is None
+    flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
+    cases: list[_Case | str] = []
+    for k, forms in enumerate(made):
+        if varied or not _has_rows_of_its_own(program, layout):
+            cases.append(_case(program, layout, k, parts[k], forms, names))
+            continue
+        called = [f"{program.name}_rows{k + 1}{form}" for form in sorted(forms)]
+        for form in sorted(forms):
+            own = _case(program, layout, k, parts[k], {form: forms[form]}, names)
+            title = f"The flow of H_{k + 1}" + ", for large arguments of functions" * (form == "_far")
+            yield _rows(program, layout, [own], title=title, head=f"rows{k + 1}{form}", arguments="const double *coef")
+        cases.append(f"{called[0] if len(called) == 1 else f'(far ? {called[0]} : {called[1]})'}(s, coef, first, end);")
     yield _rows(
         program,
         layout,
@@ -94,9 +103,14 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         title=f"How {what[0].lower()}{what[1:]} carries a tangent vector" if varied else what,
         head="tangent_rows" if varied else "sweep_rows",
         arguments=f"int {flow}, const double *coef, {'double *const *v' if varied else 'int far'}",
-        coloured=coloured,
-        unused=["part"] * (len(cases) == 1 and not coloured) + ([] if varied else unused),
+        coloured=bool(step.by_colour),
+        unused=["part"] * (len(cases) == 1 and not step.by_colour) + ([] if varied else unused),
     )
+
+
+def _has_rows_of_its_own(program: Program, layout: Layout) -> bool:
+    """Whether each part of H has a loop over rows of its own, which compilers make faster where these are short."""
+    return program.profile == "fast" and len(layout.step.sites.axes) > 1
 
 
 def _forms_of_part(
@@ -152,7 +166,11 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
         sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
         for kernel, more in forms_of(program, sweep.kernel)
     ]
-    yield from _over_sites(loops)
+    plain = len(loops) == 1 and layout.step.sites.colours == 1 and not sweep.gather and not sweep.is_tangent
+    if plain and len(layout.step.sites.axes) > 1:
+        yield _Call(loops[0], "at.from, at.wide")  # whole vectors: what lies beside a row is copied afresh
+    else:
+        yield from _over_sites(loops)
 
 
 def _over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
@@ -222,8 +240,8 @@ def _of_equation(
     )
 
 
-def _rows(program: Program, layout: Layout, cases: Sequence[_Case], **more: object) -> str:
-    """A function that goes over pieces of rows; what it does to each is one of some ``cases``."""
+def _rows(program: Program, layout: Layout, cases: Sequence[_Case | str], **more: object) -> str:
+    """A function that goes over pieces of rows; what it does to each is one of some ``cases``, or what these call."""
     last = [bounds(w)[-1] for w in layout.weights]
     values = {
         "NAME": program.name,
@@ -231,9 +249,12 @@ def _rows(program: Program, layout: Layout, cases: Sequence[_Case], **more: obje
         "high": max([0, *(high for _, high in last)]),
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and len(layout.step.sites.axes) == 1,
     }
-    loops = [render("c", "each_piece.c", {**values, **vars(case)}).splitlines() for case in cases]
+    loops = [
+        [case] if isinstance(case, str) else render("c", "each_piece.c", {**values, **vars(case)}).splitlines()
+        for case in cases
+    ]
     body = loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops), "}"]
-    return render("c", "sweep_rows.c", {**values, "coloured": False, "body": body, **more})
+    return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": body, **more})
 
 
 def _cases(loops: Sequence[Sequence[str]]) -> Iterator[str]:
