@@ -1,4 +1,4 @@
-"""Runs of solvers as functions of JAX: with derivatives, under `jit` and `vmap`. Needs the extra ``phigen[jax]``.
+"""Runs of solvers as functions of JAX: with derivatives, under `jit` and `vmap`. Needs jax.
 
 The solver runs on the CPU, in double precision, as a callback. Derivatives are those of `Solver.pullback`; second ones
 are not offered.

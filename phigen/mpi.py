@@ -482,5 +482,5 @@ def _mpi() -> Any:
     try:
         from mpi4py import MPI
     except ImportError:
-        raise MissingPackageError("this needs mpi4py: pip install 'phigen[mpi]'") from None
+        raise MissingPackageError("this needs mpi4py\n  hint: pip install mpi4py") from None
     return MPI

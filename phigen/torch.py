@@ -1,4 +1,4 @@
-"""Runs of solvers as functions of PyTorch, with gradients. Needs the extra ``phigen[torch]``.
+"""Runs of solvers as functions of PyTorch, with gradients. Needs torch.
 
 The solver runs on the CPU, in double precision. Derivatives are those of `Solver.pullback`; second ones are not
 offered.

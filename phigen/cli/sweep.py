@@ -62,8 +62,13 @@ def command(
         from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
+    elif shown:
+        raise click.UsageError("--show says what --plot FILE draws")
     spec = load_one(spec_file)
     sweep = _sweep_of(spec, name)
+    if shown and shown not in sweep.keep:
+        kept = ", ".join(sweep.keep)
+        raise click.BadParameter(f"{shown!r} is not kept; the sweep keeps {kept}", param_hint="--show")
     setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from phigen.drawing.palette import SERIES, save, styled
-from phigen.errors import PhigenError
+from phigen.errors import FileError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +23,7 @@ _PANELS = 6
 
 
 def draw(store: Path, path: Path, shown: str | None = None) -> None:
-    """Draw a variable of a store into a file. Raises `PhigenError` where there is none of that name."""
+    """Draw a variable of a store into a file. Raises `FileError` where there is none of that name."""
     import xarray
 
     with xarray.open_zarr(str(store), decode_cf=False) as data:
@@ -32,7 +32,7 @@ def draw(store: Path, path: Path, shown: str | None = None) -> None:
         ]
         chosen = shown or next(iter(known), "")
         if chosen not in known:
-            raise PhigenError(f"there is no {chosen!r} to draw; there are {', '.join(known) or 'none'}")
+            raise FileError(f"there is no {chosen!r} to draw; there are {', '.join(known) or 'none'}")
         save(_figure(data, chosen), path)
 
 

@@ -54,7 +54,7 @@ def sweep(
     in memory. ``scheduler`` is the address of a Dask cluster; the default are ``workers`` processes of this machine,
     one for each core. ``progress`` is told the members made and those of them that failed, chunk by chunk. Scripts that
     call this need the guard ``if __name__ == "__main__":``, as all that start processes do. Raises `SpecError`,
-    `MissingPackageError` without the extra ``phigen[sweep]``, ``phigen.errors.FileError`` and `PhigenError`.
+    `MissingPackageError` without dask, distributed, xarray or zarr, ``phigen.errors.FileError`` and `PhigenError`.
     """
     from phigen.sweeping.store import imported
     from phigen.sweeping.sweep import Setting, made

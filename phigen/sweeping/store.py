@@ -29,13 +29,13 @@ _BESIDE = "made_by"
 
 
 def imported(name: str) -> Any:
-    """A package of the extra ``phigen[sweep]``. Raises `MissingPackageError`."""
+    """A package that sweeps need. Raises `MissingPackageError`."""
     from importlib import import_module
 
     try:
         return import_module(name)
     except ImportError:
-        message = f"sweeps need {name.partition('.')[0]}\n  hint: pip install 'phigen[sweep]'"
+        message = f"sweeps need {name.partition('.')[0]}\n  hint: pip install dask distributed xarray zarr"
         raise MissingPackageError(message) from None
 
 

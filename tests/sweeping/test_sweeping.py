@@ -300,6 +300,8 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
     assert "4 members (J 2 × step 2), 4 made now, of which 2 failed" in done.output
     data = xarray.open_zarr(tmp_path / "s.zarr").load()
     assert (np.isnan(data.energy_error) == [[False, True]] * 2).all()
+    shown = CliRunner().invoke(group, [*arguments, "--show", "final"])
+    assert (shown.exit_code, "the sweep keeps energy_error" in shown.output) == (2, True)
     with pytest.raises(ValueError, match="'x' is not a parameter"):
         phigen.sweep(specs.loads(CHAIN), over={"x": [1.0]})
     with pytest.raises(ValueError, match="a run of the spec is needed"):
