@@ -24,7 +24,7 @@ from phigen.attitude.parts import by_angles
 from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
-from phigen.lattice.building import cell_from_spec
+from phigen.lattice.building import cell_from_spec, expect_coloured
 from phigen.lattice.cell import Cell
 from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 from phigen.proofs import statements
@@ -238,6 +238,7 @@ def _swept(
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec=spec, **asked))
     described = _described(spec, extras, profile) | {"lanes": spec.solver.lanes}
     program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
+    expect_coloured(spec, cell.axes, plan.colouring.periods(cell.boundary))
     nothing: Any = NoSystem(spec)
     return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.forms import algebra_of_form, poisson_matrix
@@ -49,6 +49,21 @@ def cell_from_spec(spec: Spec) -> Cell:
 def least_sizes(cell: Cell) -> tuple[int, ...]:
     """The sizes that a grid has at least: no site is its own neighbour, and an open one has room for all of H and π."""
     return tuple(1 + max(h, p) for h, p in zip(cell.hamiltonian_reach, cell.poisson_reach, strict=True))
+
+
+def expect_coloured(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> None:
+    """Raises `SpecError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
+    problems = []
+    for run in spec.runs.values():
+        sizes = run.lattice.sizes if run.lattice else ()
+        for axis, size, period in zip(axes, sizes, periods, strict=False):
+            if size % period:
+                message = f"sizes: {size} along {axis} is no multiple of {period}, as the colours of the splitting need"
+                nearest = size - size % period or period
+                hint = f"for example {nearest}; scheme: series takes every size"
+                problems.append(spec.diagnostic(("runs", run.name, "sizes"), message, hint))
+    if problems:
+        raise SpecError(problems)
 
 
 def _local(spec: Spec) -> dict[tuple[str, str], Expression]:

@@ -490,6 +490,9 @@ def test_odd_sizes_do_not_fit_two_colours() -> None:
          'hamiltonian: "a*b[i+1]"', "which couple neighbours"),
         ('coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nscheme: series\norder: 12\n'
          'hamiltonian: "p**2/2 + q*q[i+1]"', "the orders 2, 4, 4, 6, 6, 8, 8, 10, not 12"),
+        ('coordinates: [x]\npoisson: {brackets: {x: {"x[i+1]": "x*x[i+1]"}}}\nhamiltonian: x\n'
+         'runs: {odd: {sizes: [7], initial: {x: 1}, step: 0.1, steps: 1}}',
+         "(?s)7 along i is no multiple of 2.*for example 6"),
     ],
 )  # fmt: skip
 def test_what_has_no_step_is_refused(text: str, said: str) -> None:
