@@ -27,13 +27,7 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
     where there is one, and what has a value neither at any sampled point nor at any of the starts; where there are no
     starts, the latter is undecided.
     """
-    parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
-    if system.forces:
-        parts["the force"] = [*system.forces.covector, *system.forces.vector]
-    parts |= {f"the noise {s.name}": [s.hamiltonian, s.amplitude] for s in system.noise}
-    parts["π"] = [e for row in system.poisson for e in row]
-    parts |= {name: [e] for name, e in (*system.casimirs.items(), *system.invariants.items())}
-    for name, roots in parts.items():
+    for name, roots in _parts(system).items():
         found = _divided_by_zero(roots, system.positive)
         if found:
             yield Statement(f"{name} is defined", REFUTED, found)
@@ -41,6 +35,30 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
             tried = f"no value at any of {len(SCALES) * POINTS} points"
             told = f"{tried}, nor where a run starts" if starts else tried
             yield Statement(f"{name} is defined", REFUTED if starts else UNDECIDED, told)
+
+
+def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[Statement]:
+    """A statement for each run, by its name, that starts where some part of the system has no value."""
+    parts = _parts(system)
+    for run, point in starts.items():
+        without = [name for name, roots in parts.items() if not _is_defined(roots, point)]
+        if without:
+            yield Statement(start_is_defined(run), UNDECIDED, f"no value of {', '.join(without)} there")
+
+
+def start_is_defined(run: str) -> str:
+    """The name of the statement about the start of a run."""
+    return f"everything is defined where {run} starts"
+
+
+def _parts(system: System) -> dict[str, Sequence[Expression]]:
+    """The expressions of a system by what they are."""
+    parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
+    if system.forces:
+        parts["the force"] = [*system.forces.covector, *system.forces.vector]
+    parts |= {f"the noise {s.name}": [s.hamiltonian, s.amplitude] for s in system.noise}
+    parts["π"] = [e for row in system.poisson for e in row]
+    return parts | {name: [e] for name, e in (*system.casimirs.items(), *system.invariants.items())}
 
 
 def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:

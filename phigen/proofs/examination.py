@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from phigen.compilation import Compilation
 from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.definedness import start_is_defined
 from phigen.proofs.statements import ATTITUDE, CASIMIRS, DEFINEDNESS, INVARIANTS, METHOD, MONITOR, SPLITTING, Groups
 from phigen.spec.model import Spec
 from phigen.symbolic.verdict import REFUTED, Statement
@@ -68,7 +69,7 @@ def refutation(found: Examination) -> str:
 
 
 def doubts(found: Examination) -> list[Diagnostic]:
-    """Warnings of what seems to have no value anywhere, each with its place in the spec."""
+    """Warnings of what seems to have no value anywhere, or where a run starts, each with its place in the spec."""
     listed = [
         found.spec.diagnostic(_place(found.spec, DEFINEDNESS, s), str(s)) for s in found.groups.get(DEFINEDNESS, ())
     ]
@@ -82,6 +83,7 @@ def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
     places |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}
     places |= {f"{name} is defined": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is defined": ("invariants", name) for name in spec.invariants}
+    places |= {start_is_defined(run): ("runs", run, "initial") for run in spec.runs}
     return places.get(statement.name, _PLACES.get(group.partition(" (")[0], ("poisson",)))
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from phigen.compilation import Compilation
 from phigen.geometry import checks
-from phigen.geometry.definedness import undefined_parts
+from phigen.geometry.definedness import undefined_parts, undefined_starts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.positivity import positivity
 from phigen.geometry.system import System
@@ -34,8 +34,11 @@ METHOD, SPLITTING, ATTITUDE = "Bi-realisation", "Splitting", "Attitude"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """What has no value anywhere; nothing is said of what has."""
-    found = tuple(undefined_parts(system, _starts(system, spec)))
+    """What has no value anywhere, or where a run starts; nothing is said of what has."""
+    starts = _starts(system, spec)
+    found = tuple(undefined_parts(system, starts)) or tuple(
+        undefined_starts(system, dict(zip(spec.runs, starts, strict=True)))
+    )
     return {DEFINEDNESS: found} if found else {}
 
 

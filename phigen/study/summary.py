@@ -151,7 +151,8 @@ class Watch:
         state["good"] = np.asarray(good + count)
         windows = _windows(np.arange(good, good + count), self._about[1])
         for k, (v, unit) in enumerate(zip(values, self._units(), strict=True)):
-            np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
+            with np.errstate(invalid="ignore"):  # where the start has no value, errors have none
+                np.maximum.at(state["maxima"][k], windows, unit.errors(v, float(state["start"][k])))
         self._see_turns(x, windows)
         if self._run and self._run.exact:
             off = _against_exact(self._system, self._run, self._parameters, state["first"], t, x)

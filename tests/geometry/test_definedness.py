@@ -51,6 +51,15 @@ def test_where_no_run_says_where_it_starts_a_search_in_vain_is_a_warning():
         compile_proved(spec.loads(text))
 
 
+def test_a_run_that_starts_where_something_has_no_value_is_a_warning():
+    runs = "runs: {good: {initial: [1, 1], step: 0.1, steps: 1}, bad: {initial: [-1, 1], step: 0.1, steps: 1}}\n"
+    text = PAIR + "hamiltonian: y**2 + x - log(x)\ninvariants: {F: x - log(x) + y**2}\n" + runs
+    (found,) = examine(spec.loads(text)).groups[DEFINEDNESS]
+    assert (found.name, found.detail) == ("everything is defined where bad starts", "no value of H, F there")
+    with pytest.warns(PhigenWarning, match=r"^<string>:7:\d+: warning: everything is defined where bad starts"):
+        compile_proved(spec.loads(text))
+
+
 @pytest.mark.parametrize(
     "text",
     [
