@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: e89d964dcb6e9e4f7f3c2af67820664680fcd1fad7f637e58afce56d95747499
+ * body-sha256: d0ead3f3aeb5d170eaa23c2668ee7c8642acd307187c2f09de4e946e8133a78c
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -211,6 +211,17 @@ function finite(values, length, what) {
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
 
+// ---- Many steps ----
+
+/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count) {
+  if (!(Number.isInteger(count) && count >= 0)) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+  }
+  for (let k = 0; k < count; k++) solver.step(h);
+  return solver;
+}
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
@@ -335,11 +346,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   /**

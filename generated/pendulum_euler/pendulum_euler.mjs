@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 366cc617505915c8f480e7947f3d51e803fb32eca435887e6482f89b77dc9e9c
+ * body-sha256: 4737fd73d8bb387d554f0d79d3fdfbac5ff796d271fd79cf1ed9ee0fc454ed03
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -114,6 +114,17 @@ function finite(values, length, what) {
   const copy = Float64Array.from(values ?? []);
   if (copy.length === length && copy.every(Number.isFinite)) return copy;
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
+}
+
+// ---- Many steps ----
+
+/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count) {
+  if (!(Number.isInteger(count) && count >= 0)) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+  }
+  for (let k = 0; k < count; k++) solver.step(h);
+  return solver;
 }
 
 // ---- The solver ----
@@ -227,11 +238,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   /**

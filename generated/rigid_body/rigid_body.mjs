@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7882601a367dacb1e45a09c011c5a220bdaca4ee6a0dfd14bb6596b01f349313
+ * body-sha256: 1615f017a8ce1b5de3986fb65a8b4ea40bb7ac8584275da5b5db97b89d250f6e
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -493,6 +493,17 @@ function finite(values, length, what) {
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
 
+// ---- Many steps ----
+
+/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count) {
+  if (!(Number.isInteger(count) && count >= 0)) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+  }
+  for (let k = 0; k < count; k++) solver.step(h);
+  return solver;
+}
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
@@ -613,11 +624,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   /**

@@ -13,7 +13,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 7ed0bbebce66777fd68d5466372a1d10eb5ba5c366846dc88f0b287a62ca8240
+ * body-sha256: 5c9a82fb246ddda85dbdddc143ed96e62f1fd6f68b3d81dddc490c6094d4eaa5
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -197,6 +197,17 @@ function finite(values, length, what) {
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
 
+// ---- Many steps ----
+
+/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count) {
+  if (!(Number.isInteger(count) && count >= 0)) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+  }
+  for (let k = 0; k < count; k++) solver.step(h);
+  return solver;
+}
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
@@ -311,11 +322,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   /**

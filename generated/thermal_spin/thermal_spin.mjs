@@ -18,7 +18,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 16e0ae0b732d20829c21ade1b56d8acbe70a5e462f849f186a063a3eb8ee2661
+ * body-sha256: 09808f23b9186ff990bc1bd44f1ae8faea2538ed9c11e8d6ddd44c98e731af61
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -305,6 +305,17 @@ function finite(values, length, what) {
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
 
+// ---- Many steps ----
+
+/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count) {
+  if (!(Number.isInteger(count) && count >= 0)) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+  }
+  for (let k = 0; k < count; k++) solver.step(h);
+  return solver;
+}
+
 // ---- The solver ----
 
 const number = new Float64Array(1);
@@ -386,13 +397,7 @@ export class Solver {
   constructor(options) {
     this.x = finite(options.x0, DIM, "x0");
     this.params = admitted(options.params ?? {});
-    const { seed = 0, member = 0, step0 = 0 } = options;
-    for (const [name, value] of Object.entries({ seed, member, step0 })) {
-      if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
-        throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}`);
-      }
-    }
-    Object.assign(this, { seed, member, step0 });
+    Object.assign(this, drawsOf(options));
   }
 
   /** What depends on the step size; nothing where that is as before. */
@@ -446,11 +451,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   /**
@@ -622,7 +623,7 @@ function makeStage(solver, stage) {
   return retried(solver, stage, attempt);
 }
 
-// ---- Noise ----
+// ---- Random numbers ----
 
 /** The upper 32 bits of the product of two numbers of 32 bits. */
 function upper(a, b) {
@@ -660,15 +661,32 @@ function words(number) {
   return [Number(bits & 0xffffffffn), Number(bits >> 32n)];
 }
 
-/** Normal variates of variance 1, in pairs by Box and Muller, cut off at BOUND: all increments of a step. */
+/** Two normal variates of variance 1 by Box and Muller, cut off at BOUND, from a counter of four words. */
+function twoNormals(counter, key) {
+  const [a, b, c, d] = philox(counter, key);
+  const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
+  const angle = 6.283185307179586 * unit(c, d);
+  return [radius * Math.cos(angle), radius * Math.sin(angle)];
+}
+
+/** What random numbers are a function of, of the options of a solver; StepError for what is not allowed. */
+function drawsOf({ seed = 0, member = 0, step0 = 0 }) {
+  for (const [name, value] of Object.entries({ seed, member, step0 })) {
+    if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
+      throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}`);
+    }
+  }
+  return { seed, member, step0 };
+}
+
+// ---- Noise ----
+
+/** Normal variates of variance 1, in pairs: all increments of a step. */
 function normals(seed, member, step, values) {
   const [low, high] = words(step);
   for (let k = 0; k < DRAWS; k += 2) {
-    const [a, b, c, d] = philox([low, high, member, k / 2], words(seed));
-    const radius = Math.min(Math.sqrt(-2 * Math.log(unit(a, b) + 2 ** -54)), BOUND);
-    const angle = 6.283185307179586 * unit(c, d);
-    values[k] = radius * Math.cos(angle);
-    if (k + 1 < DRAWS) values[k + 1] = radius * Math.sin(angle);
+    const pair = twoNormals([low, high, member, k / 2], words(seed));
+    values.set(pair.slice(0, DRAWS - k), k);
   }
 }
 

@@ -14,7 +14,7 @@
  *
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 9e9ab9b6b5820241fc48cc4a5eebf061bd3eb4deb95f2a1a10e4e514fdc3419e
+ * body-sha256: 215ef30b763f78aa42774602c18200929a90dcacd15b85b6bee4c55e825d845a
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -177,6 +177,17 @@ function finite(values, length, what) {
   throw new StepError("BAD_ARGUMENT", 0, `${what} must be ${length} finite numbers`);
 }
 
+// ---- Many steps ----
+
+/** So many steps of a solver. Throws StepError for a number that is none, and where a step cannot be made. */
+function march(solver, h, count) {
+  if (!(Number.isInteger(count) && count >= 0)) {
+    throw new StepError("BAD_ARGUMENT", solver.steps, `the number of steps is ${count}`);
+  }
+  for (let k = 0; k < count; k++) solver.step(h);
+  return solver;
+}
+
 // ---- The solver ----
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
@@ -294,11 +305,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   /** The density of the Hamiltonian at each site, of x or of another state. */

@@ -105,9 +105,10 @@ def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapp
 
 def stated(found: Mapping[str, Unit]) -> str:
     """What errors are relative to, in a sentence; ``found`` are units by the names of quantities."""
-    said = ["relative to the value at the start"] * any(unit.kind != SITES for unit in found.values())
+    if found and all(unit.kind == SITES for unit in found.values()):
+        return "Errors are relative to the sum of the magnitudes of the energies of the sites at the start."
+    said = ["relative to the value at the start"]
     for kind, how in (
-        (SITES, "relative to the sum of the magnitudes of the energies of the sites at the start"),
         (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| there, since {0} is nearly 0"),
         (ABSOLUTE, "absolute, since {0} is 0 there"),
     ):

@@ -12,24 +12,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lattice import test_acting, test_time
+from lattice import test_acting, test_tangents, test_time
 from lattice.lattices import LATTICES
 from tools import tool
 
 from phigen import resources
 from phigen import spec as specs
+from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
 from phigen.lattice.states import Start, start_of
 from phigen.runtime.modules import load_module
-from phigen.spec.model import Spec
+from phigen.spec.model import Extras, Spec
 
-#: Those with noise are refused.
-CORPUS = {
-    f.stem: f
-    for f in sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))
-    if "noise:" not in f.read_text(encoding="utf-8")
-}
+CORPUS = {f.stem: f for f in sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))}
 
 STIFF = """\
 phigen: 1
@@ -77,6 +73,9 @@ VARIANTS: dict[str, Callable[[], Spec]] = {
 #: Lattices with a time, and with forces.
 DRIVEN = {f"{name}, in time": (test_time, name) for name in test_time.TEXTS}
 DRIVEN |= {f"{name}, forced": (test_acting, name) for name in test_acting.FORCED}
+DRIVEN |= {f"{name}, noisy": (test_acting, name) for name in test_acting.NOISY}
+#: Whose random numbers they are: numbers of 64, 32 and 48 bits.
+DRAWS: dict[str, Any] = {"seed": 2**61 + 5, "member": 2**31 + 3, "step0": 2**45 + 2}
 CASES = [*CORPUS, *VARIANTS, *DRIVEN]
 STEPS, T0 = 8, 0.7
 
@@ -113,6 +112,7 @@ def job(folder: Path, case: str, **more: Any) -> dict[str, Any]:
     options = {"x0": start.state.ravel().tolist(), "sizes": start.sizes, "params": params}
     options |= {"bonds": start.bonds.ravel().tolist()} if start.graph else {}
     options |= {"t0": T0} if compilation.program.time else {}
+    options |= {**DRAWS, "seed": str(DRAWS["seed"])} if compilation.program.noise else {}  # beyond 2^53
     return {"module": path.as_uri(), "options": {**options, **more}, "h": h, "steps": STEPS}
 
 
@@ -137,7 +137,7 @@ def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answer
     name = compilation.program.name
     (start, h), dated = begun(case), bool(compilation.program.time)
     module = load_module(emit(compilation.program, "numpy", "phigen")[f"{name}.py"], name)
-    since = {"t0": T0} if dated else {}
+    since = ({"t0": T0} if dated else {}) | (DRAWS if compilation.program.noise else {})
     x = module.integrate(start.state, h, STEPS, stride=STEPS, **since, **start.arguments)[-1]
     size, end = np.abs(x).max(), T0 * dated + STEPS * h
     then = {**start.arguments, **({"t": end} if dated else {})}
@@ -172,6 +172,55 @@ def test_a_step_that_cannot_be_made_leaves_the_state(case: str, answers: dict[st
     assert failure["status"] in ("NOT_FINITE", "NO_CONVERGENCE")
     assert failure["steps"] == STEPS
     assert answers[case]["kept"]
+
+
+#: Tangent vectors: open ends, colours, a graph of colours, pairs, noise, the series with sweeps and Newton's method.
+CARRYING = {
+    **dict.fromkeys(("sheet", "volterra", "magnet", "tangle", "vortices"), test_tangents.with_tangents),
+    **{name: lambda name: carrying(test_acting.compiled(name)) for name in ("free", "bath")},
+    "stiff graph": lambda name: carrying(compiled(name)),
+}
+
+
+def carrying(compilation: Compilation) -> Compilation:
+    return compile_spec(compilation.spec, extras=Extras(tangent=True))
+
+
+@pytest.fixture(scope="module")
+def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[str, Any], np.ndarray, np.ndarray]]:
+    """What each answers, and the state and vectors that NumPy has."""
+    folder, jobs, expected = tmp_path_factory.mktemp("carried"), [], []
+    for case, made in CARRYING.items():
+        compilation = made(case)
+        if case in test_tangents.IN_C:
+            x = test_tangents.start(case, test_tangents.FEW.get(case))
+            values, h = test_tangents.disorder(case, x), test_tangents.H
+        elif case in test_acting.TEXTS:
+            (x, values), h = test_acting.given(case), 0.05
+        else:
+            begin, h = begun(case)
+            x, values = begin.state, begin.arguments
+        draws = {"seed": 5, "step0": 3} if compilation.program.noise else {}
+        vectors = np.random.default_rng(2).normal(size=(2, *x.shape))
+        solver = lattice_solver_of(compilation, "numpy")
+        expected.append(solver.step_tangent(x, h, vectors, parameters=values, **draws))
+        about = {n: np.ravel(v).tolist() if np.ndim(v) else float(v) for n, v in values.items()}
+        options = {"x0": x.ravel().tolist(), "sizes": x.shape[1:], "bonds": about.pop("bonds", None), "params": about}
+        path = folder / f"{case.replace(' ', '_')}.mjs"
+        path.write_text(*emit(compilation.program, "js", "phigen").values(), encoding="utf-8")
+        given = {"module": path.as_uri(), "options": options | draws, "h": h, "steps": 0}
+        jobs.append({**given, "vectors": vectors.reshape(2, -1).tolist()})
+    answers = node(folder, jobs)
+    return {case: (a, *e) for case, a, e in zip(CARRYING, answers, expected, strict=True)}
+
+
+@pytest.mark.parametrize("case", CARRYING)
+def test_tangent_vectors_are_those_of_numpy_to_roundoff(case: str, carried: dict[str, Any]) -> None:
+    found, after, vectors = carried[case]
+    size = np.abs(vectors).max()
+    np.testing.assert_allclose(np.reshape(found["carried"], vectors.shape), vectors, rtol=0, atol=1e-12 * size)
+    np.testing.assert_allclose(np.reshape(found["after"], after.shape), after, rtol=0, atol=1e-13 * np.abs(after).max())
+    assert found["unlike"]["status"] == "BAD_ARGUMENT"
 
 
 REFUSED = {

@@ -49,15 +49,10 @@ def emit(program: Program, command: str) -> dict[str, str]:
 
 
 def expect_offered(program: Program) -> None:
-    """Raise `SpecError` for adjoints, and for noise and tangents of lattices."""
+    """Raise `SpecError` for adjoints."""
     if program.step.adjoint:
         message = f"{program.name} asks for the transpose of steps, adjoint, which is not offered in JavaScript"
         raise SpecError([Diagnostic(message, hint="the targets c and numpy have it")])
-    if isinstance(program.step, Sweeps) and (program.noise or program.extras.tangent):
-        message = (
-            f"{program.name} is a lattice {'with noise' if program.noise else 'whose steps carry tangent vectors'}"
-        )
-        raise SpecError([Diagnostic(f"{message}, which is not offered in JavaScript", hint="c and numpy have it")])
 
 
 def _lattice(program: Program, step: Sweeps) -> str:
@@ -65,7 +60,7 @@ def _lattice(program: Program, step: Sweeps) -> str:
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
     pieces = [lattice.tables(program, step), *early, *_functions(program)]
     model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
-    return f"{model}\n\n{assembled(lattice.modules(step), lattice.switches(program, step))}\n"
+    return f"{model}\n\n{assembled(lattice.modules(program, step), lattice.switches(program, step))}\n"
 
 
 def _system_of_coordinates(program: Program) -> str:
@@ -73,9 +68,9 @@ def _system_of_coordinates(program: Program) -> str:
     step, features = program.step, _features(program)
     assert not isinstance(step, Sweeps)
     chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
-    modules = ["errors", "solver", chosen]
+    modules = ["errors", "march", "solver", chosen]
     modules += ["taylor"] if isinstance(step, Path) else []
-    modules += ["noise"] if program.noise else []
+    modules += ["philox", "noise"] if program.noise else []
     modules += ["guess"] if features["IMPLICIT"] else []
     modules += ["gauge" if program.searches_gauge else "gauge_formula"] if program.gauge else []
     modules += ["level"] if program.monitor else []

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.program import Program
+from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol, kind_of
 from phigen.targets.code import lower
@@ -26,14 +26,15 @@ _FIXED = "\N{NO-BREAK SPACE}"
 _INDEX = {"a": "i", "b": "j"}
 
 #: The runtime of lattices; after it what makes a step.
-MODULES = ("errors", "lattice", "sites")
+MODULES = ("errors", "march", "lattice", "sites")
 
 
-def modules(step: Sweeps) -> list[str]:
+def modules(program: Program, step: Sweeps) -> list[str]:
     """The modules of the runtime."""
+    noise = ["philox", "site_noise"] if program.noise else []
     if step.equation is None:
-        return [*MODULES, "flows"]
-    return [*MODULES, "sweeps", "krylov"]
+        return [*MODULES, *noise, "flows"]
+    return [*MODULES, *noise, "sweeps", "krylov", *["site_tangent"] * program.extras.tangent]
 
 
 def switches(program: Program, step: Sweeps) -> dict[str, bool]:
@@ -47,6 +48,8 @@ def switches(program: Program, step: Sweeps) -> dict[str, bool]:
         "GRAPH": _partners(step).graph,
         "SPLIT": step.equation is None,
         "BY_COLOUR": bool(step.by_colour),
+        "NOISE": program.noise is not None,
+        "TANGENT": program.extras.tangent,
     }
 
 
@@ -79,6 +82,9 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
         "at_sites": json.dumps(step.sites.parameters),
         "at_bonds": json.dumps(step.sites.at_bonds),
         "graph": _partners(step).graph,
+        "sources": json.dumps(program.noise.sources) if program.noise else "",
+        "parts": program.noise.parts if program.noise else 0,
+        "bound": json.dumps(BOUND),
     }
 
 
@@ -104,6 +110,7 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in schedule.flows)}]",
         "split": step.equation is None,
         "flows": f"[{', '.join(map(_listed, step.parts))}]",
+        "tangents": f"[{', '.join(map(_listed, _derivatives(step)))}]" if _derivatives(step) else "",
         "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
 
@@ -120,12 +127,14 @@ def kernels(program: Program, step: Sweeps) -> Iterator[str]:
         if sweep.gather:
             yield from (printed.gathering(ends, "coef") for ends in sweep.gather.ends)
         yield printed.sweep(sweep)
+        if tangent := sweep.tangent:
+            yield from (printed.gathering(ends, "coef") for ends in _ends(tangent.gather))
+            yield printed.sweep(tangent)
     if step.partners:
         for gather in (step.partners.energy, step.partners.field, step.partners.varied):
             yield from (printed.gathering(ends, "params") for ends in gather.ends)
     if step.equation:
-        for kernel in (step.equation.relax, step.equation.advance, step.equation.slope):
-            yield printed.of_equation(kernel)
+        yield from (printed.of_equation(kernel) for kernel in step.equation.kernels)
     seen = program.observables
     yield from (printed.seen(kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field))
 
@@ -175,9 +184,15 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
     ]
 
 
+def _derivatives(step: Sweeps) -> list[tuple[Sweep, ...]]:
+    """The derivatives of the sweeps of all parts; none where they were not asked for."""
+    found = [tuple(sweep.tangent for sweep in part if sweep.tangent) for part in step.parts]
+    return found if any(found) else []
+
+
 def _most_sums(step: Sweeps) -> int:
     """The most sums over other sites that are held for each."""
-    swept = [sweep.gather for part in step.parts for sweep in part if sweep.gather]
+    swept = [sweep.gather for part in (*step.parts, *_derivatives(step)) for sweep in part if sweep.gather]
     partners = _partners(step)
     return max(len(g.names) for g in (*swept, partners.energy, partners.field, partners.varied))
 
@@ -196,26 +211,31 @@ class _Printed:
         self.near, self.weights = _near(step), _bounds(step, program)
 
     def sweep(self, sweep: Sweep) -> str:
-        """A sweep: it changes x in place, since it reads elsewhere only what stands still."""
+        """A sweep: it changes x in place, since it reads elsewhere only what stands still; its derivative changes v."""
+        varied = sweep.kernel.name.startswith("tangent")
+        more = ["v"] * varied
         body = _Body(self, sweep.kernel, sweep.gather.names if sweep.gather else ())
-        stores = [(self._entry("x", sweep.moved[s.index]), body.show(s.value)) for s in body.code.stores]
+        changed = "v" if varied else "x"
+        stores = [(self._entry(changed, sweep.moved[s.index]), body.show(s.value)) for s in body.code.stores]
         if len(stores) > 1:
             body.lines += [f"const change{k} = {value};" for k, (_, value) in enumerate(stores)]
             stores = [(place, f"change{k}") for k, (place, _) in enumerate(stores)]
         body.lines += [f"{place} += {value};" for place, value in stores]
         by_colour = ["colour"] if self.step.by_colour else []
-        before = [f"{camel(e.kernel.name)}(coef, x, sites{', colour' * bool(by_colour)});" for e in _ends(sweep.gather)]
+        given = ", ".join(["coef", "x", *more, "sites", *by_colour])
+        before = [f"{camel(e.kernel.name)}({given});" for e in _ends(sweep.gather)]
         clear = ["sites.sums.fill(0);"] if before else []
         loop = "for (let i = 0; i < count; i++) {"
         if self.step.sites.colours > 1:
             body.lines.insert(0, "const i = chosen[k];")
             body.first.insert(0, f"const chosen = sites.coloured[{sweep.colour}];")
             loop = "for (let k = 0; k < chosen.length; k++) {"
-        return self._function(sweep.kernel, ["coef", "x", "sites", *by_colour], [*clear, *before], body, [loop])
+        arguments = ["coef", "x", *more, "sites", *by_colour]
+        return self._function(sweep.kernel, arguments, [*clear, *before], body, [loop])
 
     def of_equation(self, kernel: Kernel) -> str:
         """A kernel of the equation of a stage, at the y that is its x."""
-        starts, varied = "start" in kernel.inputs, kernel.name == "slope"
+        starts, varied = kernel.name in ("relax", "slope", "side"), kernel.name in ("slope", "side", "follow")
         arguments = ["coef", *["start"] * starts, "x", *["v"] * varied]
         gather = _partners(self.step).varied if varied else _partners(self.step).field
         body = _Body(self, kernel, gather.names)
@@ -251,7 +271,7 @@ class _Printed:
         else:
             body.lines.insert(0, "if (j === i) continue;")
             loops = ["for (let i = 0; i < count; i++) {", "  for (let j = 0; j < count; j++) {"]
-        varied = ["v"] if ends in _partners(self.step).varied.ends else []
+        varied = ["v"] if "varied" in ends.kernel.inputs or ends in _partners(self.step).varied.ends else []
         return self._function(ends.kernel, [first, "x", *varied, "sites", *by_colour], [], body, loops)
 
     def _forces(self, params: str, gather: Gather, more: str = "") -> list[str]:
@@ -309,7 +329,7 @@ class _Body:
         for array, s in used:
             if array == "t":
                 self.first.append(f"const {self.scope[s]} = sites.t;")
-            elif isinstance(s, Symbol):
+            elif isinstance(s, Symbol) and s not in printed.step.sites.places:
                 self._bind(s, list(sums))
             else:
                 self._read(s)
@@ -357,6 +377,9 @@ class _Body:
         fields = self.printed.program.coordinates
         if base in fields:
             return f"x[{at_field(site, fields.index(base))}]"
+        if base in self.printed.step.sites.increments:
+            number = self.printed.step.sites.increments.index(base)
+            return f"{self._array('sites.dw', Symbol('at', 'dw'))}[{at_field(site, number)}]"
         return f"{self._at(base)}[{site}]"
 
     def _at(self, parameter: str) -> str:

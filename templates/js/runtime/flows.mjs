@@ -1,4 +1,11 @@
 import { FLOWS } from "./model.mjs";
+// #if NOISE
+import { SOURCES } from "./model.mjs";
+import { drawAtSites } from "./site_noise.mjs";
+// #endif
+// #if TANGENT
+import { TANGENTS } from "./model.mjs";
+// #endif
 import { allFinite } from "./sites.mjs";
 
 // ---- The step of a splitting: flows of parts of H, one after the other ----
@@ -6,14 +13,39 @@ import { allFinite } from "./sites.mjs";
 /** One step: a status. If it fails, the state is of no use. */
 export function makeStep(solver) {
   const { x, rows, sites } = solver;
+  // #if NOISE
+  const back = sites.flows.length - SOURCES.length; // flows of the noise come first, and last backwards
+  let number = 0;
+  // #endif
   // #if BY_COLOUR
   for (const [part, row, colour] of sites.flows) {
+    // #if TANGENT
+    FLOWS[part].forEach((sweep, k) => {
+      for (const v of solver.vectors) TANGENTS[part][k](rows[row], x, v, sites, colour);
+      sweep(rows[row], x, sites, colour);
+    });
+    // #else
     for (const sweep of FLOWS[part]) sweep(rows[row], x, sites, colour);
+    // #endif
   }
   // #else
   for (const [part, row] of sites.flows) {
+    // #if NOISE
+    if (number === 0 || number === back) drawAtSites(solver, number === 0 ? 0 : 1);
+    number++;
+    // #endif
+    // #if TANGENT
+    FLOWS[part].forEach((sweep, k) => {
+      for (const v of solver.vectors) TANGENTS[part][k](rows[row], x, v, sites);
+      sweep(rows[row], x, sites);
+    });
+    // #else
     for (const sweep of FLOWS[part]) sweep(rows[row], x, sites);
+    // #endif
   }
+  // #endif
+  // #if TANGENT
+  if (!solver.vectors.every(allFinite)) return "NOT_FINITE";
   // #endif
   return allFinite(x) ? "OK" : "NOT_FINITE";
 }

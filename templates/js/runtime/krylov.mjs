@@ -60,6 +60,19 @@ function krylov(matrix, side) {
   return solution;
 }
 
+/** v of v - S v = side, with the derivative S of the equation for y and usual sizes; null as above. */
+export function linearised(coef, x, y, side, sizes, sites) {
+  const count = y.length / sizes.length;
+  const unit = (k) => sizes[Math.floor(k / count)];
+  const matrix = (scaled) => {
+    const out = new Float64Array(scaled.length);
+    slope(coef, x, y, scaled.map((v, k) => v * unit(k)), sites, out);
+    return out.map((moved, k) => scaled[k] - moved / unit(k));
+  };
+  const scaled = krylov(matrix, side.map((v, k) => v / unit(k)));
+  return scaled && scaled.map((v, k) => v * unit(k));
+}
+
 /** y at the middle of a stage by Newton's method; null where there is none near x. */
 export function byNewton(coef, x, guess, sites) {
   const y = Float64Array.from(guess);
@@ -70,17 +83,8 @@ export function byNewton(coef, x, guess, sites) {
   for (let correction = 0; correction < MOST_CORRECTIONS; correction++) {
     relax(coef, x, y, sites, image);
     if (!allFinite(image)) return null;
-    const sizes = usual(image);
-    const count = y.length / sizes.length;
-    const unit = (k) => sizes[Math.floor(k / count)];
-    const matrix = (scaled) => {
-      const out = new Float64Array(scaled.length);
-      slope(coef, y, scaled.map((v, k) => v * unit(k)), sites, out);
-      return out.map((moved, k) => scaled[k] - moved / unit(k));
-    };
-    const scaled = krylov(matrix, image.map((v, k) => (v - y[k]) / unit(k)));
-    if (scaled === null) return null;
-    const change = scaled.map((v, k) => v * unit(k));
+    const change = linearised(coef, x, y, image.map((v, k) => v - y[k]), usual(image), sites);
+    if (change === null) return null;
     add(y, 1, change);
     if (!allFinite(y)) return null;
     const size = sizeOf(change, y);

@@ -1,4 +1,5 @@
 import { StepError, finite } from "./errors.mjs";
+import { march } from "./march.mjs";
 import { CASIMIRS, CASIMIR_KINDS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
 import { AXES, COEFFICIENTS, SPEC_SHA256, TIMES, VERSION } from "./model.mjs";
 import { casimirs, energy, prepare, vectorField } from "./model.mjs";
@@ -7,6 +8,9 @@ import { MULTIPLES } from "./model.mjs";
 // #endif
 // #if RENEWED
 import { MOMENTS, PREPARED, refresh } from "./model.mjs";
+// #endif
+// #if NOISE
+import { drawsOf } from "./philox.mjs";
 // #endif
 import { Sites } from "./sites.mjs";
 import { makeStep } from "./flows.mjs";
@@ -45,6 +49,16 @@ export class Solver {
   /** Time since the start. */
   t = 0;
   // #endif
+  // #if NOISE
+  /** The random numbers of a step are a function of these, of the steps made before, and of the site. */
+  seed = 0;
+  member = 0;
+  step0 = 0;
+  // #endif
+  // #if TANGENT
+  /** The tangent vectors that a step carries along. */
+  vectors = [];
+  // #endif
   /** Good steps since the start. */
   steps = 0;
   /** The last step size. */
@@ -71,6 +85,11 @@ export class Solver {
    * #if TIMED
    * @param {number} [options.t0] the time of x0, 0 by default
    * #endif
+   * #if NOISE
+   * @param {number | bigint} [options.seed] which random numbers are taken, of 64 bits, 0 by default
+   * @param {number} [options.member] the same, of 32 bits, 0 by default
+   * @param {number} [options.step0] how many steps were made before x0, below 2^48, 0 by default
+   * #endif
    * #if GRAPH
    * @param {ArrayLike<number>} options.bonds the ends of all bonds, counted from 0: a, b of the first, …
    * #endif
@@ -83,6 +102,10 @@ export class Solver {
     this.before = Float64Array.from(this.x);
     // #if TIMED
     [this.t] = finite([options.t0 ?? 0], 1, "t0");
+    // #endif
+    // #if NOISE
+    Object.assign(this, drawsOf(options));
+    if (this.step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${this.step0}`);
     // #endif
     const rows = prepareStep(this.sites.params, 1e-100, this.rows);
     if (!rows.every((row) => row.every(Number.isFinite))) {
@@ -143,6 +166,26 @@ export class Solver {
     return this;
   }
 
+  // #if TANGENT
+  /**
+   * One step as `step` makes it, and where its derivative carries vectors, to round-off. Throws StepError;
+   * then the state is as before.
+   *
+   * @param {number} h
+   * @param {ArrayLike<number>[]} vectors laid out as x
+   * @returns {Float64Array[]}
+   */
+  stepTangent(h, vectors) {
+    this.vectors = vectors.map((v) => finite(v, this.x.length, "a tangent vector"));
+    try {
+      this.step(h);
+      return this.vectors;
+    } finally {
+      this.vectors = [];
+    }
+  }
+
+  // #endif
   /**
    * Many steps. Throws StepError; then x is the last good state, and steps counts the good ones.
    *
@@ -152,11 +195,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   // #if TIMED

@@ -10,6 +10,9 @@ import { GATHERED } from "./model.mjs";
 // #if GRAPH
 import { AT_BONDS } from "./model.mjs";
 // #endif
+// #if NOISE
+import { SOURCES } from "./model.mjs";
+// #endif
 // #if SPLIT
 import { SCHEDULE } from "./model.mjs";
 // #endif
@@ -50,6 +53,10 @@ export class Sites {
     // #if GATHER
     /** What bonds or pairs add up at each site. */
     this.sums = new Float64Array(GATHERED * this.count);
+    // #endif
+    // #if NOISE
+    /** The increments of the noise in a part of a step, of one source after the other. */
+    this.dw = new Float64Array(SOURCES.length * this.count);
     // #endif
     // #if SPLIT
     // #if BY_COLOUR

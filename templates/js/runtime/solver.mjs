@@ -1,4 +1,5 @@
 import { StepError, finite } from "./errors.mjs";
+import { march } from "./march.mjs";
 import { makeStage } from "./newton.mjs";
 // #if IMPLICIT
 import { History } from "./guess.mjs";
@@ -20,6 +21,7 @@ import { MIDDLES, MOMENTS, PREPARED, refresh } from "./model.mjs";
 // #if NOISE
 import { DRAWS, SOURCES, noiseFields } from "./model.mjs";
 import { draw } from "./noise.mjs";
+import { drawsOf } from "./philox.mjs";
 // #endif
 // #if MODIFIED
 import { modified } from "./model.mjs";
@@ -182,13 +184,7 @@ export class Solver {
     [this.t] = finite([options.t0 ?? 0], 1, "t0");
     // #endif
     // #if NOISE
-    const { seed = 0, member = 0, step0 = 0 } = options;
-    for (const [name, value] of Object.entries({ seed, member, step0 })) {
-      if (!((Number.isInteger(value) || typeof value === "bigint") && value >= 0)) {
-        throw new StepError("BAD_ARGUMENT", 0, `${name} is ${value}`);
-      }
-    }
-    Object.assign(this, { seed, member, step0 });
+    Object.assign(this, drawsOf(options));
     // #endif
     // #if HELD
     const { gauge } = options;
@@ -351,11 +347,7 @@ export class Solver {
    */
   integrate(h, count) {
     this.#setStep(h);
-    if (!(Number.isInteger(count) && count >= 0)) {
-      throw new StepError("BAD_ARGUMENT", this.steps, `the number of steps is ${count}`);
-    }
-    for (let k = 0; k < count; k++) this.step(h);
-    return this;
+    return march(this, h, count);
   }
 
   // #if KICKED

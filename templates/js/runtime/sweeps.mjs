@@ -1,6 +1,12 @@
 import { DIM, MOST_SWEEPS, SCHEDULE, increment, relax } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
 import { byNewton } from "./krylov.mjs";
+// #if NOISE
+import { drawAtSites } from "./site_noise.mjs";
+// #endif
+// #if TANGENT
+import { carry } from "./site_tangent.mjs";
+// #endif
 
 // ---- The step of the series: stages, of which each solves an equation on the whole lattice ----
 
@@ -80,6 +86,9 @@ function remember(differences, value) {
 /** One step: a status. If it fails, the state is of no use. */
 export function makeStep(solver) {
   const { x, rows, sites, past } = solver;
+  // #if NOISE
+  drawAtSites(solver, 0);
+  // #endif
   past.stages ??= SCHEDULE.map(() => ({ order: 0, differences: [] }));
   const change = new Float64Array(x.length);
   for (const [stage, [, row]] of SCHEDULE.entries()) {
@@ -98,6 +107,11 @@ export function makeStep(solver) {
     }
     if (y === null) return "NO_CONVERGENCE";
     own.order = remember(own.differences, y.map((v, k) => v - x[k]));
+    // #if TANGENT
+    for (const v of solver.vectors) {
+      if (!carry(coef, x, y, v, sites)) return "NO_CONVERGENCE";
+    }
+    // #endif
     increment(coef, y, sites, change);
     for (let k = 0; k < x.length; k++) x[k] += change[k];
     if (!allFinite(x)) return "NOT_FINITE";

@@ -1,0 +1,26 @@
+import { PARTS, SOURCES } from "./model.mjs";
+import { twoNormals, words } from "./philox.mjs";
+
+// ---- Noise at sites ----
+
+/**
+ * The increments of all sites in a part of the next step: a function of seed, member, step, part and site
+ * alone. A step of -h has them in the order in which it undoes one of h.
+ */
+export function drawAtSites(solver, part) {
+  const { seed, member, step0, steps, h, sites } = solver;
+  const { count, dw } = sites;
+  const [low, high] = words(BigInt(step0) + BigInt(steps));
+  const key = words(seed);
+  const pairs = Math.ceil(SOURCES.length / 2);
+  const first = pairs * (h < 0 ? PARTS - 1 - part : part);
+  const size = Math.sign(h) * Math.sqrt(Math.abs(h) / PARTS);
+  for (let pair = 0; pair < pairs; pair++) {
+    const beside = (high | ((first + pair) << 16)) >>> 0;
+    for (let site = 0; site < count; site++) {
+      const [one, other] = twoNormals([low, beside, member, site], key);
+      dw[2 * pair * count + site] = size * one;
+      if (2 * pair + 1 < SOURCES.length) dw[(2 * pair + 1) * count + site] = size * other;
+    }
+  }
+}

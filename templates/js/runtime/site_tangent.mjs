@@ -1,0 +1,39 @@
+import { linearised } from "./krylov.mjs";
+import { follow, side, slope } from "./model.mjs";
+import { allFinite } from "./sites.mjs";
+import { usual } from "./sweeps.mjs";
+
+// ---- Tangent vectors of the series ----
+
+/** Corrections of a variation of y; how small is rounding, and what is left when they shrink no more. */
+const MOST_REFINED = 200;
+const REFINED = 2 ** -54;
+const NEARLY = 1e-11;
+
+/** Where a stage carries v, in place: dy = S dy + side is solved, and moves it; false where that fails. */
+export function carry(coef, x, y, v, sites) {
+  const sizes = usual(y);
+  const count = y.length / sizes.length;
+  const length = (w) => Math.sqrt(w.reduce((sum, part, k) => sum + (part / sizes[Math.floor(k / count)]) ** 2, 0));
+  const [own, moved] = [new Float64Array(y.length), new Float64Array(y.length)];
+  side(coef, x, y, v, sites, own);
+  const size = length(own);
+  if (!Number.isFinite(size)) return false;
+  const found = Float64Array.from(own);
+  let before = Infinity;
+  for (let correction = 0; correction < MOST_REFINED; correction++) {
+    slope(coef, x, y, found, sites, moved);
+    const left = own.map((part, k) => part + moved[k] - found[k]);
+    const rest = length(left);
+    if (rest <= REFINED * size || (rest > 0.5 * before && rest <= NEARLY * size)) {
+      follow(coef, y, found, sites, moved);
+      for (let k = 0; k < v.length; k++) v[k] += moved[k];
+      return allFinite(v);
+    }
+    const change = linearised(coef, x, y, left, sizes, sites);
+    if (change === null) return false;
+    for (let k = 0; k < found.length; k++) found[k] += change[k];
+    before = rest;
+  }
+  return false;
+}
