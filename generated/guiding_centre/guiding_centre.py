@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: b50443d19997892fdcc2df5d7f0ad4ea83c898c485471aef1c63f29ce8965271
+# body-sha256: a6b4e66d0fb735b6213872c282f7739779455809a7ecf0ae4527ed8a2bf79157
 import numpy as np
 
 VERSION = "0.1.0"
@@ -396,18 +396,15 @@ def _path(coef, x, p):
     change, mean, made = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
     for pieces in (1, 2, 4, 8, 16, 32, 64, 128):
-        total, average = np.zeros((len(left), DIM)), np.zeros((len(left), DIM))
-        good = np.full(len(left), True)
+        on, total, average = left, np.zeros((len(left), DIM)), np.zeros((len(left), DIM))
         for _ in range(pieces):
-            shift, local, fine = _piece(_at(coef, left), p[left] / pieces, x[left] + total)
-            average += (total + local) / pieces
-            total += shift
-            made[left[good]] += 1
-            good &= fine
-            if not good.any():
+            shift, local, fine = _piece(_at(coef, on), p[on] / pieces, x[on] + total)
+            made[on] += 1
+            on, total, average = on[fine], (total + shift)[fine], (average + (total + local) / pieces)[fine]
+            if not len(on):
                 break
-        change[left[good]], mean[left[good]] = total[good], average[good]
-        left = left[~good]
+        change[on], mean[on] = total, average
+        left = left[~np.isin(left, on)]
         if not len(left):
             break
     return change, mean, made
@@ -421,17 +418,23 @@ def _residual(coef, x, p):
 
 
 def _differences(coef, x, p, residual):
-    """The Jacobian by differences, for steps so large that the approximate one does not contract; pieces made."""
-    made = np.zeros(len(x), dtype=int)
+    """The Jacobian by differences, for steps so large that the approximate one does not contract; pieces made.
+
+    NaN where a path cannot be followed.
+    """
+    jacobian, made = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
-    columns = []
+    left = np.arange(len(x))
     for j in range(DIM):
-        q = p.copy()
-        q[:, j] += 1e-7 * norm
-        shifted, _, _, pieces = _residual(coef, x, q)
-        columns.append((shifted - residual) / (q[:, j] - p[:, j])[:, np.newaxis])
-        made += pieces
-    return np.stack(columns, axis=-1), made
+        q = p[left]
+        q[:, j] += 1e-7 * norm[left]
+        shifted, change, _, pieces = _residual(_at(coef, left), x[left], q)
+        jacobian[left, :, j] = (shifted - residual[left]) / (q[:, j] - p[left, j])[:, np.newaxis]
+        made[left] += pieces
+        left = left[~np.isnan(change).any(axis=-1)]
+        if not len(left):
+            break
+    return jacobian, made
 
 
 def _solve(matrix, side):
@@ -496,6 +499,7 @@ def _attempt(coef, x, carry, p):
             at = open_[slow]
             jacobian[slow], pieces = _differences(_at(coef, at), x[at], p[at], residual[slow])
             made[at] += pieces
+            finite[slow] = ~np.isnan(jacobian[slow]).any(axis=(-1, -2))
         delta = _solve(jacobian, residual)
         singular = finite & ~done & ~np.isfinite(delta).all(axis=-1)
         status[open_[singular]] = "SINGULAR"
@@ -511,12 +515,13 @@ def _attempt(coef, x, carry, p):
 def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the last two p, for the starting guess."""
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
-    failed = np.flatnonzero(status != "")
-    if len(failed) and memory[0].any():
+    guessed = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & guessed)
+    if len(failed):
         # A guess from earlier steps may mislead: once more from p = 0.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], np.zeros_like(x[failed]))
         following[failed], rest[failed], p[failed], status[failed] = again
-    return following, rest, (p, memory[0] if memory[0].any() else p), status
+    return following, rest, (p, np.where(guessed[:, np.newaxis], memory[0], p)), status
 
 
 def _choose_gauge(parameters, x):

@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 04d53c1a7b81859d4f346b926b783d1dd5a739f01b7c572f4469280b46d29a0b
+# body-sha256: 06c51ba529a71bc30d53f7adabb9f0d467428c92e6c19982a8642cd76a32e400
 import numpy as np
 
 VERSION = "0.1.0"
@@ -220,12 +220,13 @@ def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the starting guess."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
-    failed = np.flatnonzero(status != "")
-    if len(failed) and memory[0].any():
+    guessed = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & guessed)
+    if len(failed):
         # A guess from earlier steps may mislead: once more from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
+    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):

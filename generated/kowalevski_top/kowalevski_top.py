@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c0a118b72c76d314af677c5a4c55c7e796c1f0b22d74836d2e33e65d4bba47d9
+# body-sha256: 7edbf3db3aeebe4d7692649caa042d2477bd8463cb98561fe1eb4a03e27b3c53
 import numpy as np
 
 VERSION = "0.1.0"
@@ -1121,12 +1121,13 @@ def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the starting guess."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
-    failed = np.flatnonzero(status != "")
-    if len(failed) and memory[0].any():
+    guessed = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & guessed)
+    if len(failed):
         # A guess from earlier steps may mislead: once more from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
+    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):

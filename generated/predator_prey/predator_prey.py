@@ -12,7 +12,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: fce1fe7a097389cb4a27b3d0214526d5a8091becdd1fd8bd0ab4ac63de0914fb
+# body-sha256: 70853b62e6487163efd4143e6658db1828a4d959edcd6e679887b990674968a3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -275,12 +275,13 @@ def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the starting guess."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
-    failed = np.flatnonzero(status != "")
-    if len(failed) and memory[0].any():
+    guessed = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & guessed)
+    if len(failed):
         # A guess from earlier steps may mislead: once more from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
+    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):

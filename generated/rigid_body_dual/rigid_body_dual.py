@@ -13,7 +13,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: e77583c1d4057ab02c713d8270ac9b4046098a39742e1e59386dc8955054c13e
+# body-sha256: c73aa0f0050cd0e03c5c799f9f199abcc73df894acc1db3a0c2e92777a20ab75
 import numpy as np
 
 VERSION = "0.1.0"
@@ -413,12 +413,13 @@ def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the offsets y - x of the last two steps, for the starting guess."""
     guess = x + (2 * memory[0] - memory[1])
     following, rest, y, status = _solved(stage, x, carry, guess)
-    failed = np.flatnonzero(status != "")
-    if len(failed) and memory[0].any():
+    guessed = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & guessed)
+    if len(failed):
         # A guess from earlier steps may mislead: once more from y = x.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], x[failed])
         following[failed], rest[failed], y[failed], status[failed] = again
-    return following, rest, (y - x, memory[0] if memory[0].any() else y - x), status
+    return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
 def _choose_gauge(parameters, x):

@@ -11,7 +11,7 @@
 #
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c3a0fb6cc0b47dbb446c9b99c100aa0e90c96066e92ef49c8c968f8a594ac63d
+# body-sha256: 4fa509d6463cbd008e73bd6c9dfd2dd9843622cf74041a41d1b78c4b6cca14ae
 import numpy as np
 
 VERSION = "0.1.0"
@@ -227,18 +227,15 @@ def _path(coef, x, p):
     change, mean, made = np.full_like(x, np.nan), np.full_like(x, np.nan), np.zeros(len(x), dtype=int)
     left = np.arange(len(x))
     for pieces in (1, 2, 4, 8, 16, 32, 64, 128):
-        total, average = np.zeros((len(left), DIM)), np.zeros((len(left), DIM))
-        good = np.full(len(left), True)
+        on, total, average = left, np.zeros((len(left), DIM)), np.zeros((len(left), DIM))
         for _ in range(pieces):
-            shift, local, fine = _piece(_at(coef, left), p[left] / pieces, x[left] + total)
-            average += (total + local) / pieces
-            total += shift
-            made[left[good]] += 1
-            good &= fine
-            if not good.any():
+            shift, local, fine = _piece(_at(coef, on), p[on] / pieces, x[on] + total)
+            made[on] += 1
+            on, total, average = on[fine], (total + shift)[fine], (average + (total + local) / pieces)[fine]
+            if not len(on):
                 break
-        change[left[good]], mean[left[good]] = total[good], average[good]
-        left = left[~good]
+        change[on], mean[on] = total, average
+        left = left[~np.isin(left, on)]
         if not len(left):
             break
     return change, mean, made
@@ -252,17 +249,23 @@ def _residual(coef, x, p):
 
 
 def _differences(coef, x, p, residual):
-    """The Jacobian by differences, for steps so large that the approximate one does not contract; pieces made."""
-    made = np.zeros(len(x), dtype=int)
+    """The Jacobian by differences, for steps so large that the approximate one does not contract; pieces made.
+
+    NaN where a path cannot be followed.
+    """
+    jacobian, made = np.full((len(x), DIM, DIM), np.nan), np.zeros(len(x), dtype=int)
     norm = np.max(np.abs(p), axis=-1) + np.finfo(float).tiny
-    columns = []
+    left = np.arange(len(x))
     for j in range(DIM):
-        q = p.copy()
-        q[:, j] += 1e-7 * norm
-        shifted, _, _, pieces = _residual(coef, x, q)
-        columns.append((shifted - residual) / (q[:, j] - p[:, j])[:, np.newaxis])
-        made += pieces
-    return np.stack(columns, axis=-1), made
+        q = p[left]
+        q[:, j] += 1e-7 * norm[left]
+        shifted, change, _, pieces = _residual(_at(coef, left), x[left], q)
+        jacobian[left, :, j] = (shifted - residual[left]) / (q[:, j] - p[left, j])[:, np.newaxis]
+        made[left] += pieces
+        left = left[~np.isnan(change).any(axis=-1)]
+        if not len(left):
+            break
+    return jacobian, made
 
 
 def _solve(matrix, side):
@@ -327,6 +330,7 @@ def _attempt(coef, x, carry, p):
             at = open_[slow]
             jacobian[slow], pieces = _differences(_at(coef, at), x[at], p[at], residual[slow])
             made[at] += pieces
+            finite[slow] = ~np.isnan(jacobian[slow]).any(axis=(-1, -2))
         delta = _solve(jacobian, residual)
         singular = finite & ~done & ~np.isfinite(delta).all(axis=-1)
         status[open_[singular]] = "SINGULAR"
@@ -342,12 +346,13 @@ def _attempt(coef, x, carry, p):
 def _advance(stage, x, carry, memory):
     """One stage of all members; `memory` holds the last two p, for the starting guess."""
     following, rest, p, status = _solved(stage, x, carry, 2 * memory[0] - memory[1])
-    failed = np.flatnonzero(status != "")
-    if len(failed) and memory[0].any():
+    guessed = memory[0].any(axis=-1)
+    failed = np.flatnonzero((status != "") & guessed)
+    if len(failed):
         # A guess from earlier steps may mislead: once more from p = 0.
         again = _solved(_stage_at(stage, failed), x[failed], carry[failed], np.zeros_like(x[failed]))
         following[failed], rest[failed], p[failed], status[failed] = again
-    return following, rest, (p, memory[0] if memory[0].any() else p), status
+    return following, rest, (p, np.where(guessed[:, np.newaxis], memory[0], p)), status
 
 
 def _choose_gauge(parameters, x):

@@ -140,6 +140,50 @@ def test_a_hopeless_path_ends_early(monkeypatch):
     assert len(pieces) <= MOST_PIECES + 4 * 2 * LONGEST_PATH
 
 
+def test_a_path_of_numpy_costs_and_is_the_same_whatever_the_others_are(monkeypatch):
+    """Members whose path is done, or lost, are followed no further; the others have the bits that they have alone."""
+    module = solver(compiled("nambu_pendulum"), "numpy").backend.module
+    x, p = np.tile([0.6, 0.1, 0.7], (4, 1)), np.outer([0.1, 40.0, 1e9, 0.3], [1.0, 0.8, -0.5])
+    rows, follow = [], module._piece
+    monkeypatch.setattr(module, "_piece", lambda coef, p, x: rows.append(len(x)) or follow(coef, p, x))
+    coef = np.zeros((1, 1))
+    together = module._path(coef, x, p)
+    assert sum(rows) == together[2].sum()
+    alone = [module._path(coef, x[m : m + 1], p[m : m + 1]) for m in range(4)]
+    for whole, parts in zip(together, zip(*alone, strict=True), strict=True):
+        assert bits(whole) == bits(np.concatenate(parts))
+    assert together[2].tolist()[0] == 1
+    assert together[2][1] > 1
+    assert np.isnan(together[0][2]).all()
+
+
+def test_differences_of_numpy_end_where_no_path_is_left(monkeypatch):
+    module, calls = solver(compiled("nambu_pendulum"), "numpy").backend.module, []
+    lost = np.full((2, 3), np.nan), np.full((2, 3), np.nan), np.array([8, 8])
+    monkeypatch.setattr(module, "_path", lambda *arguments: calls.append(1) or lost)
+    jacobian, made = module._differences(np.zeros((99, 1)), np.ones((2, 3)), np.ones((2, 3)), np.ones((2, 3)))
+    assert (len(calls), made.tolist()) == (1, [8, 8])
+    assert np.isnan(jacobian).any(axis=(1, 2)).all()
+
+
+@pytest.mark.parametrize("name", ["newton", "path"])
+def test_numpy_tries_again_only_where_a_guess_may_have_misled(name, monkeypatch):
+    """A member at rest has nothing to guess from; the others of an ensemble are no reason to solve for it twice."""
+    module, tried = solver(kind(name), "numpy").backend.module, []
+
+    def fail(stage, x, carry, guess):
+        tried.append(x.tolist())
+        return x.copy(), carry, guess, np.full(len(x), "NO_CONVERGENCE", dtype=object)
+
+    monkeypatch.setattr(module, "_solved", fail)
+    moving, still = [0.1, 0.2, 0.3], [0.0, 0.0, 0.0]
+    x, offsets = np.array([moving, still]), np.array([moving, still])
+    _, _, memory, status = module._advance((np.zeros((9, 1)), {}, 0.1), x, np.zeros_like(x), (offsets, offsets))
+    assert tried == [[moving, still], [moving]]
+    assert (status == "NO_CONVERGENCE").all()
+    assert memory[1].tolist() == [moving, still]
+
+
 @pytest.mark.parametrize(
     "changes", [{"h": 10**400}, {"h": [0.1, 0.2]}, {"h": np.nan}, {"m": 10**400}, {"x0": [10**400, 1]}]
 )
