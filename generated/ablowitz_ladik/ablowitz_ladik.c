@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: c28ea29f6a4e314b822969ff50da983562d000df93446a99cee92ae84666bd8f
+ * body-sha256: 2838e8d89c4f50a42cc7746b72888ca21542d2cf0575903f57725a81daa1030c
  */
 #include "ablowitz_ladik.h"
 
@@ -560,11 +560,10 @@ static int ablowitz_ladik_try(ablowitz_ladik_solver *s, size_t steps)
     return 0;
 }
 
-ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static ablowitz_ladik_status ablowitz_ladik_march(ablowitz_ladik_solver *s, size_t steps)
 {
-    ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
-    if (status != ablowitz_ladik_OK || steps == 0) return status;
-    ablowitz_ladik_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    ablowitz_ladik_status status = ablowitz_ladik_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = ablowitz_ladik_STRETCH; s->steps < end && status == ablowitz_ladik_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -578,6 +577,15 @@ ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double 
             status = ablowitz_ladik_NOT_FINITE;
         }
     }
+    return status;
+}
+
+ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
+{
+    ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
+    if (status != ablowitz_ladik_OK || steps == 0) return status;
+    ablowitz_ladik_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = ablowitz_ladik_march(s, steps);
     if (s->open && !ablowitz_ladik_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = ablowitz_ladik_NOT_FINITE;
         s->open = 0;

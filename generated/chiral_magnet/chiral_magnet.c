@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: 5711f8ab22334c366c741621475131b6b81a8460ae6fe5d077278b411fd6c6e7
+ * body-sha256: 56b94328506f884421d2286242e415a53d5114cee4bc13c59fd765e2dbf7850f
  */
 #include "chiral_magnet.h"
 
@@ -1031,11 +1031,10 @@ static int chiral_magnet_try(chiral_magnet_solver *s, size_t steps)
     return 0;
 }
 
-chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static chiral_magnet_status chiral_magnet_march(chiral_magnet_solver *s, size_t steps)
 {
-    chiral_magnet_status status = chiral_magnet_set_step(s, h);
-    if (status != chiral_magnet_OK || steps == 0) return status;
-    chiral_magnet_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    chiral_magnet_status status = chiral_magnet_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = chiral_magnet_STRETCH; s->steps < end && status == chiral_magnet_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -1049,6 +1048,15 @@ chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, 
             status = chiral_magnet_NOT_FINITE;
         }
     }
+    return status;
+}
+
+chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
+{
+    chiral_magnet_status status = chiral_magnet_set_step(s, h);
+    if (status != chiral_magnet_OK || steps == 0) return status;
+    chiral_magnet_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = chiral_magnet_march(s, steps);
     if (s->open && !chiral_magnet_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = chiral_magnet_NOT_FINITE;
         s->open = 0;

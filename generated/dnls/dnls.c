@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 0e4af5c1f1ba6d9f23a66c93167f289cacf94f2df2ff75a9dc17e56434903acb
+ * body-sha256: 2de0bdc6ffcf546e19a72bb24ebd55be117d61375147b788905677b8436a3dcb
  */
 #include "dnls.h"
 
@@ -503,11 +503,10 @@ static int dnls_try(dnls_solver *s, size_t steps)
     return 0;
 }
 
-dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static dnls_status dnls_march(dnls_solver *s, size_t steps)
 {
-    dnls_status status = dnls_set_step(s, h);
-    if (status != dnls_OK || steps == 0) return status;
-    dnls_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    dnls_status status = dnls_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_STRETCH; s->steps < end && status == dnls_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -521,6 +520,15 @@ dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
             status = dnls_NOT_FINITE;
         }
     }
+    return status;
+}
+
+dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
+{
+    dnls_status status = dnls_set_step(s, h);
+    if (status != dnls_OK || steps == 0) return status;
+    dnls_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = dnls_march(s, steps);
     if (s->open && !dnls_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = dnls_NOT_FINITE;
         s->open = 0;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: abd10887abadfafdf4382a3dfc8706f478b12e416bea22555ea256e81f02e6fc
+ * body-sha256: 1ce1e6d0617c8559594fa3f9bd2f4da47d1daedb5867d9aab251817697055f54
  */
 #include "dnls_disorder.h"
 
@@ -586,11 +586,10 @@ static int dnls_disorder_try(dnls_disorder_solver *s, size_t steps)
     return 0;
 }
 
-dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static dnls_disorder_status dnls_disorder_march(dnls_disorder_solver *s, size_t steps)
 {
-    dnls_disorder_status status = dnls_disorder_set_step(s, h);
-    if (status != dnls_disorder_OK || steps == 0) return status;
-    dnls_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    dnls_disorder_status status = dnls_disorder_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_disorder_STRETCH; s->steps < end && status == dnls_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -604,6 +603,15 @@ dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, 
             status = dnls_disorder_NOT_FINITE;
         }
     }
+    return status;
+}
+
+dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
+{
+    dnls_disorder_status status = dnls_disorder_set_step(s, h);
+    if (status != dnls_disorder_OK || steps == 0) return status;
+    dnls_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = dnls_disorder_march(s, steps);
     if (s->open && !dnls_disorder_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = dnls_disorder_NOT_FINITE;
         s->open = 0;

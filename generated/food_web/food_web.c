@@ -22,7 +22,7 @@
  *   5. The solver
  *   6. The flows
  *   7. What is seen at sites
- * body-sha256: a835997f274a6716f8f9d90cb56023c8a3d9f25c9f2857ad3c20ff5154bae75d
+ * body-sha256: 88a49ccd6d6bfa4fd56d40feb92a12a315d65fc13e8e763b17b2f938c5a7fc58
  */
 #include "food_web.h"
 
@@ -718,11 +718,10 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static food_web_status food_web_march(food_web_solver *s, size_t steps)
 {
-    food_web_status status = food_web_set_step(s, h);
-    if (status != food_web_OK || steps == 0) return status;
-    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    food_web_status status = food_web_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -736,6 +735,15 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
             status = food_web_NOT_FINITE;
         }
     }
+    return status;
+}
+
+food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
+{
+    food_web_status status = food_web_set_step(s, h);
+    if (status != food_web_OK || steps == 0) return status;
+    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = food_web_NOT_FINITE;
         s->open = 0;

@@ -23,7 +23,7 @@
  *   6. Several flows at once
  *   7. What is seen at sites
  *   8. Steps by hand
- * body-sha256: dcab33f682036c7781cddb1e9070fad22647db3748ab3db4e577b1e4ad4e3733
+ * body-sha256: 565625f1d95306edcc68e12e7d6ea80679c1f5b177262473fe96eaef2fea6697
  */
 #include "fput.h"
 
@@ -529,11 +529,10 @@ static int fput_try(fput_solver *s, size_t steps)
     return 0;
 }
 
-fput_status fput_integrate(fput_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static fput_status fput_march(fput_solver *s, size_t steps)
 {
-    fput_status status = fput_set_step(s, h);
-    if (status != fput_OK || steps == 0) return status;
-    fput_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    fput_status status = fput_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = fput_STRETCH; s->steps < end && status == fput_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -547,6 +546,15 @@ fput_status fput_integrate(fput_solver *s, double h, size_t steps)
             status = fput_NOT_FINITE;
         }
     }
+    return status;
+}
+
+fput_status fput_integrate(fput_solver *s, double h, size_t steps)
+{
+    fput_status status = fput_set_step(s, h);
+    if (status != fput_OK || steps == 0) return status;
+    fput_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = fput_march(s, steps);
     if (s->open && !fput_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = fput_NOT_FINITE;
         s->open = 0;

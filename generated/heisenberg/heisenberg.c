@@ -23,7 +23,7 @@
  *   6. Several flows at once
  *   7. What is seen at sites
  *   8. Steps by hand
- * body-sha256: ec14eb5340fe12287b9c7427da4c284e7b4542dde1239c4e0efcf07afa785dfb
+ * body-sha256: d794a8aea03cd569d951f910266d1a0c44adac87d8176bfecbb912cceb2233fc
  */
 #include "heisenberg.h"
 
@@ -869,11 +869,10 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
-heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
 {
-    heisenberg_status status = heisenberg_set_step(s, h);
-    if (status != heisenberg_OK || steps == 0) return status;
-    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    heisenberg_status status = heisenberg_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -892,6 +891,15 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
             status = heisenberg_NOT_FINITE;
         }
     }
+    return status;
+}
+
+heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
+{
+    heisenberg_status status = heisenberg_set_step(s, h);
+    if (status != heisenberg_OK || steps == 0) return status;
+    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = heisenberg_march(s, steps);
     if (s->open && !heisenberg_close(s)) { /* the last flow of the last step, before which steps go on */
         status = heisenberg_NOT_FINITE;
         s->open = 0;

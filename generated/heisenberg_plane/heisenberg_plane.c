@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 5945b85911c7ed2920d0aeea30c006e29fc090f07844f37945c3c70562e1e958
+ * body-sha256: 9a302a74a3cdb9fd27d7470fd026586d1c4e34e48ce5b280029a0ef6da2aab47
  */
 #include "heisenberg_plane.h"
 
@@ -645,11 +645,10 @@ static int heisenberg_plane_try(heisenberg_plane_solver *s, size_t steps)
     return 0;
 }
 
-heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static heisenberg_plane_status heisenberg_plane_march(heisenberg_plane_solver *s, size_t steps)
 {
-    heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
-    if (status != heisenberg_plane_OK || steps == 0) return status;
-    heisenberg_plane_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    heisenberg_plane_status status = heisenberg_plane_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_plane_STRETCH; s->steps < end && status == heisenberg_plane_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -663,6 +662,15 @@ heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, d
             status = heisenberg_plane_NOT_FINITE;
         }
     }
+    return status;
+}
+
+heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
+{
+    heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
+    if (status != heisenberg_plane_OK || steps == 0) return status;
+    heisenberg_plane_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = heisenberg_plane_march(s, steps);
     /* the last flow of the last step, before which steps go on */
     if (s->open && !heisenberg_plane_try(s, 0)) {
         status = heisenberg_plane_NOT_FINITE;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 776d70ffccf62196519cf139ee75828e61fcf4524292464525b25067065ec28b
+ * body-sha256: dcd4fef95eda0a7bd2f9810019398b1a71ea1998fb8b519b0e9840ce6138eca1
  */
 #include "klein_gordon.h"
 
@@ -459,11 +459,10 @@ static int klein_gordon_try(klein_gordon_solver *s, size_t steps)
     return 0;
 }
 
-klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static klein_gordon_status klein_gordon_march(klein_gordon_solver *s, size_t steps)
 {
-    klein_gordon_status status = klein_gordon_set_step(s, h);
-    if (status != klein_gordon_OK || steps == 0) return status;
-    klein_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    klein_gordon_status status = klein_gordon_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = klein_gordon_STRETCH; s->steps < end && status == klein_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -477,6 +476,15 @@ klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, siz
             status = klein_gordon_NOT_FINITE;
         }
     }
+    return status;
+}
+
+klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
+{
+    klein_gordon_status status = klein_gordon_set_step(s, h);
+    if (status != klein_gordon_OK || steps == 0) return status;
+    klein_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = klein_gordon_march(s, steps);
     if (s->open && !klein_gordon_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = klein_gordon_NOT_FINITE;
         s->open = 0;

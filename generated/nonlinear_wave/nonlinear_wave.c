@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 61944e6cbcd9edbf692a8976247dc2cfbb934ea39423bb5430b3dcd1babcf2ed
+ * body-sha256: 4d0a26fe7dcb555224c1934026572a5d4a020c9027a006a6dbf680c8e17c5a31
  */
 #include "nonlinear_wave.h"
 
@@ -469,11 +469,10 @@ static int nonlinear_wave_try(nonlinear_wave_solver *s, size_t steps)
     return 0;
 }
 
-nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static nonlinear_wave_status nonlinear_wave_march(nonlinear_wave_solver *s, size_t steps)
 {
-    nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
-    if (status != nonlinear_wave_OK || steps == 0) return status;
-    nonlinear_wave_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    nonlinear_wave_status status = nonlinear_wave_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = nonlinear_wave_STRETCH; s->steps < end && status == nonlinear_wave_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -487,6 +486,15 @@ nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double 
             status = nonlinear_wave_NOT_FINITE;
         }
     }
+    return status;
+}
+
+nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
+{
+    nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
+    if (status != nonlinear_wave_OK || steps == 0) return status;
+    nonlinear_wave_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = nonlinear_wave_march(s, steps);
     if (s->open && !nonlinear_wave_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = nonlinear_wave_NOT_FINITE;
         s->open = 0;

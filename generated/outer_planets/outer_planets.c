@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: eada05aee50f80c78462fd0a9f944b6250a3f71a61b9081942597b5d83d0100b
+ * body-sha256: 789c7d81da887b4a983560288992f358f03dc43ddbe8ee0d8c1bd02b6660ea80
  */
 #include "outer_planets.h"
 
@@ -591,11 +591,10 @@ static int outer_planets_try(outer_planets_solver *s, size_t steps)
     return 0;
 }
 
-outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static outer_planets_status outer_planets_march(outer_planets_solver *s, size_t steps)
 {
-    outer_planets_status status = outer_planets_set_step(s, h);
-    if (status != outer_planets_OK || steps == 0) return status;
-    outer_planets_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    outer_planets_status status = outer_planets_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = outer_planets_STRETCH; s->steps < end && status == outer_planets_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -609,6 +608,15 @@ outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, 
             status = outer_planets_NOT_FINITE;
         }
     }
+    return status;
+}
+
+outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
+{
+    outer_planets_status status = outer_planets_set_step(s, h);
+    if (status != outer_planets_OK || steps == 0) return status;
+    outer_planets_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = outer_planets_march(s, steps);
     if (s->open && !outer_planets_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = outer_planets_NOT_FINITE;
         s->open = 0;

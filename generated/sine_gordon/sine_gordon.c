@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 695ed55e74a6eb2d9b02586176da87033481f45f908a83d29bcae0647fba9d9d
+ * body-sha256: 33ff767ef2c2664fd9b400786638f8f161f52960108cdd31d90537c1918d5a7f
  */
 #include "sine_gordon.h"
 
@@ -495,11 +495,10 @@ static int sine_gordon_try(sine_gordon_solver *s, size_t steps)
     return 0;
 }
 
-sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static sine_gordon_status sine_gordon_march(sine_gordon_solver *s, size_t steps)
 {
-    sine_gordon_status status = sine_gordon_set_step(s, h);
-    if (status != sine_gordon_OK || steps == 0) return status;
-    sine_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    sine_gordon_status status = sine_gordon_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = sine_gordon_STRETCH; s->steps < end && status == sine_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -513,6 +512,15 @@ sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t
             status = sine_gordon_NOT_FINITE;
         }
     }
+    return status;
+}
+
+sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
+{
+    sine_gordon_status status = sine_gordon_set_step(s, h);
+    if (status != sine_gordon_OK || steps == 0) return status;
+    sine_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = sine_gordon_march(s, steps);
     if (s->open && !sine_gordon_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = sine_gordon_NOT_FINITE;
         s->open = 0;

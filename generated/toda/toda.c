@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: fb5a06a8fcfecc228a6ab8fc59de5c266aee2594793b9adf742b3d71eeaac399
+ * body-sha256: 7426c7609cd7da343b18775867bc426106b4f15c00931148fbb3b5e28ee10cf9
  */
 #include "toda.h"
 
@@ -477,11 +477,10 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-toda_status toda_integrate(toda_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static toda_status toda_march(toda_solver *s, size_t steps)
 {
-    toda_status status = toda_set_step(s, h);
-    if (status != toda_OK || steps == 0) return status;
-    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    toda_status status = toda_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -495,6 +494,15 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
             status = toda_NOT_FINITE;
         }
     }
+    return status;
+}
+
+toda_status toda_integrate(toda_solver *s, double h, size_t steps)
+{
+    toda_status status = toda_set_step(s, h);
+    if (status != toda_OK || steps == 0) return status;
+    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = toda_march(s, steps);
     if (s->open && !toda_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = toda_NOT_FINITE;
         s->open = 0;

@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 3c8dfa9f4b030c2861d1640c2585693c94ea58a52bffbddd1d925edc9a6cf10e
+ * body-sha256: 12b55271a45d82661f991920bb347746dfba56370e10bd55599466325dc73ff6
  */
 #include "volterra.h"
 
@@ -504,11 +504,10 @@ static int volterra_try(volterra_solver *s, size_t steps)
     return 0;
 }
 
-volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static volterra_status volterra_march(volterra_solver *s, size_t steps)
 {
-    volterra_status status = volterra_set_step(s, h);
-    if (status != volterra_OK || steps == 0) return status;
-    volterra_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    volterra_status status = volterra_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = volterra_STRETCH; s->steps < end && status == volterra_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -522,6 +521,15 @@ volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
             status = volterra_NOT_FINITE;
         }
     }
+    return status;
+}
+
+volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
+{
+    volterra_status status = volterra_set_step(s, h);
+    if (status != volterra_OK || steps == 0) return status;
+    volterra_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = volterra_march(s, steps);
     if (s->open && !volterra_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = volterra_NOT_FINITE;
         s->open = 0;

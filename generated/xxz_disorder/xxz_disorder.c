@@ -21,7 +21,7 @@
  *   4. The solver
  *   5. The flows
  *   6. What is seen at sites
- * body-sha256: 63650130f038481e1820c2f95a205868912bb6985cac5a485e2f25d4118b1e2c
+ * body-sha256: 36a0764d429ce943d9b03fe17897acd2186fada2f4731b82110414195c02642d
  */
 #include "xxz_disorder.h"
 
@@ -571,11 +571,10 @@ static int xxz_disorder_try(xxz_disorder_solver *s, size_t steps)
     return 0;
 }
 
-xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static xxz_disorder_status xxz_disorder_march(xxz_disorder_solver *s, size_t steps)
 {
-    xxz_disorder_status status = xxz_disorder_set_step(s, h);
-    if (status != xxz_disorder_OK || steps == 0) return status;
-    xxz_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    xxz_disorder_status status = xxz_disorder_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = xxz_disorder_STRETCH; s->steps < end && status == xxz_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -589,6 +588,15 @@ xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, siz
             status = xxz_disorder_NOT_FINITE;
         }
     }
+    return status;
+}
+
+xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
+{
+    xxz_disorder_status status = xxz_disorder_set_step(s, h);
+    if (status != xxz_disorder_OK || steps == 0) return status;
+    xxz_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = xxz_disorder_march(s, steps);
     if (s->open && !xxz_disorder_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = xxz_disorder_NOT_FINITE;
         s->open = 0;

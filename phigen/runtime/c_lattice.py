@@ -51,6 +51,8 @@ _NOISY = {**_PASSED, "set_noise": (_INT, (_POINTER, ctypes.c_uint64, ctypes.c_ui
 _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "tangent_size": (_SIZE, (_POINTER, _SIZE)),
     "integrate_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER)),
+    "trail_size": (_SIZE, (_POINTER, _SIZE)),
+    "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, *(_POINTER,) * 5, _SIZE)),
     "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
     "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE)),
     "stages": (_SIZE, ()),
@@ -64,6 +66,12 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "set_state": (_INT, (_POINTER, _POINTER)),
     "kick": (_INT, (_POINTER, _POINTER)),
 }
+
+#: Numbers that the trail of a segment takes at most, unless it is one step: those that the cache of a core holds.
+KEPT = 1 << 18
+
+#: States that segments of a run begin with for which a pullback has room, however large they are.
+STATES = 8
 
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
 _UPDATES_PER_CALL = 1 << 26
@@ -151,6 +159,23 @@ class CLatticeSession:
         if status:
             raise BackendError(status_name(status), self.steps, self.state()[None])
         return np.asarray(carried, dtype=np.float64)
+
+    def pull_back(self, h: float, steps: int, stride: int, bars: Floats, found: int) -> tuple[Floats, Floats]:
+        """The rows of a run but for the first, and the cotangent of the state, from those of these rows.
+
+        ``found`` is the address of a struct, to which the cotangents of parameters are added.
+        """
+        given = np.ascontiguousarray(bars, dtype=self._real)
+        rows, x0_bar = np.empty_like(given), np.empty(self._shape, self._real)
+        most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
+        state = x0_bar.nbytes
+        trail = np.empty(min(most or least, max(KEPT * x0_bar.itemsize, least + STATES * 2 * state)), dtype=np.uint8)
+        pointers = (rows.ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found, trail.ctypes.data)
+        status = self._c.pullback(self._address, h, steps, stride, *pointers, max(len(trail), least))
+        if status:
+            self.advance(h, steps)  # tells where
+            raise BackendError(status_name(status), 0, self.state()[None])
+        return np.asarray(rows, dtype=np.float64), np.asarray(x0_bar, dtype=np.float64)
 
     def hamiltonian(self) -> float:
         """H of the state."""
@@ -289,22 +314,31 @@ class CLattice:
         self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
         """See `phigen.runtime.lattice.LatticeBackend`."""
-        raise MissingExtraError("pullback")
+        if not hasattr(self._c, "pullback"):
+            raise MissingExtraError("pullback")
+        zero = dict.fromkeys(self.interface.parameters, 0.0)
+        struct, arrays = _packed(self.interface, zero, x0.shape[1:], len(parameters.get("bonds", ())))
+        rows, x0_bar = self.start(x0, parameters).pull_back(h, steps, stride, bars[1:], struct.ctypes.data)
+        found = {name: np.asarray(struct[name][0], dtype=np.float64) for name in zero if name not in arrays}
+        for name, own in arrays.items():
+            of_array = np.asarray(own, dtype=np.float64)
+            found[name] = of_array if np.ndim(parameters[name]) else of_array.sum()
+        return np.concatenate([x0[None], rows]), x0_bar + bars[0], {name: found[name] for name in zero}
 
 
 def _packed(
     interface: LatticeInterface, parameters: Mapping[str, Any], sizes: tuple[int, ...], bonds: int
-) -> tuple[NDArray[Any], list[NDArray[Any]]]:
-    """The struct of parameters, and the arrays that it points to."""
+) -> tuple[NDArray[Any], dict[str, NDArray[Any]]]:
+    """The struct of parameters, and the arrays that it points to, which are copies."""
     real: Any = np.float32 if interface.single else np.float64
     arrays = {*interface.at_sites, *interface.at_bonds}
     members = [(name, np.uintp if name in arrays else real) for name in interface.parameters] or [("unused", np.int8)]
-    struct, kept = np.zeros(1, dtype=np.dtype(members, align=True)), list[NDArray[Any]]()
+    struct, kept = np.zeros(1, dtype=np.dtype(members, align=True)), dict[str, NDArray[Any]]()
     for name in interface.parameters:
         value = parameters[name]
         if name in arrays:
             shape = sizes if name in interface.at_sites else (bonds,)
-            kept.append(np.ascontiguousarray(np.broadcast_to(np.asarray(value, dtype=real), shape)))
-            value = kept[-1].ctypes.data
+            kept[name] = np.array(np.broadcast_to(np.asarray(value, dtype=real), shape), order="C")
+            value = kept[name].ctypes.data
         struct[name] = value
     return struct, kept

@@ -40,3 +40,8 @@ class Kernel:
     def roots(self) -> list[Expression]:
         """The expressions of all outputs, in order."""
         return [v for o in self.outputs for v in o.values]
+
+    def along(self, array: str) -> list[tuple[str, Expression]]:
+        """Of a transpose: the symbols of an input with their cotangents."""
+        values = next((o.values for o in self.outputs if o.name == f"{array}_bar"), ())
+        return list(zip(self.inputs[array] if values else (), values, strict=True))

@@ -303,8 +303,6 @@ def test_c_failure_leaves_state_and_cotangents():
 def test_adjoint_is_refused_where_it_is_not_offered():
     with pytest.raises(SpecError, match="not offered in JavaScript"):
         emit(compilation("newton").program, "js", "phigen build")
-    with pytest.raises(SpecError, match="lattice, adjoint, which is not offered in C"):
-        compile("fput", target="c", adjoint=True)
     plain = compile_spec(compilation("newton").spec)
     assert all("adjoint" not in text for target in TARGETS for text in files(plain, target).values())
 

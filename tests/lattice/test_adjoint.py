@@ -5,10 +5,13 @@ from functools import cache
 import mpmath
 import numpy as np
 import pytest
+from lattice.lattices import LATTICES as SPECS
+from lattice.lattices import with_threads
 from support import precisely
 
 import phigen
 from phigen import SpecError, StepError
+from phigen.runtime import c_lattice
 
 H, STEPS, SITES = 0.05, 4, 6
 RING = {"bonds": np.array([[i, (i + 1) % SITES] for i in range(SITES)] + [[0, 2]])}
@@ -36,17 +39,25 @@ hamiltonian: p**2/2 + (1 + cos(t))*(q[i+1] - q)**2/2
 """
 
 
+#: In C: kicks, colours, open ends along two axes with parameters of neighbours.
+IN_C = {"fput": SITES, "volterra": SITES, "far_open": (4, 3)}
+
+
 @cache
 def made(name, target="numpy"):
     lattice, *series = name.split()
     more = {"scheme": "series", "order": 2} if series else {}
-    return phigen.compile(lattice, target=target, adjoint=True, **more)
+    more |= {"tangent": True} if target == "c" else {}
+    spec = phigen.spec.loads(SPECS[lattice]) if lattice == "far_open" else lattice
+    return phigen.compile(spec, target=target, adjoint=True, **more)
 
 
-def beginning(solver):
+def beginning(solver, sizes=SITES):
     """Sites that are all different; planets far from one another."""
-    x = 0.3 + 0.5 * np.random.default_rng(3).random((len(solver.interface.coordinates), SITES))
-    x[0] += 3 * np.arange(SITES) * (solver.interface.name == "outer_planets")
+    shape = np.empty((len(solver.interface.coordinates), *np.atleast_1d(sizes))).shape
+    x = 0.3 + 0.5 * np.random.default_rng(3).random(shape)
+    if solver.interface.name == "outer_planets":
+        x[0] += 3 * np.arange(SITES)
     return x
 
 
@@ -153,6 +164,54 @@ def test_members_and_their_disorder_have_cotangents():
     assert solver.pullback(x, H, 0, bar[0], B=0.5).parameters_bar["B"] == 0.0
 
 
+def weighed_tangents(solver, x, bar, stride, parameters):
+    """The derivatives of Σ bar·frames along some directions of the start, by tangent vectors; and the directions."""
+    along = np.random.default_rng(6).normal(size=(2, *x.shape))
+    found = np.array([np.sum(bar[0] * v) for v in along])
+    run = solver.tangents(x, H, STEPS + 1, along, stride, parameters=parameters)
+    for weights, (_, carried) in zip(bar[1:], run, strict=True):
+        found += [np.sum(weights * v) for v in carried]
+    return found, along
+
+
+@pytest.mark.parametrize("name", IN_C)
+def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
+    solver, numpy, random = made(name, "c"), made(name), np.random.default_rng(5)
+    x = beginning(solver, IN_C[name])
+    bar, given = random.normal(size=(4, *x.shape)), {"w": 1 + random.random(x.shape[1:])} if name == "far_open" else {}
+    frames, x0_bar, found = solver.pullback(x, H, STEPS + 1, bar, 2, parameters=given)
+    assert np.array_equal(frames, solver.integrate(x, H, STEPS + 1, 2, parameters=given).x)
+    expected = numpy.pullback(x, H, STEPS + 1, bar, 2, parameters=given)
+    assert x0_bar == pytest.approx(expected.x0_bar, rel=1e-13, abs=1e-13)
+    for parameter, value in expected.parameters_bar.items():
+        assert found[parameter] == pytest.approx(value, rel=1e-12, abs=1e-13), parameter
+    slopes, along = weighed_tangents(solver, x, bar, 2, given)
+    assert [np.sum(x0_bar * v) for v in along] == pytest.approx(slopes, rel=1e-12)
+
+
+def test_c_has_the_same_bits_for_any_memory(monkeypatch):
+    """Of steps that are made again from states that were kept, or where there is no room, from those before."""
+    solver, random = made("fput", "c"), np.random.default_rng(8)
+    x, bar = 0.3 * random.random((2, SITES)), random.normal(size=(4, 2, SITES))
+    whole = solver.pullback(x, H, 17, bar, 7)
+    for kept, states in ((0, 1), (0, 4), (1200, 1)):
+        monkeypatch.setattr(c_lattice, "KEPT", kept)
+        monkeypatch.setattr(c_lattice, "STATES", states)
+        part = solver.pullback(x, H, 17, bar, 7)
+        assert np.array_equal(part.x1, whole.x1)
+        assert np.array_equal(part.x0_bar, whole.x0_bar)
+        assert part.parameters_bar == whole.parameters_bar
+
+
+def test_c_has_the_same_bits_for_any_threads():
+    solver, random = made("fput", "c"), np.random.default_rng(8)
+    x, bar = 0.3 * random.random((2, 6000)), random.normal(size=(2, 6000))
+    found = [*with_threads(lambda: solver.pullback(x, H, 1, bar))]
+    for one in found:
+        assert np.array_equal(one.x0_bar, found[0].x0_bar)
+        assert one.parameters_bar == found[0].parameters_bar
+
+
 def test_what_cannot_be_pulled_back_is_told():
     solver = made("fput")
     x = beginning(solver)
@@ -168,4 +227,8 @@ def test_what_cannot_be_pulled_back_is_told():
     with pytest.raises(SpecError, match="adjoint is not offered for lattices with a time, forces or noise"):
         phigen.compile(phigen.spec.loads(SHAKEN), target="numpy")
     with pytest.raises(SpecError, match="not offered in C"):
-        made("fput", "c")
+        made("chiral_magnet", "c")
+    in_c = made("fput", "c")
+    with pytest.raises(StepError) as failed:
+        in_c.pullback(1e90 * x, H, 9, x)
+    assert (failed.value.status, failed.value.step) == ("NOT_FINITE", 0)

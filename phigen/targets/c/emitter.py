@@ -23,6 +23,7 @@ from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import function, members, printer
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.lanes import remembered
+from phigen.targets.c.lattice import adjoint as lattice_adjoint
 from phigen.targets.c.lattice import layout as lattice_layout
 from phigen.targets.c.lattice import model as lattice_model
 from phigen.targets.c.lattice.parts import sweeps
@@ -46,11 +47,11 @@ Sizes = list[tuple[str, int, str]]
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header.
 
-    Raises `SpecError` for what is not offered: adjoints of lattices.
+    Raises `SpecError` for what is not offered: adjoints of graphs, pairs, and the series of lattices.
     """
     name, lines = program.name, header_lines(program, command)
-    if isinstance(program.step, Sweeps) and program.step.adjoint:
-        message = f"{name} asks for the transpose of steps of a lattice, adjoint, which is not offered in C"
+    if isinstance(program.step, Sweeps) and program.step.adjoint and (program.step.partners or program.step.equation):
+        message = f"{name} asks for the transpose of steps, adjoint, which is not offered in C on graphs and by series"
         raise SpecError([Diagnostic(message, hint="the target numpy has it")])
     amalgam, header, code = _amalgam(program)
     written = single if program.single else str
@@ -88,6 +89,8 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
         "model.h": lattice_model.model(program, step),
         "sweeps.h": sweeps(program, step, lanes),
     }
+    if step.adjoint:
+        texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint)
     return Amalgam(program.name, has, texts), "lattice.h", "lattice.c"
 
 

@@ -459,6 +459,10 @@ phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, ch
 #include "lattice_tangent.c"
 #endif
 
+#if PHI_ADJOINT
+#include "lattice_adjoint.c"
+#endif
+
 #if !PHI_SERIES
 int phi_saved(const phi_solver *s, double *x, size_t *far)
 {

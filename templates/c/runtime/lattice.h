@@ -75,6 +75,9 @@ typedef struct {
     uint64_t first_plane, planes; /* of the whole lattice: the plane that is here the first, and how many there are; or 0 */
 #endif
 #endif
+#if PHI_ADJOINT
+    double *kept;             /* where steps keep what the sweeps of them change, while they do */
+#endif
 #if PHI_TANGENT
     size_t vectors;           /* tangent vectors that flows carry along, while they do */
     double *tangents;         /* the fields of the first, in rows, then those of the others */
@@ -158,6 +161,23 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 size_t phi_tangent_size(const phi_solver *s, size_t count);
 phi_status phi_step_tangent(phi_solver *s, double h, size_t count, double *v, void *work);
 phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t count, double *v, void *work);
+
+#endif
+#if PHI_ADJOINT
+/* Many steps as phi_integrate makes them from the state, and the transpose of their derivative: rows[row][field][site], if not
+   NULL, gets the states after stride, 2 * stride, ... steps and at the end, rows_bar are their cotangents. x0_bar[field][site]
+   gets the derivatives of sum rows_bar * rows along the state before, and *params_bar, where not NULL, gains those along the
+   parameters: its arrays have a number for each site, or bond, or are NULL. All is exact to round-off. trail is memory of so
+   many bytes, phi_trail_size(s, steps) for any number of steps: with as many as there are, each is made once. With less
+   they are made again, in pieces; more than for one step is room for states to begin these with, so that few are made
+   more than twice. On failure all is as before. */
+size_t phi_trail_size(const phi_solver *s, size_t steps);
+phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
+    double *x0_bar, phi_params_bar *params_bar, void *trail, size_t size);
+
+/* The same for one step, with phi_trail_size(s, 1) bytes; x0_bar may be x1_bar. */
+phi_status phi_step_adjoint(phi_solver *s, double h, const double *x1_bar, double *x0_bar, phi_params_bar *params_bar,
+    void *trail);
 
 #endif
 /* The state x[field][site]. */

@@ -114,10 +114,20 @@ static void phi_steps(const phi_solver *s, size_t steps)
     }
 }
 
+#if PHI_ADJOINT
+static size_t phi_numbers_kept(const phi_solver *s);
+static void phi_keep_steps(const phi_solver *s, size_t steps);
+
+#endif
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
 static int phi_try(phi_solver *s, size_t steps)
 {
+#if PHI_ADJOINT
+    if (s->kept != NULL) phi_keep_steps(s, steps);
+    else phi_steps(s, steps);
+#else
     phi_steps(s, steps);
+#endif
     if (phi_all_hold(s, s->x)) return 1;
     phi_copy(s->x, s->before, s);
     return 0;
@@ -136,11 +146,10 @@ static int phi_close(phi_solver *s)
 }
 
 #endif
-phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
+static phi_status phi_march(phi_solver *s, size_t steps)
 {
-    phi_status status = phi_set_step(s, h);
-    if (status != PHI_OK || steps == 0) return status;
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    phi_status status = PHI_OK;
     const size_t end = s->steps + steps;
     for (size_t stretch = PHI_STRETCH; s->steps < end && status == PHI_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -150,6 +159,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         if (phi_try(s, now)) {
             phi_copy(s->before, s->x, s);
             s->steps += now;
+#if PHI_ADJOINT
+            if (s->kept != NULL) s->kept += now * phi_numbers_kept(s);
+#endif
 #if !PHI_NOISE
             s->open = PHI_FLOWS > 1;
 #endif
@@ -167,6 +179,15 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
             status = PHI_NOT_FINITE;
         }
     }
+    return status;
+}
+
+phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+{
+    phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK || steps == 0) return status;
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    status = phi_march(s, steps);
 #if PHI_NEAR
     if (s->open && !phi_close(s)) { /* the last flow of the last step, before which steps go on */
 #else

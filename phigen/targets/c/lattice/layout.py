@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import VARIED, Gather, Partners, Sweeps
@@ -80,6 +81,7 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     """The layout of a lattice."""
     sites = step.sites
     offsets = [offset for _, offset in sites.places.values()]
+    offsets += [tuple(-o for o in offset) for offset in offsets] if step.adjoint else []
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
     used = (w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
     weights = dict.fromkeys(w for w in used if kind_of(w) == PRESENT)
@@ -110,6 +112,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "GRAPH": layout.graph,
         "BY_COLOUR": bool(step.by_colour),
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
+        "NUMBERED": any(p.at == "all" for p in program.parameters),
+        "HANDS": any(hands(step)),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "BANDED": banded,
@@ -125,6 +129,16 @@ def waves(program: Program, step: Sweeps) -> bool:
     """Whether several flows are made at once: of grids, where what a flow reads lies beside."""
     split = step.equation is None and step.partners is None
     return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
+
+
+def hands(step: Sweeps) -> list[bool]:
+    """Of each part of H whether its transpose gives anything to sites beside."""
+    found: list[bool] = []
+    back = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
+    for part in step.parts if step.adjoint else ():
+        read = [(s, e) for sweep in part for s, e in back[sweep.kernel.name + BACK].along("site")]
+        found.append(any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read))
+    return found
 
 
 def bounds(weight: str) -> list[tuple[int, int]]:

@@ -72,9 +72,10 @@ def forms_of(program: Program, kernel: Kernel) -> Iterator[tuple[Kernel, str]]:
 def _inside(kernel: Kernel) -> Kernel:
     """The kernel away from open ends."""
     weights = weights_of(kernel)
-    values = substitute(kernel.roots, dict.fromkeys(weights, ONE))
-    output, others = kernel.outputs[0].name, tuple(s for s in kernel.inputs["present"] if s not in weights)
-    return replace(kernel, inputs={**kernel.inputs, "present": others}, outputs=(Output(output, tuple(values)),))
+    values = iter(substitute(kernel.roots, dict.fromkeys(weights, ONE)))
+    others = tuple(s for s in kernel.inputs["present"] if s not in weights)
+    outputs = tuple(Output(o.name, tuple(next(values) for _ in o.values)) for o in kernel.outputs)
+    return replace(kernel, inputs={**kernel.inputs, "present": others}, outputs=outputs)
 
 
 def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Loop:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Sweeps
@@ -51,8 +51,15 @@ def declarations(program: Program, step: Sweeps) -> str:
         "noise": program.noise is not None,
         "members": listed or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
+        "bars": _bars(program, member) if step.adjoint else [],
     }
     return render("c", "lattice.h", values)
+
+
+def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
+    """The members of the struct of the derivatives along parameters."""
+    declared = [f"double {'*' * (p.at != 'all')}{member[p.name]};" for p in program.parameters]
+    return declared or ["char unused;"]
 
 
 def rows_of(step: Sweeps) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
@@ -32,6 +33,7 @@ class SiteNames:
         moved: set[str],
         calls: Mapping[str, str],
         sums: Sequence[str] = (),
+        seeds: Mapping[str, Sequence[str]] = MappingProxyType({}),
     ) -> None:
         self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
@@ -60,6 +62,8 @@ class SiteNames:
                 pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
                 self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
                 self.scope.bind(s, f"{pointer}[i]")
+            elif isinstance(s, Symbol) and s.kind in seeds:
+                self._loaded.append(f"{self.scope[s]} = {seeds[s.kind][int(s.key[0])]}")
             elif isinstance(s, Symbol) and s.kind == INCREMENT:
                 self._bind_site(s)
             elif isinstance(s, Symbol):

@@ -85,7 +85,7 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         yield replace(same[0], name=names[code]).text(program, [loop.purpose for loop in same])
     unused, varied = ["far"] * all(len(forms) == 1 for forms in made), rows is None
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
-    cases: list[_Case | str] = []
+    cases: list[Case | str] = []
     for k, forms in enumerate(made):
         if varied or not _has_rows_of_its_own(program, layout):
             cases.append(_case(program, layout, k, parts[k], forms, names))
@@ -94,9 +94,11 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         for form in sorted(forms):
             own = _case(program, layout, k, parts[k], {form: forms[form]}, names)
             title = f"The flow of H_{k + 1}" + ", for large arguments of functions" * (form == "_far")
-            yield _rows(program, layout, [own], title=title, head=f"rows{k + 1}{form}", arguments="const double *coef")
+            yield over_rows(
+                program, layout, [own], title=title, head=f"rows{k + 1}{form}", arguments="const double *coef"
+            )
         cases.append(f"{called[0] if len(called) == 1 else f'(far ? {called[0]} : {called[1]})'}(s, coef, first, end);")
-    yield _rows(
+    yield over_rows(
         program,
         layout,
         cases,
@@ -128,7 +130,7 @@ def _case(
     part: Sequence[Sweep],
     forms: Mapping[str, Sequence[_Call]],
     names: Mapping[str, str],
-) -> _Case:
+) -> Case:
     """The statements of a part of H, where the loops have ``names`` by their code."""
     coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
     lines = {
@@ -138,11 +140,11 @@ def _case(
     moved = sorted({f for sweep in part for f in sweep.moved})
     statements = [*_either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
     setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
-    return _Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]))
+    return Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]))
 
 
 @dataclass(frozen=True)
-class _Case:
+class Case:
     """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends."""
 
     calls: Sequence[str]
@@ -170,10 +172,10 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
     if plain and len(layout.step.sites.axes) > 1:
         yield _Call(loops[0], "at.from, at.wide")  # whole vectors: what lies beside a row is copied afresh
     else:
-        yield from _over_sites(loops)
+        yield from calls_over_sites(loops)
 
 
-def _over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
+def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
     """One loop for all sites, or two: for those away from open ends, and for those beside them."""
     if len(loops) == 1:
         yield _Call(loops[0])
@@ -213,7 +215,7 @@ def _of_equation(
             for one, more in forms_of(program, kernel)
         ]
         yield from (loop.text(program) for loop in loops)
-        lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in _over_sites(loops)]
+        lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in calls_over_sites(loops)]
     out = "s->x" if moves else "to" if varied else "s->y[1 - now]"
     reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = v;"] * varied
     titles = {
@@ -227,10 +229,10 @@ def _of_equation(
     ends = _copied_ends(program, layout, range(program.dimension), out) if changed else []
     measured = [f"{name}_measure(s->y[now], s->y[1 - now], &at, extent);"] if relaxing else []
     setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
-    yield _rows(
+    yield over_rows(
         program,
         layout,
-        [_Case([*gathered, *_either(lines), *ends, *measured], setup, has_ends(program, [kernel]))],
+        [Case([*gathered, *_either(lines), *ends, *measured], setup, has_ends(program, [kernel]))],
         title=titles[kernel.name],
         head=f"{kernel.name}_rows",
         arguments="const double *coef, int far, int now"
@@ -240,8 +242,13 @@ def _of_equation(
     )
 
 
-def _rows(program: Program, layout: Layout, cases: Sequence[_Case | str], **more: object) -> str:
-    """A function that goes over pieces of rows; what it does to each is one of some ``cases``, or what these call."""
+def over_rows(
+    program: Program, layout: Layout, cases: Sequence[Case | str], labels: Sequence[int] = (), **more: object
+) -> str:
+    """A function that goes over pieces of rows; what it does to each is one of some ``cases``, or what these call.
+
+    They have the numbers 1, 2, …, or those of ``labels``.
+    """
     last = [bounds(w)[-1] for w in layout.weights]
     values = {
         "NAME": program.name,
@@ -253,12 +260,12 @@ def _rows(program: Program, layout: Layout, cases: Sequence[_Case | str], **more
         [case] if isinstance(case, str) else render("c", "each_piece.c", {**values, **vars(case)}).splitlines()
         for case in cases
     ]
-    body = loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops), "}"]
+    body = loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels or range(1, 1 + len(loops))), "}"]
     return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": body, **more})
 
 
-def _cases(loops: Sequence[Sequence[str]]) -> Iterator[str]:
+def _cases(loops: Sequence[Sequence[str]], labels: Sequence[int]) -> Iterator[str]:
     """The cases of a switch over parts of H, with their statements."""
-    for k, lines in enumerate(loops, 1):
-        yield f"{'default' if k == len(loops) else f'case {k}'}: /* H_{k} */"
+    for k, lines in zip(labels, loops, strict=True):
+        yield f"{'default' if k == labels[-1] else f'case {k}'}: /* H_{k} */"
         yield from (f"    {line}" for line in (*lines, "break;"))

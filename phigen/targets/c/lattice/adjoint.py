@@ -1,0 +1,216 @@
+"""The transpose of a step of a lattice in C: loops that pull cotangents back through its sweeps.
+
+A sweep is gone back through in two goes, so that every site is written by itself alone, whatever the threads. In the
+first, each site finds what it gives to the values that it has read. What is its own it adds at once; what belongs to
+others it puts into arrays, one for each value that is ``handed``. In the second, each site adds what it is handed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Adjoint, Sweep, Sweeps
+from phigen.symbolic.symbols import COEFFICIENT, Symbol
+from phigen.targets.c.kernels import function, members
+from phigen.targets.c.lattice.layout import Layout, layout_of
+from phigen.targets.c.lattice.loops import Loop, forms_of, in_loops
+from phigen.targets.c.lattice.names import SiteNames, beside
+from phigen.targets.c.lattice.parts import Case, calls_over_sites, over_rows
+from phigen.targets.code import Code, lower
+from phigen.targets.rendering import render
+
+
+@dataclass(frozen=True)
+class Handed:
+    """A value that a sweep hands to the site at an offset: the number of its array, and the number of that of bars."""
+
+    array: int
+    base: int
+    offset: tuple[int, ...]
+
+
+def printed(program: Program, step: Sweeps, adjoint: Adjoint) -> str:
+    """The loops, and which of them go back through which part."""
+    layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
+    found = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
+    found += [function(program, adjoint.refresh)] if adjoint.refresh else []
+    back, hand, handed = list[Case](), list[Case](), list[list[Handed]]()
+    for part in step.parts:
+        own, calls, given = list[Handed](), list[str](), 0
+        for sweep in part:
+            kernel = kernels[f"{sweep.kernel.name}_back"]
+            listed = _handed(layout, kernel, given)
+            given = max([given, *(h.array + 1 for h in listed)])
+            loops = [_loop(program, layout, sweep, form, more, listed) for form, more in forms_of(program, kernel)]
+            found += [loop.text(program) for loop in loops]
+            sums = f"sums + unit * {program.name}_COEFFICIENTS"
+            calls += [
+                f"{program.name}_{call.loop.name}(coef, &at.row, {call.sites}, {sums});"
+                for call in calls_over_sites(loops)
+            ]
+            own += listed
+        calls += _ends(program, layout, own)
+        setup = ["at.row.x = x;", "at.row.bar = bar;", "at.row.handed = handed;"]
+        back.append(Case(calls, setup, any("second" in line for line in calls)))
+        handed.append(own)
+        if own:
+            loop = _handing(program, layout, len(handed), own)
+            found.append(loop.text(program))
+            where = [] if len(step.sites.axes) == 1 else _givers(program)
+            hand.append(Case([f"{program.name}_{loop.name}(&at.row, at.from, at.to);"], [*setup, *where], beside=False))
+    arguments = "const double *coef, double *const *x, double *const *bar, double *const *handed, double *sums"
+    found.append(_over(program, layout, back, "How a part goes back", "back_rows", arguments))
+    if hand:
+        labels = [k for k, own in enumerate(handed, 1) if own]
+        title = "What sites are handed"
+        arguments = arguments.removeprefix("const double *coef, ").removesuffix(", double *sums")
+        found.append(_over(program, layout, hand, title, "hand_rows", arguments, labels))
+    return "\n".join([_tables(program, step, handed), *found, _added(program, step, layout)])
+
+
+def _over(
+    program: Program,
+    layout: Layout,
+    cases: Sequence[Case],
+    title: str,
+    head: str,
+    arguments: str,
+    labels: Sequence[int] = (),
+) -> str:
+    more = {"title": title, "head": head, "arguments": f"int part, {arguments}", "coloured": False}
+    return over_rows(program, layout, cases, labels, unused=["part"] * (len(cases) == 1), **more)
+
+
+def _tables(program: Program, step: Sweeps, handed: Sequence[Sequence[Handed]]) -> str:
+    moved = [{f for sweep in part for f in sweep.moved} for part in step.parts]
+    rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in moved]
+    values = {
+        "NAME": program.name,
+        "parts": len(step.parts),
+        "moves": ", ".join(f"{{ {row} }}" for row in rows),
+        "hands": ", ".join(str(int(bool(own))) for own in handed),
+        "handed": max([1, *(h.array + 1 for own in handed for h in own)]),
+        "numbers": max(1, sum(p.at == "all" for p in program.parameters)),
+    }
+    return render("c", "lattice_adjoint.c", values)
+
+
+def _handed(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
+    """What a sweep hands to sites beside, in arrays from the first on: one for values that are the same."""
+    arrays: dict[int, int] = {}
+    found = []
+    for name, value in kernel.along("site"):
+        base, offset = layout.step.sites.places[name]
+        if any(offset) and not value.is_zero:
+            array = arrays.setdefault(id(value), first + len(arrays))
+            found.append(Handed(array, layout.arrays.index(base), offset))
+    return found
+
+
+def _loop(program: Program, layout: Layout, sweep: Sweep, kernel: Kernel, form: str, handed: Sequence[Handed]) -> Loop:
+    """The first go of a sweep."""
+    name, code, step = program.name, lower(kernel), layout.step
+    moved = [program.coordinates[i] for i in sweep.moved]
+    seeds = {"change_bar": [f"bar_{layout.arrays.index(f)}[i]" for f in moved]}
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds)
+    head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
+    used, given = {layout.arrays.index(f) for f in moved}, dict[int, str]()
+    places = {(h.base, h.offset): h.array for h in handed}
+    for store in (s for s in code.stores if not s.value.is_zero):
+        value = names.show(store.value)
+        if store.array == "coef_bar":
+            shares.append((store.index, value))
+            continue
+        base, offset = step.sites.places[kernel.inputs["site"][store.index]]
+        number = layout.arrays.index(base)
+        if any(offset):
+            given.setdefault(places[number, offset], value)
+        else:
+            used.add(number)
+            stores.append(f"bar_{number}[i] += {value};")
+    given |= {h.array: "0.0" for h in handed if h.array not in given}
+    stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
+    head += [f"    double *restrict bar_{k} = row->bar[{k}] + row->at[0];" for k in sorted(used)]
+    for array in given:
+        head.append(f"    double *restrict handed_{array} = row->handed[{array}] + row->at[0];")
+        if step.sites.colours > 1:
+            head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    body += [*stores, *(f"share{k}[i - begin] = {value};" for k, (_, value) in enumerate(shares))]
+    text = _looped(name, layout, sweep, [*head, *(f"    {line}" for line in names.pointers())], body, shares)
+    arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
+    return Loop(kernel.name + form, kernel.purpose, arguments, text)
+
+
+def _looped(
+    name: str, layout: Layout, sweep: Sweep, head: Sequence[str], body: Sequence[str], shares: Sequence[tuple[int, str]]
+) -> str:
+    """The loop over sites; where they have shares in sums, over so many of them at once that these are kept apart."""
+    coloured = layout.step.sites.colours > 1
+    begin, end = ("begin", "end") if shares else ("from", "to")
+    start = f"{name}_first(row, {sweep.colour}, {begin})" if coloured else begin
+    onward = f"i += {layout.colour_step}" if coloured else "++i"
+    loop = [f"{name}_EACH_SITE", f"for (ptrdiff_t i = {start}; i < {end}; {onward}) {{"]
+    loop += [*(f"    {line}" for line in body), "}"]
+    if not shares:
+        return "\n".join([*head, "    (void)sums;", *(f"    {line}" for line in loop)]) + "\n"
+    kept = ", ".join(f"share{k}[{name}_ADDED]" for k in range(len(shares)))
+    inner = [f"const ptrdiff_t end = to - begin < {name}_ADDED ? to : begin + {name}_ADDED;"]
+    if coloured:
+        inner += [f"memset(share{k}, 0, sizeof share{k});" for k in range(len(shares))]
+    inner += [*loop, *(f"sums[{c}] += {name}_added(share{k}, end - begin);" for k, (c, _) in enumerate(shares))]
+    lines = [f"double {kept};", f"for (ptrdiff_t begin = from; begin < to; begin += {name}_ADDED) {{"]
+    return "\n".join([*head, *(f"    {line}" for line in [*lines, *(f"    {line}" for line in inner), "}"])]) + "\n"
+
+
+def _unused(code: Code) -> list[str]:
+    return [] if any(isinstance(s, Symbol) and s.kind == COEFFICIENT for s in code.used) else ["    (void)coef;"]
+
+
+def _ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> Iterator[str]:
+    """What copies the ends of rows of what is handed along them; beyond open ends there is nothing."""
+    if layout.step.sites.open[-1]:
+        return
+    for array in sorted({h.array for h in handed if h.offset[-1]}):
+        yield f"{program.name}_ends(handed[{array}] + at.row.at[0], s->length, at.from, at.to);"
+
+
+def _handing(program: Program, layout: Layout, part: int, handed: Sequence[Handed]) -> Loop:
+    """The second go of a part: a site at an offset from another is handed what that has for it."""
+    sums: dict[int, list[str]] = {}
+    pointers: dict[str, str] = {}
+    for h in handed:
+        back = tuple(-o for o in h.offset)
+        line = layout.line(back)
+        pointer = f"handed_{h.array}" + (f"_{line}" if line else "")
+        pointers[pointer] = f"const double *restrict {pointer} = row->handed[{h.array}] + row->at[{line}];"
+        sums.setdefault(h.base, []).append(beside(pointer, back[-1]))
+    lines = [f"    {text}" for text in pointers.values()]
+    lines += [f"    double *restrict bar_{k} = row->bar[{k}] + row->at[0];" for k in sums]
+    lines += [f"    {program.name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines += [f"        bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]
+    purpose = f"what sites are handed by those around that the sweeps of H_{part} have changed"
+    arguments = f"const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
+    return Loop(f"hand{part}", purpose, arguments, "\n".join([*lines, "    }"]) + "\n")
+
+
+def _givers(program: Program) -> list[str]:
+    name = program.name
+    return [
+        f"ptrdiff_t givers[{name}_LINES];",
+        f"{name}_find_givers(s, unit / {name}_pieces(s), givers);",
+        "at.row.at = givers;",
+    ]
+
+
+def _added(program: Program, step: Sweeps, layout: Layout) -> str:
+    """How the derivatives along parameters are added to those of the caller."""
+    member = members(program)
+    plain = [member[p.name] for p in program.parameters if p.at == "all"]
+    sites: Mapping[str, int] = {member[p]: layout.arrays.index(p) for p in step.sites.parameters}
+    values = {"NAME": program.name, "numbers": plain, "sites": list(sites.items())}
+    return render("c", "lattice_bars.c", values)
