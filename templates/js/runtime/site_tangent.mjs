@@ -14,7 +14,8 @@ const NEARLY = 1e-11;
 export function carry(coef, x, y, v, sites) {
   const sizes = usual(y);
   const count = y.length / sizes.length;
-  const length = (w) => Math.sqrt(w.reduce((sum, part, k) => sum + (part / sizes[Math.floor(k / count)]) ** 2, 0));
+  const usually = (k) => sizes[Math.floor(k / count)];
+  const length = (w) => Math.sqrt(w.reduce((sum, part, k) => sum + (part / usually(k)) ** 2, 0));
   const [own, moved] = [new Float64Array(y.length), new Float64Array(y.length)];
   side(coef, x, y, v, sites, own);
   const size = length(own);
