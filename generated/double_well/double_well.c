@@ -26,7 +26,7 @@
  *   6. Noise
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 4ed6ab04a909d887d2cc75e54f8d708bccd3aaeb8557c2617b2903873738e2a9
+ * body-sha256: f7f3cc20fae3e03b8d899a638979e5a945ce29c5520fbbfd71524429d8a36ac7
  */
 #include "double_well.h"
 
@@ -345,7 +345,7 @@ static int double_well_draw(double_well_solver *s, const double *given)
     } else {
         double_well_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         /* so that a step of -h undoes one of h */
-        const double size = copysign(sqrt(fabs(s->h) / double_well_PARTS), s->h);
+        const double size = copysign(sqrt(fabs(s->h) / (double)double_well_PARTS), s->h);
         for (int k = 0; k < double_well_DRAWS; ++k) s->dw[k] *= size;
     }
     for (int k = 0; k < double_well_DRAWS; ++k)

@@ -28,7 +28,7 @@
  *   6. Noise
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 4460acb6d7269e87872c9c1e3dc6dac730f2e5b9fd432b077d7103f1f6d89146
+ * body-sha256: 77d80d6e80e64edd95521c8e4b0f0454e813bf088dfe9fd746311e4276af90de
  */
 #include "thermal_chain.h"
 
@@ -902,7 +902,7 @@ static int thermal_chain_draw(thermal_chain_solver *s, const double *given)
     } else {
         thermal_chain_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         /* so that a step of -h undoes one of h */
-        const double size = copysign(sqrt(fabs(s->h) / thermal_chain_PARTS), s->h);
+        const double size = copysign(sqrt(fabs(s->h) / (double)thermal_chain_PARTS), s->h);
         for (int k = 0; k < thermal_chain_DRAWS; ++k) s->dw[k] *= size;
     }
     for (int k = 0; k < thermal_chain_DRAWS; ++k)

@@ -30,7 +30,7 @@
  *   8. Krylov spaces
  *   9. Newton's method where sweeps fail
  *   10. What is seen at sites
- * body-sha256: 82fef0e98e53fcfb047c86a7b78ebd6429441bea481859907bc4d7e475c4fa86
+ * body-sha256: ac1d9429803a49b34830a7ea5254c107cd5d7080af1bd1563114a417b48d0758
  */
 #include "thermal_heisenberg.h"
 
@@ -717,7 +717,7 @@ static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, siz
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? thermal_heisenberg_PARTS - 1 - part
         : part) * ((thermal_heisenberg_SOURCES + 1) / 2);
-    const double size = copysign(sqrt(fabs(s->h) / thermal_heisenberg_PARTS), s->h);
+    const double size = copysign(sqrt(fabs(s->h) / (double)thermal_heisenberg_PARTS), s->h);
     const size_t pieces = thermal_heisenberg_pieces(s);
     for (size_t unit = first; unit < end; ++unit) {
         const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);

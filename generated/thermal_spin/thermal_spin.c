@@ -27,7 +27,7 @@
  *   6. Noise
  *   7. The solver
  *   8. Ensembles
- * body-sha256: 437c23da650005c91e497f702c437c395ac03f8d050018f652405d091de92cef
+ * body-sha256: a20c50188a1bf7c893d4531c62805b7070a8cbaee7b11b7159f006bf66e523f1
  */
 #include "thermal_spin.h"
 
@@ -432,7 +432,7 @@ static int thermal_spin_draw(thermal_spin_solver *s, const double *given)
     } else {
         thermal_spin_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
         /* so that a step of -h undoes one of h */
-        const double size = copysign(sqrt(fabs(s->h) / thermal_spin_PARTS), s->h);
+        const double size = copysign(sqrt(fabs(s->h) / (double)thermal_spin_PARTS), s->h);
         for (int k = 0; k < thermal_spin_DRAWS; ++k) s->dw[k] *= size;
     }
     for (int k = 0; k < thermal_spin_DRAWS; ++k)

@@ -115,7 +115,9 @@ def in_lanes(program: Program) -> Lanes | None:
     if not program.lanes:
         return None
     found = _of_steps(program) if program.offers("lanes") else None
-    return found or (_traces(program, program.step) if isinstance(program.step, Path) else None)
+    if found or program.single or not isinstance(program.step, Path):
+        return found  # lanes are of numbers of 64 bits
+    return _traces(program, program.step)
 
 
 def _of_steps(program: Program) -> Blocks | Packs | None:

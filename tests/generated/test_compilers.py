@@ -67,7 +67,8 @@ def test_all_c_is_cpp_as_well(compiler, tmp_path):
     solvers = sorted(GENERATED.glob("*/*.c"))
     after = "#include <stdlib.h>\nint restrict = 0; /* a macro no longer */\n"
     write(tmp_path, {"all.cpp": "".join(f'#include "{path}"\n' for path in solvers) + after})
-    run([tool(compiler), "-std=c++17", "-Wall", "-Werror", "-Wvla", "-fsyntax-only", "all.cpp"], tmp_path)
+    flags = ["-std=c++17", "-Wall", "-Wconversion", "-Werror", "-Wvla", "-fsyntax-only"]
+    run([tool(compiler), *flags, "all.cpp"], tmp_path)
 
 
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])

@@ -96,12 +96,10 @@ def test_lattices_move_as_in_double_precision(name):
     assert 1e-9 < np.abs(found.x - right.x).max() / np.abs(right.x).max() < 50 * ONE_STEP
 
 
-def test_derivatives_are_those_of_double_precision():
-    """The tangent map of a step, and gradients of a run."""
-    (made, other), (at, given) = (
-        in_single("rigid_body", tangent=True, adjoint=True),
-        numbers(in_single("rigid_body")[0]),
-    )
+@pytest.mark.parametrize("name", ["rigid_body", "nambu_pendulum"])
+def test_derivatives_are_those_of_double_precision(name):
+    """The tangent map of a step, and gradients of a run; along paths they are traced one by one."""
+    (made, other), (at, given) = in_single(name, tangent=True, adjoint=True), numbers(in_single(name)[0])
     (_, tangent), (_, right) = (solver(c, "c").step_tangent(at.x, at.h, **given) for c in (made, other))
     assert 1e-9 < np.abs(tangent - right).max() < ONE_STEP
     bars = [

@@ -29,7 +29,7 @@ static void phi_draw_rows(const phi_solver *s, size_t steps, int part, size_t fi
 {
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? PHI_PARTS - 1 - part : part) * ((PHI_SOURCES + 1) / 2);
-    const double size = copysign(sqrt(fabs(s->h) / PHI_PARTS), s->h);
+    const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h);
     const size_t pieces = phi_pieces(s);
     for (size_t unit = first; unit < end; ++unit) {
         const phi_piece at = phi_piece_of(s, unit);

@@ -27,7 +27,7 @@ static int phi_draw(phi_solver *s, const double *given)
         memmove(s->dw, given, sizeof s->dw);
     } else {
         phi_normals(s->seed, s->member, s->first_step + s->steps, s->dw);
-        const double size = copysign(sqrt(fabs(s->h) / PHI_PARTS), s->h); /* so that a step of -h undoes one of h */
+        const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h); /* so that a step of -h undoes one of h */
         for (int k = 0; k < PHI_DRAWS; ++k) s->dw[k] *= size;
 #if PHI_SPLITTING
         for (int k = 0; k < PHI_SOURCES && s->h < 0.0; ++k) { /* what was last in the step of h comes first */
