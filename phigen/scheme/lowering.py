@@ -61,7 +61,11 @@ def _power(base: Expression, exponent: Fraction) -> Expression:
 
 
 def _root(base: Expression, degree: int) -> Expression | None:
-    return raw("pow", (base,), Fraction(1, degree)) if degree in (2, 3) else None
+    """The root by square roots and at most one cube root, which other powers share; None for other degrees."""
+    if degree in (2, 3):
+        return raw("pow", (base,), Fraction(1, degree))
+    half = _root(base, degree // 2) if degree % 2 == 0 else None
+    return raw("pow", (half,), Fraction(1, 2)) if half is not None else None
 
 
 def _integer_power(base: Expression, n: int) -> Expression:

@@ -58,7 +58,7 @@ def test_lowered_form(sources, expected):
     assert [*lines, *(PRINTER(r) for r in roots)] == expected
 
 
-EXPONENTS = [Fraction(n, d) for d in (1, 2, 3, 5, 7) for n in (-23, -9, -4, -3, -2, -1, 1, 2, 3, 4, 5, 9, 16, 23)]
+EXPONENTS = [Fraction(n, d) for d in range(1, 9) for n in (-23, -9, -4, -3, -2, -1, 1, 2, 3, 4, 5, 9, 16, 23)]
 
 
 @pytest.mark.parametrize("exponent", EXPONENTS, ids=str)
@@ -71,7 +71,7 @@ def test_expanding_a_power_keeps_its_value(exponent):
 
 def test_expanded_powers_are_squares_reciprocals_roots_or_calls():
     left = {e.value for n in EXPONENTS for e in topological(expand_powers([power(x, n)])) if e.op == "pow"}
-    assert {v for v in left if v.denominator in (1, 2, 3)} == {2, -1, Fraction(1, 2), Fraction(1, 3)}
+    assert {v for v in left if v.denominator not in (5, 7)} == {2, -1, Fraction(1, 2), Fraction(1, 3)}
 
 
 def evaluated(assignments, roots, at):
