@@ -1,4 +1,5 @@
-"""A very eccentric orbit over many periods: ``monitor: log`` beside DOP853 with step control, compiled, and heyoka.
+"""A very eccentric orbit over many periods: ``monitor: log`` and the series with ``monitor: r2**(3/4)`` beside DOP853
+with step control, compiled, and heyoka.
 
 ``python -m benchmarks.eccentric [PERIODS]`` prints the table of docs/benchmarks.md. Times are CPU time on one core.
 Errors of phigen are those of all steps, where they are largest near the planet; of the others at eight times a period.
@@ -19,6 +20,9 @@ import numpy as np
 from scipy.integrate._ivp import dop853_coefficients as tableau
 
 import phigen
+from phigen import spec
+from phigen.api import solver_of
+from phigen.compiler import compile_spec
 from phigen.runtime import toolchain
 
 ECCENTRICITY, OBLATENESS = 0.99, 1e-6
@@ -113,6 +117,24 @@ def of_phigen(periods: int) -> Iterator[Row]:
         yield ("phigen, order 8, log", f"{steps} steps a period", *worst(found.x), taken)
 
 
+def of_series(periods: int) -> Iterator[Row]:
+    """The series with dt = r^(3/2) dτ, steps of order 2 composed to the orders 6 and 8."""
+    text = (Path(__file__).parents[1] / "specs" / "kepler_eccentric.yaml").read_text()
+    changes = {"scheme: splitting": "scheme: series", "monitor: log": "monitor: r2**(3/4)", "profile: small": ""}
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    for order, per in ((6, 60), (6, 100), (8, 40), (8, 60), (8, 80)):
+        solver = solver_of(compile_spec(spec.loads(text), order=order), "c")
+        h = PERIOD / per
+        few = solver.integrate(START, h, 50 * per, 50 * per, oblateness=OBLATENESS).t[-1]
+        total = round(periods * PERIOD * 50 * per / few)
+        begin = time.process_time()
+        solver.integrate(START, h, total, total, oblateness=OBLATENESS)
+        taken = time.process_time() - begin
+        found = solver.integrate(START, h, total, oblateness=OBLATENESS)
+        yield (f"phigen, order {order}, series", f"{total / periods:.0f} steps a period", *worst(found.x), taken)
+
+
 def of_dop853(periods: int) -> Iterator[Row]:
     """DOP853 with the step control of its authors, in C with the flags of phigen."""
     with tempfile.TemporaryDirectory() as folder:
@@ -175,7 +197,7 @@ def of_heyoka(periods: int) -> Iterator[Row]:
 def main() -> None:
     periods = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     print(f"| {periods} periods | | energy: first tenth | all | s |\n|---|---|---|---|---|")
-    for rows in (of_phigen, of_dop853, of_heyoka):
+    for rows in (of_phigen, of_series, of_dop853, of_heyoka):
         for name, said, first, whole, taken in rows(periods):
             print(f"| {name} | {said} | {first:.1e} | {whole:.1e} | {taken:.2f} |", flush=True)
 

@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 1fb140364e6381b4db055b662229c7946dc1e9d01a75e118a2ff6bfa1079c6b1
+ * body-sha256: a74b7e932c1b66053e8eb5f00c7043618ecc7c1b246dd00f96b7315f7236f162
  */
 #include "kowalevski_top.h"
 
@@ -2886,6 +2886,26 @@ static void kowalevski_top_record_lanes(kowalevski_top_history *history,
     history->count += kowalevski_top_LANES;
 }
 
+/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
+   mean the mean slope. */
+static void kowalevski_top_stride(const kowalevski_top_solver *s, double h, double x[kowalevski_top_DIM],
+    double mean[kowalevski_top_DIM])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
+    double point[kowalevski_top_DIM], slope[kowalevski_top_DIM];
+    memcpy(point, x, sizeof point);
+    memset(mean, 0, kowalevski_top_DIM * sizeof mean[0]);
+    for (int part = 0; part < 4; ++part) {
+        kowalevski_top_vector_field(&s->params, point, slope);
+        for (int i = 0; i < kowalevski_top_DIM; ++i) {
+            mean[i] += weight[part] * slope[i];
+            point[i] = x[i] + h * reach[part] * slope[i];
+        }
+    }
+    for (int i = 0; i < kowalevski_top_DIM; ++i) x[i] += h * mean[i];
+}
+
 /* y becomes the points whose alpha and beta have these means. */
 static void kowalevski_top_from_means(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
 {
@@ -2902,27 +2922,14 @@ static void kowalevski_top_from_means(kowalevski_top_lanes coef[restrict], kowal
 static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table,
     kowalevski_top_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
-        1.0 / 6.0 };
-    double x[kowalevski_top_DIM], point[kowalevski_top_DIM], slope[kowalevski_top_DIM],
-        mean[kowalevski_top_DIM];
+    double x[kowalevski_top_DIM], mean[kowalevski_top_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
     kowalevski_top_model *at = &models->stage;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            kowalevski_top_vector_field(&s->params, point, slope);
-            for (int i = 0; i < kowalevski_top_DIM; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < kowalevski_top_DIM; ++i) {
-            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
+        for (int i = 0; i < kowalevski_top_DIM; ++i) at->y[i][lane] = x[i];
+        kowalevski_top_stride(s, h, x, mean);
+        for (int i = 0; i < kowalevski_top_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
     }
     kowalevski_top_from_means(table->coef, &models->stage);
 }

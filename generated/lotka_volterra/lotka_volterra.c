@@ -27,7 +27,7 @@
  *   11. Members of an ensemble
  *   12. Groups of members
  *   13. Ensembles
- * body-sha256: 548d103c985279095d8ced6b25f7e47364c78de95b4ac35169197102a06988cd
+ * body-sha256: 85f7aa8b29a02707466b26f42019451757fab2f002676f615a01234d1974a49f
  */
 #include "lotka_volterra.h"
 
@@ -1012,6 +1012,26 @@ static void lotka_volterra_record_lanes(lotka_volterra_history *history,
     history->count += lotka_volterra_LANES;
 }
 
+/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
+   mean the mean slope. */
+static void lotka_volterra_stride(const lotka_volterra_solver *s, double h, double x[lotka_volterra_DIM],
+    double mean[lotka_volterra_DIM])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
+    double point[lotka_volterra_DIM], slope[lotka_volterra_DIM];
+    memcpy(point, x, sizeof point);
+    memset(mean, 0, lotka_volterra_DIM * sizeof mean[0]);
+    for (int part = 0; part < 4; ++part) {
+        lotka_volterra_vector_field(&s->params, point, slope);
+        for (int i = 0; i < lotka_volterra_DIM; ++i) {
+            mean[i] += weight[part] * slope[i];
+            point[i] = x[i] + h * reach[part] * slope[i];
+        }
+    }
+    for (int i = 0; i < lotka_volterra_DIM; ++i) x[i] += h * mean[i];
+}
+
 /* y becomes the points whose alpha and beta have these means. */
 static void lotka_volterra_from_means(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
 {
@@ -1028,27 +1048,14 @@ static void lotka_volterra_from_means(lotka_volterra_lanes coef[restrict], lotka
 static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table,
     lotka_volterra_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
-        1.0 / 6.0 };
-    double x[lotka_volterra_DIM], point[lotka_volterra_DIM], slope[lotka_volterra_DIM],
-        mean[lotka_volterra_DIM];
+    double x[lotka_volterra_DIM], mean[lotka_volterra_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
     lotka_volterra_model *at = &models->stage;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            lotka_volterra_vector_field(&s->params, point, slope);
-            for (int i = 0; i < lotka_volterra_DIM; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < lotka_volterra_DIM; ++i) {
-            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
+        for (int i = 0; i < lotka_volterra_DIM; ++i) at->y[i][lane] = x[i];
+        lotka_volterra_stride(s, h, x, mean);
+        for (int i = 0; i < lotka_volterra_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
     }
     lotka_volterra_from_means(table->coef, &models->stage);
 }

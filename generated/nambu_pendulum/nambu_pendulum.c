@@ -29,7 +29,7 @@
  *   13. Members of an ensemble
  *   14. Groups of members
  *   15. Ensembles
- * body-sha256: acf37441402f29910d2233345c985dd57e55209d33ac33c55d3ea7ff5ab4f7ff
+ * body-sha256: 8a879f86cdebe03e2bcd8362e2b99e855b04445748e0ca4b6d90906920836db0
  */
 #include "nambu_pendulum.h"
 
@@ -1757,6 +1757,26 @@ static void nambu_pendulum_record_lanes(nambu_pendulum_history *history,
     history->count += nambu_pendulum_LANES;
 }
 
+/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
+   mean the mean slope. */
+static void nambu_pendulum_stride(const nambu_pendulum_solver *s, double h, double x[nambu_pendulum_DIM],
+    double mean[nambu_pendulum_DIM])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
+    double point[nambu_pendulum_DIM], slope[nambu_pendulum_DIM];
+    memcpy(point, x, sizeof point);
+    memset(mean, 0, nambu_pendulum_DIM * sizeof mean[0]);
+    for (int part = 0; part < 4; ++part) {
+        nambu_pendulum_vector_field(&s->params, point, slope);
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+            mean[i] += weight[part] * slope[i];
+            point[i] = x[i] + h * reach[part] * slope[i];
+        }
+    }
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) x[i] += h * mean[i];
+}
+
 /* y becomes the points whose alpha and beta have these means. */
 static void nambu_pendulum_from_means(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model)
 {
@@ -1773,27 +1793,14 @@ static void nambu_pendulum_from_means(nambu_pendulum_lanes coef[restrict], nambu
 static void nambu_pendulum_march(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
     nambu_pendulum_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
-        1.0 / 6.0 };
-    double x[nambu_pendulum_DIM], point[nambu_pendulum_DIM], slope[nambu_pendulum_DIM],
-        mean[nambu_pendulum_DIM];
+    double x[nambu_pendulum_DIM], mean[nambu_pendulum_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
     nambu_pendulum_model *at = &models->stage;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            nambu_pendulum_vector_field(&s->params, point, slope);
-            for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) at->y[i][lane] = x[i];
+        nambu_pendulum_stride(s, h, x, mean);
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
     }
     nambu_pendulum_from_means(table->coef, &models->stage);
 }

@@ -29,7 +29,7 @@
  *   12. Members of an ensemble
  *   13. Groups of members
  *   14. Ensembles
- * body-sha256: ec0140ff9dc0e78871a448413295abfbd531fbb3fbe4d74f37def59e7f0dd364
+ * body-sha256: 8d264aef2fc8e8dfb57ecb08fc7081f8f12322f03d7adc037fc985cd825a2f14
  */
 #include "rigid_body.h"
 
@@ -1397,6 +1397,26 @@ static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lane
     history->count += rigid_body_LANES;
 }
 
+/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
+   mean the mean slope. */
+static void rigid_body_stride(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
+    double mean[rigid_body_DIM])
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
+        1.0 / 6.0 };
+    double point[rigid_body_DIM], slope[rigid_body_DIM];
+    memcpy(point, x, sizeof point);
+    memset(mean, 0, rigid_body_DIM * sizeof mean[0]);
+    for (int part = 0; part < 4; ++part) {
+        rigid_body_vector_field(&s->params, point, slope);
+        for (int i = 0; i < rigid_body_DIM; ++i) {
+            mean[i] += weight[part] * slope[i];
+            point[i] = x[i] + h * reach[part] * slope[i];
+        }
+    }
+    for (int i = 0; i < rigid_body_DIM; ++i) x[i] += h * mean[i];
+}
+
 /* y becomes the points whose alpha and beta have these means. */
 static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
@@ -1412,26 +1432,14 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
    Runge-Kutta method, to leading order. */
 static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
-        1.0 / 6.0 };
-    double x[rigid_body_DIM], point[rigid_body_DIM], slope[rigid_body_DIM], mean[rigid_body_DIM];
+    double x[rigid_body_DIM], mean[rigid_body_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
     rigid_body_model *at = &models->stage;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
-            rigid_body_vector_field(&s->params, point, slope);
-            for (int i = 0; i < rigid_body_DIM; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < rigid_body_DIM; ++i) {
-            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
+        for (int i = 0; i < rigid_body_DIM; ++i) at->y[i][lane] = x[i];
+        rigid_body_stride(s, h, x, mean);
+        for (int i = 0; i < rigid_body_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
     }
     rigid_body_from_means(table->coef, &models->stage);
 }

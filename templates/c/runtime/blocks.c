@@ -149,6 +149,79 @@ static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM]
     history->count += PHI_LANES;
 }
 
+/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end, mean the
+   mean slope. */
+#if PHI_TIMED
+static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM], double mean[PHI_DIM])
+#else
+static void phi_stride(const phi_solver *s, double h, double x[PHI_DIM], double mean[PHI_DIM])
+#endif
+{
+    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
+#if PHI_TIMED
+    static const double after[4] = { 0.0, 0.5, 0.5, 1.0 };
+#endif
+    double point[PHI_DIM], slope[PHI_DIM];
+    memcpy(point, x, sizeof point);
+    memset(mean, 0, PHI_DIM * sizeof mean[0]);
+    for (int part = 0; part < 4; ++part) {
+#if PHI_TIMED
+        phi_vector_field(&s->params, t + after[part] * h, point, slope);
+#else
+        phi_vector_field(&s->params, point, slope);
+#endif
+#if PHI_MONITOR
+        const double rate = phi_monitor(&s->params, point);
+        for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
+#endif
+        for (int i = 0; i < PHI_DIM; ++i) {
+            mean[i] += weight[part] * slope[i];
+            point[i] = x[i] + h * reach[part] * slope[i];
+        }
+    }
+    for (int i = 0; i < PHI_DIM; ++i) x[i] += h * mean[i];
+}
+
+#if PHI_COMPOSED && !PHI_PATH
+enum {
+    PHI_STRIDES = 2, /* of the Runge-Kutta method in a step: errors that all stages of it share */
+    PHI_MEETINGS = 4 /* evaluations of a stage until its point is nearly where alpha(y) = x */
+};
+
+/* Guesses where no recurrence is known. The beginnings of all steps are those of Runge-Kutta steps, made one after the
+   other; from there on each lane makes the stages of its own step, by iteration. */
+static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
+{
+    double x[PHI_DIM], mean[PHI_DIM];
+    phi_lanes begin[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        for (int i = 0; i < PHI_DIM; ++i) begin[i][lane] = x[i];
+        for (int part = 0; part < PHI_STRIDES && lane < PHI_LANES - 1; ++part)
+#if PHI_TIMED
+            phi_stride(s, s->t + (lane + (double)part / PHI_STRIDES) * s->h, s->h / PHI_STRIDES, x, mean);
+#else
+            phi_stride(s, s->h / PHI_STRIDES, x, mean);
+#endif
+    }
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *at = &models->stage[stage];
+        memcpy(at->y, begin, sizeof begin);
+        for (int meeting = 0; meeting < PHI_MEETINGS; ++meeting) {
+            phi_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+            for (int i = 0; i < PHI_DIM; ++i) {
+                PHI_EACH_LANE
+                for (int lane = 0; lane < PHI_LANES; ++lane) at->y[i][lane] = begin[i][lane] - at->displacement[i][lane];
+            }
+        }
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) begin[i][lane] += at->increment[i][lane];
+        }
+    }
+}
+
+#else
 /* y becomes the points whose alpha and beta have these means. */
 static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 {
@@ -164,10 +237,8 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
    method, to leading order. */
 static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
 {
-    static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
-    double x[PHI_DIM], point[PHI_DIM], slope[PHI_DIM], mean[PHI_DIM];
+    double x[PHI_DIM], mean[PHI_DIM];
 #if PHI_TIMED
-    static const double after[4] = { 0.0, 0.5, 0.5, 1.0 };
     double begin = s->t;
 #endif
     memcpy(x, s->x, sizeof x);
@@ -181,34 +252,19 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
     phi_model *at = &models->stage[0];
     for (int lane = 0; lane < PHI_LANES; ++lane) {
 #endif
-        memcpy(point, x, sizeof x);
-        memset(mean, 0, sizeof mean);
-        for (int part = 0; part < 4; ++part) {
+        for (int i = 0; i < PHI_DIM; ++i) at->y[i][lane] = x[i];
 #if PHI_TIMED
-            phi_vector_field(&s->params, begin + after[part] * h, point, slope);
-#else
-            phi_vector_field(&s->params, point, slope);
-#endif
-#if PHI_MONITOR
-            const double rate = phi_monitor(&s->params, point);
-            for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
-#endif
-            for (int i = 0; i < PHI_DIM; ++i) {
-                mean[i] += weight[part] * slope[i];
-                point[i] = x[i] + h * reach[part] * slope[i];
-            }
-        }
-        for (int i = 0; i < PHI_DIM; ++i) {
-            at->y[i][lane] = x[i] + 0.5 * h * mean[i];
-            x[i] += h * mean[i];
-        }
-#if PHI_TIMED
+        phi_stride(s, begin, h, x, mean);
         begin += h;
+#else
+        phi_stride(s, h, x, mean);
 #endif
+        for (int i = 0; i < PHI_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
     }
     for (int stage = 0; stage < PHI_STAGES; ++stage) phi_from_means(table->coef[stage], &models->stage[stage]);
 }
 
+#endif
 /* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not near the state. */
 static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
 {
