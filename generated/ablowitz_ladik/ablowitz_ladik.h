@@ -2,11 +2,10 @@
  * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e9ba61749753b55afcbbafb23945e6e15514c7f0f7f06b80f6ce8c8102766db3
+ * body-sha256: 2fbec0742fd019ccb2e96e45a4b320fad214663d159873715bd6885a4e5aca1d
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -98,5 +97,4 @@ size_t ablowitz_ladik_solver_steps_done(const ablowitz_ladik_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* ABLOWITZ_LADIK_H */

@@ -2,11 +2,10 @@
  * ablowitz_ladik3.h: the declarations; ablowitz_ladik3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7e83deacf7ce5291dcaae77164e467a271c442690af5adbec3e108e78aa301f3
+ * body-sha256: ade62bd4bd8457c0eb2b5d25aa79048a457de953e534802343bfe971894e1c98
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define ablowitz_ladik3_CASIMIRS 0
 #define ablowitz_ladik3_PHIGEN_VERSION "0.1.0"
 #define ablowitz_ladik3_SPEC_SHA256 "522a22e2eba41e15ba83081c2557c3d42d94541601f5914945494027ebf938e2"
+enum { ablowitz_ladik3_STAGES = 5 };       /* of a step */
+enum { ablowitz_ladik3_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: x1, y1, x2, y2, x3, y3. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } ablowitz_ladik3_params;
-
 extern const ablowitz_ladik3_params ablowitz_ladik3_default_params;
-
-enum { ablowitz_ladik3_STAGES = 5 };       /* of a step */
-enum { ablowitz_ladik3_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; ablowitz_ladik3_status_string says it in words. */
 typedef enum {
     ablowitz_ladik3_OK = 0, ablowitz_ladik3_NO_CONVERGENCE, ablowitz_ladik3_SINGULAR,
         ablowitz_ladik3_NOT_FINITE, ablowitz_ladik3_BAD_ARGUMENT
 } ablowitz_ladik3_status;
+const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status);
 
 enum { ablowitz_ladik3_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[ablowitz_ladik3_DIFFERENCES][ablowitz_ladik3_DIM];
 } ablowitz_ladik3_history;
 
@@ -66,10 +63,8 @@ typedef struct {
 ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
     const double x0[ablowitz_ladik3_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 ablowitz_ladik3_status ablowitz_ladik3_step(ablowitz_ladik3_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 ablowitz_ladik3_status ablowitz_ladik3_integrate(ablowitz_ladik3_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -91,8 +86,6 @@ void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double
 void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[ablowitz_ladik3_DIM],
     double out[ablowitz_ladik3_DIM]);
 
-const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status);
-
 /* For bindings: the size of ablowitz_ladik3_solver, and its count of good steps. */
 size_t ablowitz_ladik3_solver_size(void);
 size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s);
@@ -100,5 +93,4 @@ size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* ABLOWITZ_LADIK3_H */

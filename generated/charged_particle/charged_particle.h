@@ -2,11 +2,10 @@
  * charged_particle.h: the declarations; charged_particle.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2c52d38262ff35e821f2985b85d592fcf0831763c531c77f4382ad0cd00eabd2
+ * body-sha256: 1a77cf484ae80f17e0c4036ab14f1cfc0a9c10fc1f1ae6cc3e095b03d02d28cd
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define charged_particle_CASIMIRS 0
 #define charged_particle_PHIGEN_VERSION "0.1.0"
 #define charged_particle_SPEC_SHA256 "6bda6268e8c6b32b81eb7049d472c6dd6ed8376176c222eb700c90680204f278"
+enum { charged_particle_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, z, u, v, w. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } charged_particle_params;
-
 extern const charged_particle_params charged_particle_default_params;
-
-enum { charged_particle_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
 /* How a step ends; charged_particle_status_string says it in words. */
 typedef enum {
     charged_particle_OK = 0, charged_particle_NO_CONVERGENCE, charged_particle_SINGULAR,
         charged_particle_NOT_FINITE, charged_particle_BAD_ARGUMENT
 } charged_particle_status;
+const char *charged_particle_status_string(charged_particle_status status);
 
 enum { charged_particle_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[charged_particle_DIFFERENCES][charged_particle_DIM];
 } charged_particle_history;
 
@@ -64,10 +61,8 @@ typedef struct {
 charged_particle_status charged_particle_init(charged_particle_solver *s,
     const charged_particle_params *params, const double x0[charged_particle_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 charged_particle_status charged_particle_step(charged_particle_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 charged_particle_status charged_particle_integrate(charged_particle_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -90,8 +85,6 @@ void charged_particle_casimirs(const charged_particle_params *params, const doub
 void charged_particle_vector_field(const charged_particle_params *params,
     const double x[charged_particle_DIM], double out[charged_particle_DIM]);
 
-const char *charged_particle_status_string(charged_particle_status status);
-
 /* For bindings: the size of charged_particle_solver, and its count of good steps. */
 size_t charged_particle_solver_size(void);
 size_t charged_particle_solver_steps_done(const charged_particle_solver *s);
@@ -99,5 +92,4 @@ size_t charged_particle_solver_steps_done(const charged_particle_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* CHARGED_PARTICLE_H */

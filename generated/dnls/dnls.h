@@ -2,11 +2,10 @@
  * dnls.h: the declarations; dnls.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eb9a422330c2a25a4173c11b2958bec8d22b5429ca9239944281170e839a81cd
+ * body-sha256: d844630029098cae9dbc68a027ad2dae6c0038f39c98583854d06dc631c2d8de
  */
 #ifndef DNLS_H
 #define DNLS_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -96,5 +95,4 @@ size_t dnls_solver_steps_done(const dnls_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* DNLS_H */

@@ -2,11 +2,10 @@
  * dnls_disorder.h: the declarations; dnls_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eaed40e032f579125d3b050f83d7cf06432981cd059af0d34d898f0c48a68747
+ * body-sha256: f0d93950712c0a309da00ba7cf09ee234c992dbd6aad44fc7ec551f1986d9017
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -99,5 +98,4 @@ size_t dnls_disorder_solver_steps_done(const dnls_disorder_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* DNLS_DISORDER_H */

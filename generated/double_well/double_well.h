@@ -2,11 +2,10 @@
  * double_well.h: the declarations; double_well.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f8bfc7df583d7352fd2eb7eab6ca2ddbd643005174bff08a235bb8a2e77b2c76
+ * body-sha256: 7f6c8d05c6ef28af8575b83cd91d04d7c1ebcc87a2e591244db9d0b6137a6876
  */
 #ifndef DOUBLE_WELL_H
 #define DOUBLE_WELL_H
-
 #include <stddef.h>
 #include <stdint.h>
 #ifdef __cplusplus
@@ -18,6 +17,10 @@ extern "C" {
 #define double_well_CASIMIRS 0
 #define double_well_PHIGEN_VERSION "0.1.0"
 #define double_well_SPEC_SHA256 "0601523ef6377cf687c3f6e7ce01a7ca92d1fa3aab823b00499b6553011ac36c"
+enum { double_well_COEFFICIENTS = 10 }; /* numbers that depend on params and h, and on the noise */
+enum { double_well_SOURCES = 1 };       /* of noise: bath */
+enum { double_well_DRAWS = 1 };         /* increments of the noise in a step */
+enum { double_well_PARTS = 1 };         /* increments of one source in a step, each of a part of it */
 
 /* State vectors: q, p. Casimirs: none. */
 typedef struct {
@@ -25,19 +28,14 @@ typedef struct {
     double gamma;   /* friction */
     double T;       /* temperature */
 } double_well_params;
-
 extern const double_well_params double_well_default_params;
-
-enum { double_well_COEFFICIENTS = 10 }; /* numbers that depend on params and h, and on the noise */
-enum { double_well_SOURCES = 1 };       /* of noise: bath */
-enum { double_well_DRAWS = 1 };         /* increments of the noise in a step */
-enum { double_well_PARTS = 1 };         /* increments of one source in a step, each of a part of it */
 
 /* How a step ends; double_well_status_string says it in words. */
 typedef enum {
     double_well_OK = 0, double_well_NO_CONVERGENCE, double_well_SINGULAR, double_well_NOT_FINITE,
         double_well_BAD_ARGUMENT
 } double_well_status;
+const char *double_well_status_string(double_well_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with double_well_init. */
 typedef struct {
@@ -69,10 +67,8 @@ double_well_status double_well_init(double_well_solver *s, const double_well_par
 double_well_status double_well_set_noise(double_well_solver *s, uint64_t seed, uint32_t member,
     uint64_t step);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 double_well_status double_well_step(double_well_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 double_well_status double_well_integrate(double_well_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on double_well_BAD_ARGUMENT.
@@ -106,8 +102,6 @@ void double_well_vector_field(const double_well_params *params, const double x[d
 void double_well_noise_fields(const double_well_params *params, const double x[double_well_DIM],
     double out[double_well_SOURCES * double_well_DIM]);
 
-const char *double_well_status_string(double_well_status status);
-
 /* For bindings: the size of double_well_solver, and its count of good steps. */
 size_t double_well_solver_size(void);
 size_t double_well_solver_steps_done(const double_well_solver *s);
@@ -115,5 +109,4 @@ size_t double_well_solver_steps_done(const double_well_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* DOUBLE_WELL_H */

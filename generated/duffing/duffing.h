@@ -2,11 +2,10 @@
  * duffing.h: the declarations; duffing.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 480bda077f96c4af144a23bfaab4b558812e931f8fcb1dd709dd7b7fe0ced70d
+ * body-sha256: 4673778570137c98b3b5886f31a336a3d57665d59345320014e985be46822b16
  */
 #ifndef DUFFING_H
 #define DUFFING_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define duffing_CASIMIRS 0
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "72ba392fccc406dfdc3b1d47b1172899f03878892236d624cb8d53a7a18b6c1c"
+enum { duffing_COEFFICIENTS = 33 }; /* numbers that depend on params and h, and on the time */
 
 /* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double A;     /* amplitude of the drive */
     double omega; /* its frequency */
 } duffing_params;
-
 extern const duffing_params duffing_default_params;
-
-enum { duffing_COEFFICIENTS = 33 }; /* numbers that depend on params and h, and on the time */
 
 /* How a step ends; duffing_status_string says it in words. */
 typedef enum {
     duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing_NOT_FINITE, duffing_BAD_ARGUMENT
 } duffing_status;
+const char *duffing_status_string(duffing_status status);
 
 enum { duffing_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[duffing_DIFFERENCES][duffing_DIM];
 } duffing_history;
 
@@ -67,10 +64,8 @@ duffing_status duffing_init(duffing_solver *s, const duffing_params *params, con
 duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM],
     double t0);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 duffing_status duffing_step(duffing_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on duffing_BAD_ARGUMENT.
@@ -93,8 +88,6 @@ void duffing_casimirs(const duffing_params *params, const double x[duffing_DIM],
 void duffing_vector_field(const duffing_params *params, double t, const double x[duffing_DIM],
     double out[duffing_DIM]);
 
-const char *duffing_status_string(duffing_status status);
-
 /* For bindings: the size of duffing_solver, and its count of good steps. */
 size_t duffing_solver_size(void);
 size_t duffing_solver_steps_done(const duffing_solver *s);
@@ -102,5 +95,4 @@ size_t duffing_solver_steps_done(const duffing_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* DUFFING_H */

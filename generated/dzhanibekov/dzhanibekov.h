@@ -2,11 +2,10 @@
  * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f0142ed0fc4ff415be42624f902784071212def1fc036410a22636cb261de9c7
+ * body-sha256: 1eac74eb0390c99f92128a8f2e1e6cfb5aed38f9507cc588cd8a74c2ab16db8a
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,11 @@ extern "C" {
 #define dzhanibekov_CASIMIRS 1
 #define dzhanibekov_PHIGEN_VERSION "0.1.0"
 #define dzhanibekov_SPEC_SHA256 "69c6aa7f443565487e48a933405a1745ed7142d940611d93ee67a5351a59ea66"
+enum { dzhanibekov_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
+enum { dzhanibekov_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
+enum { dzhanibekov_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion */
+enum { dzhanibekov_ELEMENT = 4 };       /* numbers of an element of the group */
+enum { dzhanibekov_RATE = 3 };          /* numbers of what the Casimirs turn */
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
@@ -24,27 +28,20 @@ typedef struct {
     double I2; /* intermediate moment of inertia */
     double I3; /* largest moment of inertia */
 } dzhanibekov_params;
-
 extern const dzhanibekov_params dzhanibekov_default_params;
-
-enum { dzhanibekov_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
-enum { dzhanibekov_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
-enum { dzhanibekov_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion */
-enum { dzhanibekov_ELEMENT = 4 };       /* numbers of an element of the group */
-enum { dzhanibekov_RATE = 3 };          /* numbers of what the Casimirs turn */
 
 /* How a step ends; dzhanibekov_status_string says it in words. */
 typedef enum {
     dzhanibekov_OK = 0, dzhanibekov_NO_CONVERGENCE, dzhanibekov_SINGULAR, dzhanibekov_NOT_FINITE,
         dzhanibekov_BAD_ARGUMENT
 } dzhanibekov_status;
+const char *dzhanibekov_status_string(dzhanibekov_status status);
 
 enum { dzhanibekov_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[dzhanibekov_DIFFERENCES][dzhanibekov_DIM];
 } dzhanibekov_history;
 
@@ -87,10 +84,8 @@ dzhanibekov_status dzhanibekov_set_attitude(dzhanibekov_solver *s,
 dzhanibekov_status dzhanibekov_init_gauge(dzhanibekov_solver *s, const dzhanibekov_params *params,
     const double x0[dzhanibekov_DIM], const double gauge[dzhanibekov_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 dzhanibekov_status dzhanibekov_step(dzhanibekov_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 dzhanibekov_status dzhanibekov_integrate(dzhanibekov_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on dzhanibekov_BAD_ARGUMENT.
@@ -109,8 +104,6 @@ void dzhanibekov_casimirs(const dzhanibekov_params *params, const double x[dzhan
 void dzhanibekov_vector_field(const dzhanibekov_params *params, const double x[dzhanibekov_DIM],
     double out[dzhanibekov_DIM]);
 
-const char *dzhanibekov_status_string(dzhanibekov_status status);
-
 /* For bindings: the size of dzhanibekov_solver, and its count of good steps. */
 size_t dzhanibekov_solver_size(void);
 size_t dzhanibekov_solver_steps_done(const dzhanibekov_solver *s);
@@ -119,5 +112,4 @@ void dzhanibekov_attitude(const dzhanibekov_solver *s, double out[dzhanibekov_EL
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* DZHANIBEKOV_H */

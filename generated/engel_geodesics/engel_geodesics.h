@@ -2,11 +2,10 @@
  * engel_geodesics.h: the declarations; engel_geodesics.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 738843d95e45387209ec16ff9468029c89c9e69b07d8f51017718cad1410ad44
+ * body-sha256: 21db396c56d0a00c296471503909f22da359e4af68a1f4a81a252e4bc88846e2
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define engel_geodesics_CASIMIRS 2
 #define engel_geodesics_PHIGEN_VERSION "0.1.0"
 #define engel_geodesics_SPEC_SHA256 "fb609c6d402d3a7fbfac0e7cda1d7e07e2dba9262c5dfd8f16d22d0ab34eeabc"
+enum { engel_geodesics_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: h1, h2, h3, h4. Casimirs: h4, C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } engel_geodesics_params;
-
 extern const engel_geodesics_params engel_geodesics_default_params;
-
-enum { engel_geodesics_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; engel_geodesics_status_string says it in words. */
 typedef enum {
     engel_geodesics_OK = 0, engel_geodesics_NO_CONVERGENCE, engel_geodesics_SINGULAR,
         engel_geodesics_NOT_FINITE, engel_geodesics_BAD_ARGUMENT
 } engel_geodesics_status;
+const char *engel_geodesics_status_string(engel_geodesics_status status);
 
 enum { engel_geodesics_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[engel_geodesics_DIFFERENCES][engel_geodesics_DIM];
 } engel_geodesics_history;
 
@@ -64,10 +61,8 @@ typedef struct {
 engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
     const double x0[engel_geodesics_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 engel_geodesics_status engel_geodesics_step(engel_geodesics_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 engel_geodesics_status engel_geodesics_integrate(engel_geodesics_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -89,8 +84,6 @@ void engel_geodesics_casimirs(const engel_geodesics_params *params, const double
 void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[engel_geodesics_DIM],
     double out[engel_geodesics_DIM]);
 
-const char *engel_geodesics_status_string(engel_geodesics_status status);
-
 /* For bindings: the size of engel_geodesics_solver, and its count of good steps. */
 size_t engel_geodesics_solver_size(void);
 size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s);
@@ -98,5 +91,4 @@ size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* ENGEL_GEODESICS_H */

@@ -2,11 +2,10 @@
  * food_web.h: the declarations; food_web.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5d227a55aa5fe676ee2dab7c9369269a7f4f65a57ec47de1eb6c1479a045dc2a
+ * body-sha256: a9b5def4ce6694d95c6f2c86937fb791e2a2134fd06ce5f5049e44ef3c6dfe18
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -115,5 +114,4 @@ size_t food_web_solver_steps_done(const food_web_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* FOOD_WEB_H */

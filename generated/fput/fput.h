@@ -2,11 +2,10 @@
  * fput.h: the declarations; fput.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 49e7d368befb082945896db9541d1cd5dd65c6b28d325e9657a2dabe5dc7de2c
+ * body-sha256: 5dce39004abc258e8d672a411054feee8d1f4f4e07f8807bc89715caf0b11f7c
  */
 #ifndef FPUT_H
 #define FPUT_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -130,5 +129,4 @@ size_t fput_solver_steps_done(const fput_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* FPUT_H */

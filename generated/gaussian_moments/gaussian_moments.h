@@ -2,11 +2,10 @@
  * gaussian_moments.h: the declarations; gaussian_moments.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4602443b221e00327d54dbde17d334bffd637a593f5176b4e59f24b6f0bb3542
+ * body-sha256: 97d222d85da8bbb744631f68c725e0665079068c1ae83f23e91d590696e52bca
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define gaussian_moments_CASIMIRS 1
 #define gaussian_moments_PHIGEN_VERSION "0.1.0"
 #define gaussian_moments_SPEC_SHA256 "967874dae83dd8a6800d977c3a20ab90481f1a1e1820f485f001b0650f3fc9e7"
+enum { gaussian_moments_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
 /* State vectors: a, b, c. Casimirs: area. */
 typedef struct {
     double k; /* stiffness of the harmonic part */
     double g; /* strength of the quartic part */
 } gaussian_moments_params;
-
 extern const gaussian_moments_params gaussian_moments_default_params;
-
-enum { gaussian_moments_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
 /* How a step ends; gaussian_moments_status_string says it in words. */
 typedef enum {
     gaussian_moments_OK = 0, gaussian_moments_NO_CONVERGENCE, gaussian_moments_SINGULAR,
         gaussian_moments_NOT_FINITE, gaussian_moments_BAD_ARGUMENT
 } gaussian_moments_status;
+const char *gaussian_moments_status_string(gaussian_moments_status status);
 
 enum { gaussian_moments_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[gaussian_moments_DIFFERENCES][gaussian_moments_DIM];
 } gaussian_moments_history;
 
@@ -65,10 +62,8 @@ typedef struct {
 gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     const gaussian_moments_params *params, const double x0[gaussian_moments_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 gaussian_moments_status gaussian_moments_step(gaussian_moments_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 gaussian_moments_status gaussian_moments_integrate(gaussian_moments_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -91,8 +86,6 @@ void gaussian_moments_casimirs(const gaussian_moments_params *params, const doub
 void gaussian_moments_vector_field(const gaussian_moments_params *params,
     const double x[gaussian_moments_DIM], double out[gaussian_moments_DIM]);
 
-const char *gaussian_moments_status_string(gaussian_moments_status status);
-
 /* For bindings: the size of gaussian_moments_solver, and its count of good steps. */
 size_t gaussian_moments_solver_size(void);
 size_t gaussian_moments_solver_steps_done(const gaussian_moments_solver *s);
@@ -100,5 +93,4 @@ size_t gaussian_moments_solver_steps_done(const gaussian_moments_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* GAUSSIAN_MOMENTS_H */

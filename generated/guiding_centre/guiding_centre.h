@@ -2,11 +2,10 @@
  * guiding_centre.h: the declarations; guiding_centre.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: adb5d65a2985f6e5e203c787615122d800a43ca2353c98868ccc0e1ae1c716d9
+ * body-sha256: d1a745c4842a91d05863abd333064c4699332173896a8cb230aed75d6751ab05
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,8 @@ extern "C" {
 #define guiding_centre_CASIMIRS 0
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
 #define guiding_centre_SPEC_SHA256 "2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570"
+enum { guiding_centre_STAGES = 5 };       /* of a step */
+enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, z, u. Casimirs: none. */
 typedef struct {
@@ -24,24 +25,20 @@ typedef struct {
     double mu;    /* magnetic moment */
     double k;     /* stiffness of the electric potential */
 } guiding_centre_params;
-
 extern const guiding_centre_params guiding_centre_default_params;
-
-enum { guiding_centre_STAGES = 5 };       /* of a step */
-enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 
 /* How a step ends; guiding_centre_status_string says it in words. */
 typedef enum {
     guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR, guiding_centre_NOT_FINITE,
         guiding_centre_BAD_ARGUMENT
 } guiding_centre_status;
+const char *guiding_centre_status_string(guiding_centre_status status);
 
 enum { guiding_centre_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM];
 } guiding_centre_history;
 
@@ -67,10 +64,8 @@ typedef struct {
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 guiding_centre_status guiding_centre_step(guiding_centre_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -90,8 +85,6 @@ void guiding_centre_casimirs(const guiding_centre_params *params, const double x
 void guiding_centre_vector_field(const guiding_centre_params *params, const double x[guiding_centre_DIM],
     double out[guiding_centre_DIM]);
 
-const char *guiding_centre_status_string(guiding_centre_status status);
-
 /* For bindings: the size of guiding_centre_solver, and its count of good steps. */
 size_t guiding_centre_solver_size(void);
 size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
@@ -99,5 +92,4 @@ size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* GUIDING_CENTRE_H */

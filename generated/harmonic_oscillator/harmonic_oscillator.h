@@ -2,11 +2,10 @@
  * harmonic_oscillator.h: the declarations; harmonic_oscillator.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9e8e59b392d3cd833b6c37cd07812e4f5fdf8332d5b64544fa6549cebd97af41
+ * body-sha256: 3c29cb3fedfa15eac656b1818d37622a898f9a8f2baf65bb2edb6a42352ed81c
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define harmonic_oscillator_CASIMIRS 0
 #define harmonic_oscillator_PHIGEN_VERSION "0.1.0"
 #define harmonic_oscillator_SPEC_SHA256 "8fea2d54be1733fb7959bf089f29b69f069d88cc4d415a7096ee372bcd8b8f90"
+enum { harmonic_oscillator_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 
 /* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double m; /* mass */
     double k; /* stiffness of the spring */
 } harmonic_oscillator_params;
-
 extern const harmonic_oscillator_params harmonic_oscillator_default_params;
-
-enum { harmonic_oscillator_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 
 /* How a step ends; harmonic_oscillator_status_string says it in words. */
 typedef enum {
     harmonic_oscillator_OK = 0, harmonic_oscillator_NO_CONVERGENCE, harmonic_oscillator_SINGULAR,
         harmonic_oscillator_NOT_FINITE, harmonic_oscillator_BAD_ARGUMENT
 } harmonic_oscillator_status;
+const char *harmonic_oscillator_status_string(harmonic_oscillator_status status);
 
 enum { harmonic_oscillator_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[harmonic_oscillator_DIFFERENCES][harmonic_oscillator_DIM];
 } harmonic_oscillator_history;
 
@@ -65,10 +62,8 @@ typedef struct {
 harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
     const harmonic_oscillator_params *params, const double x0[harmonic_oscillator_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 harmonic_oscillator_status harmonic_oscillator_step(harmonic_oscillator_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 harmonic_oscillator_status harmonic_oscillator_integrate(harmonic_oscillator_solver *s, double h,
     size_t steps);
 
@@ -92,8 +87,6 @@ void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params,
 void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params,
     const double x[harmonic_oscillator_DIM], double out[harmonic_oscillator_DIM]);
 
-const char *harmonic_oscillator_status_string(harmonic_oscillator_status status);
-
 /* For bindings: the size of harmonic_oscillator_solver, and its count of good steps. */
 size_t harmonic_oscillator_solver_size(void);
 size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s);
@@ -101,5 +94,4 @@ size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* HARMONIC_OSCILLATOR_H */

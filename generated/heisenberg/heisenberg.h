@@ -2,11 +2,10 @@
  * heisenberg.h: the declarations; heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2224bc0f9c9c48d3a5752333b9323f662e5d1b50c6e2595a955f1050c76e1b3b
+ * body-sha256: a8ee257000337406acd91411cdfec9c33a86c679d6efad1ea1e5729dd29da92c
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -133,5 +132,4 @@ size_t heisenberg_solver_steps_done(const heisenberg_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* HEISENBERG_H */

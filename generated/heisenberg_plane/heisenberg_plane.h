@@ -2,11 +2,10 @@
  * heisenberg_plane.h: the declarations; heisenberg_plane.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eba683ae5855188ec645d175544b4ae42a5bc7ff368b48eae2aa6ca65c448f39
+ * body-sha256: d910cd6b423b4a216bda03a4e6db0d3a5d87a4e79b5d9e39b079e79c4b8e396b
  */
 #ifndef HEISENBERG_PLANE_H
 #define HEISENBERG_PLANE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -101,5 +100,4 @@ size_t heisenberg_plane_solver_steps_done(const heisenberg_plane_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* HEISENBERG_PLANE_H */

@@ -2,11 +2,10 @@
  * henon_heiles.h: the declarations; henon_heiles.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 40bb496cbb3bd7025e49bc5107cd431d955ccfa45fef8b2d9072f8791b95f5ec
+ * body-sha256: 81e47ada21fd48a12568ec0addd554ad6e4bab79ecdd08929a8c3b9c13083ea7
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define henon_heiles_CASIMIRS 0
 #define henon_heiles_PHIGEN_VERSION "0.1.0"
 #define henon_heiles_SPEC_SHA256 "344c927b8e04345779f4c5f13f803b87485fa1196d3f3acdf913e1c4000a502e"
+enum { henon_heiles_COEFFICIENTS = 24 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, px, py. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } henon_heiles_params;
-
 extern const henon_heiles_params henon_heiles_default_params;
-
-enum { henon_heiles_COEFFICIENTS = 24 }; /* numbers that depend on params and h only */
 
 /* How a step ends; henon_heiles_status_string says it in words. */
 typedef enum {
     henon_heiles_OK = 0, henon_heiles_NO_CONVERGENCE, henon_heiles_SINGULAR, henon_heiles_NOT_FINITE,
         henon_heiles_BAD_ARGUMENT
 } henon_heiles_status;
+const char *henon_heiles_status_string(henon_heiles_status status);
 
 enum { henon_heiles_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[henon_heiles_DIFFERENCES][henon_heiles_DIM];
 } henon_heiles_history;
 
@@ -63,10 +60,8 @@ typedef struct {
 henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
     const double x0[henon_heiles_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 henon_heiles_status henon_heiles_step(henon_heiles_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 henon_heiles_status henon_heiles_integrate(henon_heiles_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on henon_heiles_BAD_ARGUMENT.
@@ -85,8 +80,6 @@ void henon_heiles_casimirs(const henon_heiles_params *params, const double x[hen
 void henon_heiles_vector_field(const henon_heiles_params *params, const double x[henon_heiles_DIM],
     double out[henon_heiles_DIM]);
 
-const char *henon_heiles_status_string(henon_heiles_status status);
-
 /* For bindings: the size of henon_heiles_solver, and its count of good steps. */
 size_t henon_heiles_solver_size(void);
 size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s);
@@ -94,5 +87,4 @@ size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* HENON_HEILES_H */

@@ -2,11 +2,10 @@
  * kdv.h: the declarations; kdv.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 02c4c71f0010176fa1b169bbb4048761a01a1e281624b8ba38e13917cc8a265a
+ * body-sha256: aa04f0fe8de3c20ab12d73878b2288cab921cfd9f478cc9da2308225af91a99b
  */
 #ifndef KDV_H
 #define KDV_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -111,5 +110,4 @@ size_t kdv_solver_steps_done(const kdv_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* KDV_H */

@@ -2,11 +2,10 @@
  * kepler.h: the declarations; kepler.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cb6616977c716f995d0299e71b913adcb19dc996002b88333b09cb8a65334a92
+ * body-sha256: 1be841482b18632a61a1d3a0b4ab897ede83d43028248a4930f66cc5e50e7562
  */
 #ifndef KEPLER_H
 #define KEPLER_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,27 +16,25 @@ extern "C" {
 #define kepler_CASIMIRS 0
 #define kepler_PHIGEN_VERSION "0.1.0"
 #define kepler_SPEC_SHA256 "7d889f3f1aeb8f2269b42200556d64daeb9a92956762d91c1f8a8d00d84f48f2"
+enum { kepler_COEFFICIENTS = 118 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, px, py. Casimirs: none. */
 typedef struct {
     double mu; /* gravitational parameter of the centre */
 } kepler_params;
-
 extern const kepler_params kepler_default_params;
-
-enum { kepler_COEFFICIENTS = 118 }; /* numbers that depend on params and h only */
 
 /* How a step ends; kepler_status_string says it in words. */
 typedef enum {
     kepler_OK = 0, kepler_NO_CONVERGENCE, kepler_SINGULAR, kepler_NOT_FINITE, kepler_BAD_ARGUMENT
 } kepler_status;
+const char *kepler_status_string(kepler_status status);
 
 enum { kepler_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[kepler_DIFFERENCES][kepler_DIM];
 } kepler_history;
 
@@ -61,10 +58,8 @@ typedef struct {
    positive is not, or what is computed from parameters alone is not finite. */
 kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[kepler_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 kepler_status kepler_step(kepler_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kepler_status kepler_integrate(kepler_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on kepler_BAD_ARGUMENT. Either
@@ -82,8 +77,6 @@ double kepler_hamiltonian(const kepler_params *params, const double x[kepler_DIM
 void kepler_casimirs(const kepler_params *params, const double x[kepler_DIM], double out[]);
 void kepler_vector_field(const kepler_params *params, const double x[kepler_DIM], double out[kepler_DIM]);
 
-const char *kepler_status_string(kepler_status status);
-
 /* For bindings: the size of kepler_solver, and its count of good steps. */
 size_t kepler_solver_size(void);
 size_t kepler_solver_steps_done(const kepler_solver *s);
@@ -91,5 +84,4 @@ size_t kepler_solver_steps_done(const kepler_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* KEPLER_H */

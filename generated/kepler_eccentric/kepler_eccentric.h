@@ -2,11 +2,10 @@
  * kepler_eccentric.h: the declarations; kepler_eccentric.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d510d0ac5db9729ee52f04fb3dde8f9d11dfbe1467432ed73c5734415a644583
+ * body-sha256: 07af6591c11117aa443cd855868e71ce6652fcd9027e99de3f8286ad2f5a17df
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,22 +16,21 @@ extern "C" {
 #define kepler_eccentric_CASIMIRS 0
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
 #define kepler_eccentric_SPEC_SHA256 "81869181189ef5b2007d1f8ba4054229e16bdbb9b83bebe02d636128ec39e8aa"
+enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that depend on params and h only */
+enum { kepler_eccentric_GAUGES = 1 };         /* that a trajectory holds fixed: e */
 
 /* State vectors: q1, q2, p1, p2. Casimirs: none. */
 typedef struct {
     double oblateness; /* quadrupole of the planet */
 } kepler_eccentric_params;
-
 extern const kepler_eccentric_params kepler_eccentric_default_params;
-
-enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that depend on params and h only */
-enum { kepler_eccentric_GAUGES = 1 };         /* that a trajectory holds fixed: e */
 
 /* How a step ends; kepler_eccentric_status_string says it in words. */
 typedef enum {
     kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_eccentric_SINGULAR,
         kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT
 } kepler_eccentric_status;
+const char *kepler_eccentric_status_string(kepler_eccentric_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
    kepler_eccentric_init. */
@@ -61,11 +59,9 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM],
     const double gauge[kepler_eccentric_GAUGES]);
 
-/* One step of size h in tau, of either sign; s->t gains the physical time that it takes. On failure the state
-   is as before. */
+/* One step of size h in tau, of either sign, or many; s->t gains the physical time that they take. On failure
+   s->x is the last good state, after s->steps steps. */
 kepler_eccentric_status kepler_eccentric_step(kepler_eccentric_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kepler_eccentric_status kepler_eccentric_integrate(kepler_eccentric_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -92,8 +88,6 @@ void kepler_eccentric_vector_field(const kepler_eccentric_params *params,
 /* dt/dtau at x; params may be NULL. */
 double kepler_eccentric_monitor(const kepler_eccentric_params *params, const double x[kepler_eccentric_DIM]);
 
-const char *kepler_eccentric_status_string(kepler_eccentric_status status);
-
 /* For bindings: the size of kepler_eccentric_solver, and its count of good steps. */
 size_t kepler_eccentric_solver_size(void);
 size_t kepler_eccentric_solver_steps_done(const kepler_eccentric_solver *s);
@@ -102,5 +96,4 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* KEPLER_ECCENTRIC_H */

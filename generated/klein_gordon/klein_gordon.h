@@ -2,11 +2,10 @@
  * klein_gordon.h: the declarations; klein_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fe34795af607e35f74fd22bd015f64fb510787f4779b2c29a03fa2077cc2ca64
+ * body-sha256: 0806487fc09a56056055e06ef498730b7a1d0cebcaa4f754ac91034ff3b94a4b
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -98,5 +97,4 @@ size_t klein_gordon_solver_steps_done(const klein_gordon_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* KLEIN_GORDON_H */

@@ -2,11 +2,10 @@
  * kowalevski_top.h: the declarations; kowalevski_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a2612a0a963ac19de45079deb31ecee53d1911180a09c19c091dee3fdd25da56
+ * body-sha256: 4f660b3f5ddf33daac81ba1efe214ba5a9ff1130f35453fc53e3fdf4c2fadc64
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,24 +16,23 @@ extern "C" {
 #define kowalevski_top_CASIMIRS 2
 #define kowalevski_top_PHIGEN_VERSION "0.1.0"
 #define kowalevski_top_SPEC_SHA256 "2799755b3e3da2be9c8c923424249137334cdb1506fcba1c87c071179c75beaa"
+enum { kowalevski_top_COEFFICIENTS = 172 }; /* numbers that depend on params and h only */
+enum { kowalevski_top_REMEMBERED = 111 };   /* values that a recurrence is fitted to */
+enum { kowalevski_top_WINDOW = 40 };        /* of them that it may use */
+enum { kowalevski_top_AHEAD = 8 };          /* values that it foresees */
 
 /* State vectors: P1, P2, P3, G1, G2, G3. Casimirs: A, B. */
 typedef struct {
     char unused; /* this system has no parameters */
 } kowalevski_top_params;
-
 extern const kowalevski_top_params kowalevski_top_default_params;
-
-enum { kowalevski_top_COEFFICIENTS = 172 }; /* numbers that depend on params and h only */
-enum { kowalevski_top_REMEMBERED = 111 };   /* values that a recurrence is fitted to */
-enum { kowalevski_top_WINDOW = 40 };        /* of them that it may use */
-enum { kowalevski_top_AHEAD = 8 };          /* values that it foresees */
 
 /* How a step ends; kowalevski_top_status_string says it in words. */
 typedef enum {
     kowalevski_top_OK = 0, kowalevski_top_NO_CONVERGENCE, kowalevski_top_SINGULAR, kowalevski_top_NOT_FINITE,
         kowalevski_top_BAD_ARGUMENT
 } kowalevski_top_status;
+const char *kowalevski_top_status_string(kowalevski_top_status status);
 
 enum { kowalevski_top_KEPT = 2 * kowalevski_top_REMEMBERED };
 
@@ -87,10 +85,8 @@ typedef struct {
 kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
     const double x0[kowalevski_top_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -118,8 +114,6 @@ void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x
 void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[kowalevski_top_DIM],
     double out[kowalevski_top_DIM]);
 
-const char *kowalevski_top_status_string(kowalevski_top_status status);
-
 /* For bindings: the size of kowalevski_top_solver, and its count of good steps. */
 size_t kowalevski_top_solver_size(void);
 size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s);
@@ -127,5 +121,4 @@ size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* KOWALEVSKI_TOP_H */

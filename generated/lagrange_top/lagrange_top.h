@@ -2,11 +2,10 @@
  * lagrange_top.h: the declarations; lagrange_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3cc2043472367ca8bd608a4ff00069975e537228745c44452d8143bbe096f4a8
+ * body-sha256: 3266e6bf6f0c1fc174a40f604307bf413b00bb486b968809ed6dbcca64806ccf
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,7 @@ extern "C" {
 #define lagrange_top_CASIMIRS 2
 #define lagrange_top_PHIGEN_VERSION "0.1.0"
 #define lagrange_top_SPEC_SHA256 "dc5faff4a3a290ee3b9329fcccd8fb8e506caefcd665168370fc76ae8622ea1f"
+enum { lagrange_top_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
 
 /* State vectors: P1, P2, P3, G1, G2, G3. Casimirs: A, B. */
 typedef struct {
@@ -24,23 +24,20 @@ typedef struct {
     double I3;  /* moment of inertia about the axis of symmetry */
     double mgl; /* weight times distance of the centre of mass from the fixed point */
 } lagrange_top_params;
-
 extern const lagrange_top_params lagrange_top_default_params;
-
-enum { lagrange_top_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
 
 /* How a step ends; lagrange_top_status_string says it in words. */
 typedef enum {
     lagrange_top_OK = 0, lagrange_top_NO_CONVERGENCE, lagrange_top_SINGULAR, lagrange_top_NOT_FINITE,
         lagrange_top_BAD_ARGUMENT
 } lagrange_top_status;
+const char *lagrange_top_status_string(lagrange_top_status status);
 
 enum { lagrange_top_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[lagrange_top_DIFFERENCES][lagrange_top_DIM];
 } lagrange_top_history;
 
@@ -65,10 +62,8 @@ typedef struct {
 lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
     const double x0[lagrange_top_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 lagrange_top_status lagrange_top_step(lagrange_top_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 lagrange_top_status lagrange_top_integrate(lagrange_top_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on lagrange_top_BAD_ARGUMENT.
@@ -87,8 +82,6 @@ void lagrange_top_casimirs(const lagrange_top_params *params, const double x[lag
 void lagrange_top_vector_field(const lagrange_top_params *params, const double x[lagrange_top_DIM],
     double out[lagrange_top_DIM]);
 
-const char *lagrange_top_status_string(lagrange_top_status status);
-
 /* For bindings: the size of lagrange_top_solver, and its count of good steps. */
 size_t lagrange_top_solver_size(void);
 size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s);
@@ -96,5 +89,4 @@ size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* LAGRANGE_TOP_H */

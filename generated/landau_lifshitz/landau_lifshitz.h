@@ -2,11 +2,10 @@
  * landau_lifshitz.h: the declarations; landau_lifshitz.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c3e42998c46f2e2182065d35218bc1517b79193c9508f018276dc32f5300e049
+ * body-sha256: 93d63f4f58f91998f0214f4243fa371cca8aea04ca7cdcd6753ac27aa64d6e1a
  */
 #ifndef LANDAU_LIFSHITZ_H
 #define LANDAU_LIFSHITZ_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,8 @@ extern "C" {
 #define landau_lifshitz_CASIMIRS 1
 #define landau_lifshitz_PHIGEN_VERSION "0.1.0"
 #define landau_lifshitz_SPEC_SHA256 "0ace50d0804c6bcf96c22e3ce0adf1306322d767826930130168365d5a0c1cdd"
+enum { landau_lifshitz_STAGES = 5 };       /* of a step */
+enum { landau_lifshitz_COEFFICIENTS = 6 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, z. Casimirs: length. */
 typedef struct {
@@ -24,24 +25,20 @@ typedef struct {
     double B;            /* field along -z */
     double damping_rate; /* of Landau and Lifshitz */
 } landau_lifshitz_params;
-
 extern const landau_lifshitz_params landau_lifshitz_default_params;
-
-enum { landau_lifshitz_STAGES = 5 };       /* of a step */
-enum { landau_lifshitz_COEFFICIENTS = 6 }; /* numbers that depend on params and h only */
 
 /* How a step ends; landau_lifshitz_status_string says it in words. */
 typedef enum {
     landau_lifshitz_OK = 0, landau_lifshitz_NO_CONVERGENCE, landau_lifshitz_SINGULAR,
         landau_lifshitz_NOT_FINITE, landau_lifshitz_BAD_ARGUMENT
 } landau_lifshitz_status;
+const char *landau_lifshitz_status_string(landau_lifshitz_status status);
 
 enum { landau_lifshitz_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[landau_lifshitz_DIFFERENCES][landau_lifshitz_DIM];
 } landau_lifshitz_history;
 
@@ -68,10 +65,8 @@ typedef struct {
 landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const landau_lifshitz_params *params,
     const double x0[landau_lifshitz_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 landau_lifshitz_status landau_lifshitz_step(landau_lifshitz_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 landau_lifshitz_status landau_lifshitz_integrate(landau_lifshitz_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -93,8 +88,6 @@ void landau_lifshitz_casimirs(const landau_lifshitz_params *params, const double
 void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const double x[landau_lifshitz_DIM],
     double out[landau_lifshitz_DIM]);
 
-const char *landau_lifshitz_status_string(landau_lifshitz_status status);
-
 /* For bindings: the size of landau_lifshitz_solver, and its count of good steps. */
 size_t landau_lifshitz_solver_size(void);
 size_t landau_lifshitz_solver_steps_done(const landau_lifshitz_solver *s);
@@ -102,5 +95,4 @@ size_t landau_lifshitz_solver_steps_done(const landau_lifshitz_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* LANDAU_LIFSHITZ_H */

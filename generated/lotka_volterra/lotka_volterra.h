@@ -2,11 +2,10 @@
  * lotka_volterra.h: the declarations; lotka_volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c7bdc9c11812e553df3f04f2b621a2de6d7da518ddcd508784bf71f8b1276a2c
+ * body-sha256: 5dfde5b4dfff6f8403d2ac0695f9ec7ece6f8057990acd669a36b3cdd08c3129
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,24 +16,23 @@ extern "C" {
 #define lotka_volterra_CASIMIRS 1
 #define lotka_volterra_PHIGEN_VERSION "0.1.0"
 #define lotka_volterra_SPEC_SHA256 "a253a78f7e0887e5a834a02b0b1f47451af2de51574fd76b016f875f92baa539"
+enum { lotka_volterra_COEFFICIENTS = 1 }; /* numbers that depend on params and h only */
+enum { lotka_volterra_REMEMBERED = 111 }; /* values that a recurrence is fitted to */
+enum { lotka_volterra_WINDOW = 40 };      /* of them that it may use */
+enum { lotka_volterra_AHEAD = 8 };        /* values that it foresees */
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } lotka_volterra_params;
-
 extern const lotka_volterra_params lotka_volterra_default_params;
-
-enum { lotka_volterra_COEFFICIENTS = 1 }; /* numbers that depend on params and h only */
-enum { lotka_volterra_REMEMBERED = 111 }; /* values that a recurrence is fitted to */
-enum { lotka_volterra_WINDOW = 40 };      /* of them that it may use */
-enum { lotka_volterra_AHEAD = 8 };        /* values that it foresees */
 
 /* How a step ends; lotka_volterra_status_string says it in words. */
 typedef enum {
     lotka_volterra_OK = 0, lotka_volterra_NO_CONVERGENCE, lotka_volterra_SINGULAR, lotka_volterra_NOT_FINITE,
         lotka_volterra_BAD_ARGUMENT
 } lotka_volterra_status;
+const char *lotka_volterra_status_string(lotka_volterra_status status);
 
 enum { lotka_volterra_KEPT = 2 * lotka_volterra_REMEMBERED };
 
@@ -87,10 +85,8 @@ typedef struct {
 lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
     const double x0[lotka_volterra_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -118,8 +114,6 @@ void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x
 void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[lotka_volterra_DIM],
     double out[lotka_volterra_DIM]);
 
-const char *lotka_volterra_status_string(lotka_volterra_status status);
-
 /* For bindings: the size of lotka_volterra_solver, and its count of good steps. */
 size_t lotka_volterra_solver_size(void);
 size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s);
@@ -127,5 +121,4 @@ size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* LOTKA_VOLTERRA_H */

@@ -2,11 +2,10 @@
  * maxwell_bloch.h: the declarations; maxwell_bloch.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c325d096ba2413ce01f7c27dc3eaee9c32aec84ac5e060038e385004e3576916
+ * body-sha256: 949fd9bc22505dd705e6dec9cdb474ed63924b063f6777dace61269c6982aa2a
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define maxwell_bloch_CASIMIRS 1
 #define maxwell_bloch_PHIGEN_VERSION "0.1.0"
 #define maxwell_bloch_SPEC_SHA256 "624a938a8bb2adf6721f7be0bad529b807bbe017cc3b22a2d1819ff654f45cf0"
+enum { maxwell_bloch_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, z. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } maxwell_bloch_params;
-
 extern const maxwell_bloch_params maxwell_bloch_default_params;
-
-enum { maxwell_bloch_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; maxwell_bloch_status_string says it in words. */
 typedef enum {
     maxwell_bloch_OK = 0, maxwell_bloch_NO_CONVERGENCE, maxwell_bloch_SINGULAR, maxwell_bloch_NOT_FINITE,
         maxwell_bloch_BAD_ARGUMENT
 } maxwell_bloch_status;
+const char *maxwell_bloch_status_string(maxwell_bloch_status status);
 
 enum { maxwell_bloch_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[maxwell_bloch_DIFFERENCES][maxwell_bloch_DIM];
 } maxwell_bloch_history;
 
@@ -63,10 +60,8 @@ typedef struct {
 maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_bloch_params *params,
     const double x0[maxwell_bloch_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 maxwell_bloch_status maxwell_bloch_step(maxwell_bloch_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 maxwell_bloch_status maxwell_bloch_integrate(maxwell_bloch_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on maxwell_bloch_BAD_ARGUMENT.
@@ -86,8 +81,6 @@ void maxwell_bloch_casimirs(const maxwell_bloch_params *params, const double x[m
 void maxwell_bloch_vector_field(const maxwell_bloch_params *params, const double x[maxwell_bloch_DIM],
     double out[maxwell_bloch_DIM]);
 
-const char *maxwell_bloch_status_string(maxwell_bloch_status status);
-
 /* For bindings: the size of maxwell_bloch_solver, and its count of good steps. */
 size_t maxwell_bloch_solver_size(void);
 size_t maxwell_bloch_solver_steps_done(const maxwell_bloch_solver *s);
@@ -95,5 +88,4 @@ size_t maxwell_bloch_solver_steps_done(const maxwell_bloch_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* MAXWELL_BLOCH_H */

@@ -2,11 +2,10 @@
  * nambu_pendulum.h: the declarations; nambu_pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e354a01b66467a18c731abaad1395182454da7ae3a80d0c9b26ed06122a0f9f1
+ * body-sha256: c4e8a9df97c9eb1f66b3b12195b21d843ee431226daa8e00894b9a0af6b0e617
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,24 +16,23 @@ extern "C" {
 #define nambu_pendulum_CASIMIRS 1
 #define nambu_pendulum_PHIGEN_VERSION "0.1.0"
 #define nambu_pendulum_SPEC_SHA256 "4a482cc6c1e66da787de49d9112e6ca1c38e0b9e783293e47090388bbe60f416"
+enum { nambu_pendulum_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
+enum { nambu_pendulum_REMEMBERED = 111 }; /* values that a recurrence is fitted to */
+enum { nambu_pendulum_WINDOW = 40 };      /* of them that it may use */
+enum { nambu_pendulum_AHEAD = 8 };        /* values that it foresees */
 
 /* State vectors: theta, p, V. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } nambu_pendulum_params;
-
 extern const nambu_pendulum_params nambu_pendulum_default_params;
-
-enum { nambu_pendulum_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
-enum { nambu_pendulum_REMEMBERED = 111 }; /* values that a recurrence is fitted to */
-enum { nambu_pendulum_WINDOW = 40 };      /* of them that it may use */
-enum { nambu_pendulum_AHEAD = 8 };        /* values that it foresees */
 
 /* How a step ends; nambu_pendulum_status_string says it in words. */
 typedef enum {
     nambu_pendulum_OK = 0, nambu_pendulum_NO_CONVERGENCE, nambu_pendulum_SINGULAR, nambu_pendulum_NOT_FINITE,
         nambu_pendulum_BAD_ARGUMENT
 } nambu_pendulum_status;
+const char *nambu_pendulum_status_string(nambu_pendulum_status status);
 
 enum { nambu_pendulum_KEPT = 2 * nambu_pendulum_REMEMBERED };
 
@@ -87,10 +85,8 @@ typedef struct {
 nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
     const double x0[nambu_pendulum_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -118,8 +114,6 @@ void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x
 void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[nambu_pendulum_DIM],
     double out[nambu_pendulum_DIM]);
 
-const char *nambu_pendulum_status_string(nambu_pendulum_status status);
-
 /* For bindings: the size of nambu_pendulum_solver, and its count of good steps. */
 size_t nambu_pendulum_solver_size(void);
 size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s);
@@ -127,5 +121,4 @@ size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* NAMBU_PENDULUM_H */

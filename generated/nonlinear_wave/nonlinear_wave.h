@@ -2,11 +2,10 @@
  * nonlinear_wave.h: the declarations; nonlinear_wave.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 10fd484965f9dc30a35c4b55f21c58e06ea7fac263bbdba712e97f5c994c84ba
+ * body-sha256: aa53af7521fc728354254ff82291b155aded72ad3eecd51309e02f0c43ca39ee
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -99,5 +98,4 @@ size_t nonlinear_wave_solver_steps_done(const nonlinear_wave_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* NONLINEAR_WAVE_H */

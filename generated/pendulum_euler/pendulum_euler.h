@@ -2,11 +2,10 @@
  * pendulum_euler.h: the declarations; pendulum_euler.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 69f45b6ffdc422da557ab874fcfbd4502d88c38a3e798cabf3b8848a9e4f8289
+ * body-sha256: 7cd636ed74f08e6104f76cf8508238576adb0ac80ad2583ed5cf7398fa3ca3cf
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,21 +16,20 @@ extern "C" {
 #define pendulum_euler_CASIMIRS 0
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
 #define pendulum_euler_SPEC_SHA256 "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59"
+enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that depend on params and h only */
 
 /* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double g; /* gravity over the length of the rod */
 } pendulum_euler_params;
-
 extern const pendulum_euler_params pendulum_euler_default_params;
-
-enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that depend on params and h only */
 
 /* How a step ends; pendulum_euler_status_string says it in words. */
 typedef enum {
     pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_euler_SINGULAR, pendulum_euler_NOT_FINITE,
         pendulum_euler_BAD_ARGUMENT
 } pendulum_euler_status;
+const char *pendulum_euler_status_string(pendulum_euler_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */
 typedef struct {
@@ -53,10 +51,8 @@ typedef struct {
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 pendulum_euler_status pendulum_euler_step(pendulum_euler_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 pendulum_euler_status pendulum_euler_integrate(pendulum_euler_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -76,8 +72,6 @@ void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x
 void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[pendulum_euler_DIM],
     double out[pendulum_euler_DIM]);
 
-const char *pendulum_euler_status_string(pendulum_euler_status status);
-
 /* For bindings: the size of pendulum_euler_solver, and its count of good steps. */
 size_t pendulum_euler_solver_size(void);
 size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
@@ -85,5 +79,4 @@ size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* PENDULUM_EULER_H */

@@ -2,11 +2,10 @@
  * point_vortices.h: the declarations; point_vortices.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c6b9a0046fa47d5bd93a84b99cbcc8f2a82252596443be4b8feff7ff44e2c03c
+ * body-sha256: e76e5cbfb081dcee9481add4d2eea45510c23a79893b45179c18d61c1228b792
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -115,5 +114,4 @@ size_t point_vortices_solver_steps_done(const point_vortices_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* POINT_VORTICES_H */

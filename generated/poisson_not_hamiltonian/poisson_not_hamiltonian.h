@@ -2,11 +2,10 @@
  * poisson_not_hamiltonian.h: the declarations; poisson_not_hamiltonian.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e261ced42364b06043c8bdc9e43570a84a8534bb75dfc7f5cb1c47eadab2bee2
+ * body-sha256: b2618f50837ab59ae39a72772c0607c4991a1ab514c6a2b899709be794a3d1dc
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define poisson_not_hamiltonian_CASIMIRS 1
 #define poisson_not_hamiltonian_PHIGEN_VERSION "0.1.0"
 #define poisson_not_hamiltonian_SPEC_SHA256 "91f506e06f622dbaf4083fe4274a994509dabe6e59da3a17c4a06cd9bcaa9603"
+enum { poisson_not_hamiltonian_COEFFICIENTS = 2 }; /* numbers that depend on params and h only */
 
 /* State vectors: x, y, z. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } poisson_not_hamiltonian_params;
-
 extern const poisson_not_hamiltonian_params poisson_not_hamiltonian_default_params;
-
-enum { poisson_not_hamiltonian_COEFFICIENTS = 2 }; /* numbers that depend on params and h only */
 
 /* How a step ends; poisson_not_hamiltonian_status_string says it in words. */
 typedef enum {
     poisson_not_hamiltonian_OK = 0, poisson_not_hamiltonian_NO_CONVERGENCE, poisson_not_hamiltonian_SINGULAR,
         poisson_not_hamiltonian_NOT_FINITE, poisson_not_hamiltonian_BAD_ARGUMENT
 } poisson_not_hamiltonian_status;
+const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status);
 
 /* those of higher order amplify rounding more than they gain */
 enum { poisson_not_hamiltonian_DIFFERENCES = 9 };
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[poisson_not_hamiltonian_DIFFERENCES][poisson_not_hamiltonian_DIM];
 } poisson_not_hamiltonian_history;
 
@@ -66,10 +63,8 @@ typedef struct {
 poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
     const poisson_not_hamiltonian_params *params, const double x0[poisson_not_hamiltonian_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_step(poisson_not_hamiltonian_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_integrate(poisson_not_hamiltonian_solver *s, double h,
     size_t steps);
 
@@ -93,8 +88,6 @@ void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *para
 void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params,
     const double x[poisson_not_hamiltonian_DIM], double out[poisson_not_hamiltonian_DIM]);
 
-const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status);
-
 /* For bindings: the size of poisson_not_hamiltonian_solver, and its count of good steps. */
 size_t poisson_not_hamiltonian_solver_size(void);
 size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_solver *s);
@@ -102,5 +95,4 @@ size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_s
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* POISSON_NOT_HAMILTONIAN_H */

@@ -2,11 +2,10 @@
  * predator_prey.h: the declarations; predator_prey.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4b377ce92dd3d13d9c582399ce538e0e2237937d4a18e6750f670177f66bd4f8
+ * body-sha256: ff12303eb55d5f0fd38b4ed9373c10efc1e2a3e08e30946fccb7170100cb33b1
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,7 @@ extern "C" {
 #define predator_prey_CASIMIRS 0
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
+enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that depend on params and h only */
 
 /* State vectors: prey, predator. Casimirs: none. */
 typedef struct {
@@ -25,23 +25,20 @@ typedef struct {
     double gain;   /* predators born per prey and unit time */
     double death;  /* death rate of the predators without prey */
 } predator_prey_params;
-
 extern const predator_prey_params predator_prey_default_params;
-
-enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that depend on params and h only */
 
 /* How a step ends; predator_prey_status_string says it in words. */
 typedef enum {
     predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR, predator_prey_NOT_FINITE,
         predator_prey_BAD_ARGUMENT
 } predator_prey_status;
+const char *predator_prey_status_string(predator_prey_status status);
 
 enum { predator_prey_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[predator_prey_DIFFERENCES][predator_prey_DIM];
 } predator_prey_history;
 
@@ -66,10 +63,8 @@ typedef struct {
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 predator_prey_status predator_prey_step(predator_prey_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on predator_prey_BAD_ARGUMENT.
@@ -89,8 +84,6 @@ void predator_prey_casimirs(const predator_prey_params *params, const double x[p
 void predator_prey_vector_field(const predator_prey_params *params, const double x[predator_prey_DIM],
     double out[predator_prey_DIM]);
 
-const char *predator_prey_status_string(predator_prey_status status);
-
 /* For bindings: the size of predator_prey_solver, and its count of good steps. */
 size_t predator_prey_solver_size(void);
 size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
@@ -98,5 +91,4 @@ size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* PREDATOR_PREY_H */

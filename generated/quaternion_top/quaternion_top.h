@@ -2,11 +2,10 @@
  * quaternion_top.h: the declarations; quaternion_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f9bfbf6c6733f48bc6c58bfb1a693547dcddc2a67ceb0369aa5ea34613c50217
+ * body-sha256: 1c3713800fcf73acb0773c1edeae28078ef52841fed30a46009abcac04e5c487
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,8 @@ extern "C" {
 #define quaternion_top_CASIMIRS 1
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "818ae683b38dea8c70860ad173c7962b5eb71229e0d7aeaea854acb32ebba04c"
+enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that depend on params and h only */
+enum { quaternion_top_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: length */
 
 /* State vectors: m1, m2, m3, w, x, y, z. Casimirs: length. */
 typedef struct {
@@ -26,24 +27,20 @@ typedef struct {
     double weight; /* weight times the distance of the centre of mass from the fixed point */
     double spring; /* stiffness of the spring that wants w = 1 or w = -1 */
 } quaternion_top_params;
-
 extern const quaternion_top_params quaternion_top_default_params;
-
-enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that depend on params and h only */
-enum { quaternion_top_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: length */
 
 /* How a step ends; quaternion_top_status_string says it in words. */
 typedef enum {
     quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR, quaternion_top_NOT_FINITE,
         quaternion_top_BAD_ARGUMENT
 } quaternion_top_status;
+const char *quaternion_top_status_string(quaternion_top_status status);
 
 enum { quaternion_top_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM];
 } quaternion_top_history;
 
@@ -73,10 +70,8 @@ quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quater
 quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 quaternion_top_status quaternion_top_step(quaternion_top_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -96,8 +91,6 @@ void quaternion_top_casimirs(const quaternion_top_params *params, const double x
 void quaternion_top_vector_field(const quaternion_top_params *params, const double x[quaternion_top_DIM],
     double out[quaternion_top_DIM]);
 
-const char *quaternion_top_status_string(quaternion_top_status status);
-
 /* For bindings: the size of quaternion_top_solver, and its count of good steps. */
 size_t quaternion_top_solver_size(void);
 size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
@@ -105,5 +98,4 @@ size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* QUATERNION_TOP_H */

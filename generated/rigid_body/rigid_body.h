@@ -2,11 +2,10 @@
  * rigid_body.h: the declarations; rigid_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e03da01fd8105f473806e3c88c12792a659a076893bdc58257b008b4dc75ab4a
+ * body-sha256: 747209065f580104d7dfcc0c66e6470831eb0eb27ec4361fa5dcbfef41526706
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,11 @@ extern "C" {
 #define rigid_body_CASIMIRS 1
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99"
+enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
+enum { rigid_body_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
+enum { rigid_body_REMEMBERED = 111 };  /* values that a recurrence is fitted to */
+enum { rigid_body_WINDOW = 40 };       /* of them that it may use */
+enum { rigid_body_AHEAD = 8 };         /* values that it foresees */
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
@@ -24,20 +28,14 @@ typedef struct {
     double I2; /* second principal moment of inertia */
     double I3; /* third principal moment of inertia */
 } rigid_body_params;
-
 extern const rigid_body_params rigid_body_default_params;
-
-enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
-enum { rigid_body_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
-enum { rigid_body_REMEMBERED = 111 };  /* values that a recurrence is fitted to */
-enum { rigid_body_WINDOW = 40 };       /* of them that it may use */
-enum { rigid_body_AHEAD = 8 };         /* values that it foresees */
 
 /* How a step ends; rigid_body_status_string says it in words. */
 typedef enum {
     rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR, rigid_body_NOT_FINITE,
         rigid_body_BAD_ARGUMENT
 } rigid_body_status;
+const char *rigid_body_status_string(rigid_body_status status);
 
 enum { rigid_body_KEPT = 2 * rigid_body_REMEMBERED };
 
@@ -95,10 +93,8 @@ rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params 
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 rigid_body_status rigid_body_step(rigid_body_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on rigid_body_BAD_ARGUMENT.
@@ -126,8 +122,6 @@ void rigid_body_casimirs(const rigid_body_params *params, const double x[rigid_b
 void rigid_body_vector_field(const rigid_body_params *params, const double x[rigid_body_DIM],
     double out[rigid_body_DIM]);
 
-const char *rigid_body_status_string(rigid_body_status status);
-
 /* For bindings: the size of rigid_body_solver, and its count of good steps. */
 size_t rigid_body_solver_size(void);
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
@@ -135,5 +129,4 @@ size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* RIGID_BODY_H */

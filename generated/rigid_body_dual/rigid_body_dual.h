@@ -2,11 +2,10 @@
  * rigid_body_dual.h: the declarations; rigid_body_dual.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a5a424ab5f3888b28d1a15cd10b24295e2bb10091ed31a6d9dacd3a70889b232
+ * body-sha256: 09c0a499af354d3655d7acdd6779b3fdd9fa7d62645ef67ee39bfc1630c6ff0a
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,8 @@ extern "C" {
 #define rigid_body_dual_CASIMIRS 1
 #define rigid_body_dual_PHIGEN_VERSION "0.1.0"
 #define rigid_body_dual_SPEC_SHA256 "e8342777c4b6b547dcc62fa6d2e3aaf07e52570aa2174b60c461d6c56ed43f1b"
+enum { rigid_body_dual_COEFFICIENTS = 12 }; /* numbers that depend on params and h only */
+enum { rigid_body_dual_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
@@ -24,24 +25,20 @@ typedef struct {
     double I2; /* second principal moment of inertia */
     double I3; /* third principal moment of inertia */
 } rigid_body_dual_params;
-
 extern const rigid_body_dual_params rigid_body_dual_default_params;
-
-enum { rigid_body_dual_COEFFICIENTS = 12 }; /* numbers that depend on params and h only */
-enum { rigid_body_dual_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
 
 /* How a step ends; rigid_body_dual_status_string says it in words. */
 typedef enum {
     rigid_body_dual_OK = 0, rigid_body_dual_NO_CONVERGENCE, rigid_body_dual_SINGULAR,
         rigid_body_dual_NOT_FINITE, rigid_body_dual_BAD_ARGUMENT
 } rigid_body_dual_status;
+const char *rigid_body_dual_status_string(rigid_body_dual_status status);
 
 enum { rigid_body_dual_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[rigid_body_dual_DIFFERENCES][rigid_body_dual_DIM];
 } rigid_body_dual_history;
 
@@ -73,10 +70,8 @@ rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
     const rigid_body_dual_params *params, const double x0[rigid_body_dual_DIM],
     const double gauge[rigid_body_dual_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 rigid_body_dual_status rigid_body_dual_step(rigid_body_dual_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_dual_status rigid_body_dual_integrate(rigid_body_dual_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -98,8 +93,6 @@ void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double
 void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[rigid_body_dual_DIM],
     double out[rigid_body_dual_DIM]);
 
-const char *rigid_body_dual_status_string(rigid_body_dual_status status);
-
 /* For bindings: the size of rigid_body_dual_solver, and its count of good steps. */
 size_t rigid_body_dual_solver_size(void);
 size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s);
@@ -107,5 +100,4 @@ size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* RIGID_BODY_DUAL_H */

@@ -2,11 +2,10 @@
  * rigid_body_paper.h: the declarations; rigid_body_paper.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 15cdace939953f5aa8b6a3ca916bf48600165632440f58be55ae8a5c6900eecd
+ * body-sha256: efeb565b3ef81a4587d4c50d13b6d4f6ac9100e61153bc3362d01eb909540202
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,7 @@ extern "C" {
 #define rigid_body_paper_CASIMIRS 1
 #define rigid_body_paper_PHIGEN_VERSION "0.1.0"
 #define rigid_body_paper_SPEC_SHA256 "fdf2d9a528753bef04cdf4e448b386ab40d533eb21d1b8fc60aed87613d78d3e"
+enum { rigid_body_paper_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
@@ -24,23 +24,20 @@ typedef struct {
     double J2; /* default 3.141592653589793 */
     double J3; /* default 100.0 */
 } rigid_body_paper_params;
-
 extern const rigid_body_paper_params rigid_body_paper_default_params;
-
-enum { rigid_body_paper_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; rigid_body_paper_status_string says it in words. */
 typedef enum {
     rigid_body_paper_OK = 0, rigid_body_paper_NO_CONVERGENCE, rigid_body_paper_SINGULAR,
         rigid_body_paper_NOT_FINITE, rigid_body_paper_BAD_ARGUMENT
 } rigid_body_paper_status;
+const char *rigid_body_paper_status_string(rigid_body_paper_status status);
 
 enum { rigid_body_paper_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[rigid_body_paper_DIFFERENCES][rigid_body_paper_DIM];
 } rigid_body_paper_history;
 
@@ -66,10 +63,8 @@ typedef struct {
 rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     const rigid_body_paper_params *params, const double x0[rigid_body_paper_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 rigid_body_paper_status rigid_body_paper_step(rigid_body_paper_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 rigid_body_paper_status rigid_body_paper_integrate(rigid_body_paper_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -92,8 +87,6 @@ void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const doub
 void rigid_body_paper_vector_field(const rigid_body_paper_params *params,
     const double x[rigid_body_paper_DIM], double out[rigid_body_paper_DIM]);
 
-const char *rigid_body_paper_status_string(rigid_body_paper_status status);
-
 /* For bindings: the size of rigid_body_paper_solver, and its count of good steps. */
 size_t rigid_body_paper_solver_size(void);
 size_t rigid_body_paper_solver_steps_done(const rigid_body_paper_solver *s);
@@ -101,5 +94,4 @@ size_t rigid_body_paper_solver_steps_done(const rigid_body_paper_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* RIGID_BODY_PAPER_H */

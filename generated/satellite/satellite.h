@@ -2,11 +2,10 @@
  * satellite.h: the declarations; satellite.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 043276c43ad5775f293a582ed1f00709641da9cb7b4da2806cda25703959f180
+ * body-sha256: 9b32bcc4c02210803f5a9a77f9b0ccb88d86fbd3a2ff6b14eb1ef2690f49a6f7
  */
 #ifndef SATELLITE_H
 #define SATELLITE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,10 @@ extern "C" {
 #define satellite_CASIMIRS 3
 #define satellite_PHIGEN_VERSION "0.1.0"
 #define satellite_SPEC_SHA256 "dc272fb52ae5f34a922056236d9e6fdb08ff8338f24456d0b55a9a52485fca76"
+enum { satellite_STAGES = 5 };        /* of a step */
+enum { satellite_COEFFICIENTS = 7 };  /* numbers that depend on params and h only */
+enum { satellite_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion */
+enum { satellite_ELEMENT = 4 };       /* numbers of an element of the group */
 
 /* State vectors: m1, m2, m3, N1, N2, N3, G1, G2, G3. Casimirs: N, G, A. */
 typedef struct {
@@ -25,26 +28,20 @@ typedef struct {
     double I3; /* largest moment of inertia */
     double n;  /* mean motion of the orbit */
 } satellite_params;
-
 extern const satellite_params satellite_default_params;
-
-enum { satellite_STAGES = 5 };        /* of a step */
-enum { satellite_COEFFICIENTS = 7 };  /* numbers that depend on params and h only */
-enum { satellite_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion */
-enum { satellite_ELEMENT = 4 };       /* numbers of an element of the group */
 
 /* How a step ends; satellite_status_string says it in words. */
 typedef enum {
     satellite_OK = 0, satellite_NO_CONVERGENCE, satellite_SINGULAR, satellite_NOT_FINITE,
         satellite_BAD_ARGUMENT
 } satellite_status;
+const char *satellite_status_string(satellite_status status);
 
 enum { satellite_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[satellite_DIFFERENCES][satellite_DIM];
 } satellite_history;
 
@@ -78,10 +75,8 @@ satellite_status satellite_init(satellite_solver *s, const satellite_params *par
 /* Of any length but 0. satellite_BAD_ARGUMENT where it is not finite, or 0. */
 satellite_status satellite_set_attitude(satellite_solver *s, const double attitude[satellite_ATTITUDE_SIZE]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 satellite_status satellite_step(satellite_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 satellite_status satellite_integrate(satellite_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on satellite_BAD_ARGUMENT.
@@ -100,8 +95,6 @@ void satellite_casimirs(const satellite_params *params, const double x[satellite
 void satellite_vector_field(const satellite_params *params, const double x[satellite_DIM],
     double out[satellite_DIM]);
 
-const char *satellite_status_string(satellite_status status);
-
 /* For bindings: the size of satellite_solver, and its count of good steps. */
 size_t satellite_solver_size(void);
 size_t satellite_solver_steps_done(const satellite_solver *s);
@@ -110,5 +103,4 @@ void satellite_attitude(const satellite_solver *s, double out[satellite_ELEMENT]
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SATELLITE_H */

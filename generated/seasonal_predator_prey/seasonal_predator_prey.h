@@ -2,11 +2,10 @@
  * seasonal_predator_prey.h: the declarations; seasonal_predator_prey.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 81d260f4b24d520bdd4c77ea14e08689bf1a372ce5421a018aa4afc36877baaf
+ * body-sha256: 17a7defd996d4a251b8500693b112d79eff3290bf804a4da04b3368a07e47d1b
  */
 #ifndef SEASONAL_PREDATOR_PREY_H
 #define SEASONAL_PREDATOR_PREY_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,7 @@ extern "C" {
 #define seasonal_predator_prey_CASIMIRS 0
 #define seasonal_predator_prey_PHIGEN_VERSION "0.1.0"
 #define seasonal_predator_prey_SPEC_SHA256 "6024fb8258a78f369b01d8e52272919642b4af3cf2bb32db98053ab4b6a20c9a"
+enum { seasonal_predator_prey_COEFFICIENTS = 20 }; /* numbers that depend on params and h, and on the time */
 
 /* State vectors: x, y. Casimirs: none. */
 typedef struct {
@@ -27,24 +27,21 @@ typedef struct {
     double epsilon; /* strength of the seasons */
     double omega;   /* frequency of the seasons */
 } seasonal_predator_prey_params;
-
 extern const seasonal_predator_prey_params seasonal_predator_prey_default_params;
-
-enum { seasonal_predator_prey_COEFFICIENTS = 20 }; /* numbers that depend on params and h, and on the time */
 
 /* How a step ends; seasonal_predator_prey_status_string says it in words. */
 typedef enum {
     seasonal_predator_prey_OK = 0, seasonal_predator_prey_NO_CONVERGENCE, seasonal_predator_prey_SINGULAR,
         seasonal_predator_prey_NOT_FINITE, seasonal_predator_prey_BAD_ARGUMENT
 } seasonal_predator_prey_status;
+const char *seasonal_predator_prey_status_string(seasonal_predator_prey_status status);
 
 /* those of higher order amplify rounding more than they gain */
 enum { seasonal_predator_prey_DIFFERENCES = 9 };
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[seasonal_predator_prey_DIFFERENCES][seasonal_predator_prey_DIM];
 } seasonal_predator_prey_history;
 
@@ -76,10 +73,8 @@ seasonal_predator_prey_status seasonal_predator_prey_init(seasonal_predator_prey
 seasonal_predator_prey_status seasonal_predator_prey_init_at(seasonal_predator_prey_solver *s,
     const seasonal_predator_prey_params *params, const double x0[seasonal_predator_prey_DIM], double t0);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 seasonal_predator_prey_status seasonal_predator_prey_step(seasonal_predator_prey_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 seasonal_predator_prey_status seasonal_predator_prey_integrate(seasonal_predator_prey_solver *s, double h,
     size_t steps);
 
@@ -107,8 +102,6 @@ void seasonal_predator_prey_casimirs(const seasonal_predator_prey_params *params
 void seasonal_predator_prey_vector_field(const seasonal_predator_prey_params *params, double t,
     const double x[seasonal_predator_prey_DIM], double out[seasonal_predator_prey_DIM]);
 
-const char *seasonal_predator_prey_status_string(seasonal_predator_prey_status status);
-
 /* For bindings: the size of seasonal_predator_prey_solver, and its count of good steps. */
 size_t seasonal_predator_prey_solver_size(void);
 size_t seasonal_predator_prey_solver_steps_done(const seasonal_predator_prey_solver *s);
@@ -116,5 +109,4 @@ size_t seasonal_predator_prey_solver_steps_done(const seasonal_predator_prey_sol
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SEASONAL_PREDATOR_PREY_H */

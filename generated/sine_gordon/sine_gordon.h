@@ -2,11 +2,10 @@
  * sine_gordon.h: the declarations; sine_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2ec4b1ddf767aca64a303cf2e43bab4f4f3a9c5cc59aa58fa37e9a17940de55d
+ * body-sha256: 2064cef0cea2da10ba2e4aafc8757b9307abcb094aca832d6527d2444d73b16e
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -98,5 +97,4 @@ size_t sine_gordon_solver_steps_done(const sine_gordon_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SINE_GORDON_H */

@@ -2,11 +2,10 @@
  * sir_epidemic.h: the declarations; sir_epidemic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bb6370e7bd6b96450cbc746f8e3798fb5e456220c09cfd8b4531d1182d0bba3f
+ * body-sha256: a8cf79d667d3c88c8d77f44aca12a557cb408983215ec389e3b82d30c2df90ca
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define sir_epidemic_CASIMIRS 1
 #define sir_epidemic_PHIGEN_VERSION "0.1.0"
 #define sir_epidemic_SPEC_SHA256 "3cf6d26b9024102964d272d47dd11225be0d3e675077cabf3aa91f4af27a10e2"
+enum { sir_epidemic_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
 
 /* State vectors: S, I, R. Casimirs: N. */
 typedef struct {
     double beta;  /* contacts per unit of time that infect */
     double gamma; /* rate of recovery */
 } sir_epidemic_params;
-
 extern const sir_epidemic_params sir_epidemic_default_params;
-
-enum { sir_epidemic_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
 
 /* How a step ends; sir_epidemic_status_string says it in words. */
 typedef enum {
     sir_epidemic_OK = 0, sir_epidemic_NO_CONVERGENCE, sir_epidemic_SINGULAR, sir_epidemic_NOT_FINITE,
         sir_epidemic_BAD_ARGUMENT
 } sir_epidemic_status;
+const char *sir_epidemic_status_string(sir_epidemic_status status);
 
 enum { sir_epidemic_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[sir_epidemic_DIFFERENCES][sir_epidemic_DIM];
 } sir_epidemic_history;
 
@@ -64,10 +61,8 @@ typedef struct {
 sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
     const double x0[sir_epidemic_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 sir_epidemic_status sir_epidemic_step(sir_epidemic_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_epidemic_status sir_epidemic_integrate(sir_epidemic_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on sir_epidemic_BAD_ARGUMENT.
@@ -86,8 +81,6 @@ void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[sir
 void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[sir_epidemic_DIM],
     double out[sir_epidemic_DIM]);
 
-const char *sir_epidemic_status_string(sir_epidemic_status status);
-
 /* For bindings: the size of sir_epidemic_solver, and its count of good steps. */
 size_t sir_epidemic_solver_size(void);
 size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s);
@@ -95,5 +88,4 @@ size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SIR_EPIDEMIC_H */

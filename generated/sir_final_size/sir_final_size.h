@@ -2,11 +2,10 @@
  * sir_final_size.h: the declarations; sir_final_size.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 24c3f5e71ab7e697d99045a690b0328b69b7f20f4751ae54409d8cbfd2d9065c
+ * body-sha256: 6020642eaa95b1f015e9d9aacc7754ca91ec29629c308b3504282d89e44ff0f0
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define sir_final_size_CASIMIRS 1
 #define sir_final_size_PHIGEN_VERSION "0.1.0"
 #define sir_final_size_SPEC_SHA256 "7484c778f31ede239b94c4b0e42e17d8479ae32e0b1efc0469e7872614cbf00b"
+enum { sir_final_size_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: S, I, R. Casimirs: K. */
 typedef struct {
     double beta;  /* contacts per unit of time that infect */
     double gamma; /* rate of recovery */
 } sir_final_size_params;
-
 extern const sir_final_size_params sir_final_size_default_params;
-
-enum { sir_final_size_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; sir_final_size_status_string says it in words. */
 typedef enum {
     sir_final_size_OK = 0, sir_final_size_NO_CONVERGENCE, sir_final_size_SINGULAR, sir_final_size_NOT_FINITE,
         sir_final_size_BAD_ARGUMENT
 } sir_final_size_status;
+const char *sir_final_size_status_string(sir_final_size_status status);
 
 enum { sir_final_size_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[sir_final_size_DIFFERENCES][sir_final_size_DIM];
 } sir_final_size_history;
 
@@ -64,10 +61,8 @@ typedef struct {
 sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_final_size_params *params,
     const double x0[sir_final_size_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 sir_final_size_status sir_final_size_step(sir_final_size_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sir_final_size_status sir_final_size_integrate(sir_final_size_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -87,8 +82,6 @@ void sir_final_size_casimirs(const sir_final_size_params *params, const double x
 void sir_final_size_vector_field(const sir_final_size_params *params, const double x[sir_final_size_DIM],
     double out[sir_final_size_DIM]);
 
-const char *sir_final_size_status_string(sir_final_size_status status);
-
 /* For bindings: the size of sir_final_size_solver, and its count of good steps. */
 size_t sir_final_size_solver_size(void);
 size_t sir_final_size_solver_steps_done(const sir_final_size_solver *s);
@@ -96,5 +89,4 @@ size_t sir_final_size_solver_steps_done(const sir_final_size_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SIR_FINAL_SIZE_H */

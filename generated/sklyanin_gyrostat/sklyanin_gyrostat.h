@@ -2,11 +2,10 @@
  * sklyanin_gyrostat.h: the declarations; sklyanin_gyrostat.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 005b965583ac9bd3a8733fd8bc61a36053095aeb1064629c06e4b0a7a9f6af4e
+ * body-sha256: 6178bb47b4a9613968ac664b584820cd4b6541445eeb6f68f719cedf2e5a5b93
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define sklyanin_gyrostat_CASIMIRS 2
 #define sklyanin_gyrostat_PHIGEN_VERSION "0.1.0"
 #define sklyanin_gyrostat_SPEC_SHA256 "e651a28cdc56907d5b5af694cc55378ac05a29592265e45944f163a14d4ec86f"
+enum { sklyanin_gyrostat_COEFFICIENTS = 31 }; /* numbers that depend on params and h only */
+enum { sklyanin_gyrostat_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: K0 */
 
 /* State vectors: S0, S1, S2, S3. Casimirs: K0, K1. */
 typedef struct {
     char unused; /* this system has no parameters */
 } sklyanin_gyrostat_params;
-
 extern const sklyanin_gyrostat_params sklyanin_gyrostat_default_params;
-
-enum { sklyanin_gyrostat_COEFFICIENTS = 31 }; /* numbers that depend on params and h only */
-enum { sklyanin_gyrostat_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: K0 */
 
 /* How a step ends; sklyanin_gyrostat_status_string says it in words. */
 typedef enum {
     sklyanin_gyrostat_OK = 0, sklyanin_gyrostat_NO_CONVERGENCE, sklyanin_gyrostat_SINGULAR,
         sklyanin_gyrostat_NOT_FINITE, sklyanin_gyrostat_BAD_ARGUMENT
 } sklyanin_gyrostat_status;
+const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status);
 
 enum { sklyanin_gyrostat_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[sklyanin_gyrostat_DIFFERENCES][sklyanin_gyrostat_DIM];
 } sklyanin_gyrostat_history;
 
@@ -71,10 +68,8 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *
     const sklyanin_gyrostat_params *params, const double x0[sklyanin_gyrostat_DIM],
     const double gauge[sklyanin_gyrostat_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 sklyanin_gyrostat_status sklyanin_gyrostat_step(sklyanin_gyrostat_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 sklyanin_gyrostat_status sklyanin_gyrostat_integrate(sklyanin_gyrostat_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -97,8 +92,6 @@ void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const do
 void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params,
     const double x[sklyanin_gyrostat_DIM], double out[sklyanin_gyrostat_DIM]);
 
-const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status);
-
 /* For bindings: the size of sklyanin_gyrostat_solver, and its count of good steps. */
 size_t sklyanin_gyrostat_solver_size(void);
 size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s);
@@ -106,5 +99,4 @@ size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SKLYANIN_GYROSTAT_H */

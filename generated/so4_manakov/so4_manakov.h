@@ -2,11 +2,10 @@
  * so4_manakov.h: the declarations; so4_manakov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d37c1333950e7e0deea578cb1be2098e9a14bda37497cc42a5ec126e899b0e44
+ * body-sha256: a8124464be6b97bbf9eb39af6d87429b7f45789bd6912446a12b8b3cf741aced
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define so4_manakov_CASIMIRS 2
 #define so4_manakov_PHIGEN_VERSION "0.1.0"
 #define so4_manakov_SPEC_SHA256 "c60c8cfe639c4453a54f9110f2a3b99c614520fc0699d00cf0c68db1b9948be4"
+enum { so4_manakov_COEFFICIENTS = 32 }; /* numbers that depend on params and h only */
+enum { so4_manakov_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: A */
 
 /* State vectors: x12, x13, x14, x23, x24, x34. Casimirs: A, B. */
 typedef struct {
     char unused; /* this system has no parameters */
 } so4_manakov_params;
-
 extern const so4_manakov_params so4_manakov_default_params;
-
-enum { so4_manakov_COEFFICIENTS = 32 }; /* numbers that depend on params and h only */
-enum { so4_manakov_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: A */
 
 /* How a step ends; so4_manakov_status_string says it in words. */
 typedef enum {
     so4_manakov_OK = 0, so4_manakov_NO_CONVERGENCE, so4_manakov_SINGULAR, so4_manakov_NOT_FINITE,
         so4_manakov_BAD_ARGUMENT
 } so4_manakov_status;
+const char *so4_manakov_status_string(so4_manakov_status status);
 
 enum { so4_manakov_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[so4_manakov_DIFFERENCES][so4_manakov_DIM];
 } so4_manakov_history;
 
@@ -69,10 +66,8 @@ so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_par
 so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manakov_params *params,
     const double x0[so4_manakov_DIM], const double gauge[so4_manakov_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 so4_manakov_status so4_manakov_step(so4_manakov_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 so4_manakov_status so4_manakov_integrate(so4_manakov_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on so4_manakov_BAD_ARGUMENT.
@@ -91,8 +86,6 @@ void so4_manakov_casimirs(const so4_manakov_params *params, const double x[so4_m
 void so4_manakov_vector_field(const so4_manakov_params *params, const double x[so4_manakov_DIM],
     double out[so4_manakov_DIM]);
 
-const char *so4_manakov_status_string(so4_manakov_status status);
-
 /* For bindings: the size of so4_manakov_solver, and its count of good steps. */
 size_t so4_manakov_solver_size(void);
 size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s);
@@ -100,5 +93,4 @@ size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SO4_MANAKOV_H */

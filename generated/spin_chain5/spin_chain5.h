@@ -2,11 +2,10 @@
  * spin_chain5.h: the declarations; spin_chain5.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 40fe099238202b13d083ec069525d0881d205a8271f67beb60927c1eb54b011d
+ * body-sha256: 13f5ef738ecda358a32628389e507e1d3bff60cbd02611de58ce20837cd15205
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,29 +16,27 @@ extern "C" {
 #define spin_chain5_CASIMIRS 5
 #define spin_chain5_PHIGEN_VERSION "0.1.0"
 #define spin_chain5_SPEC_SHA256 "822f770e232b566fca45eb393c188aab67b907df200761f36001661c9c3fe5e9"
+enum { spin_chain5_COEFFICIENTS = 33 }; /* numbers that depend on params and h only */
+enum { spin_chain5_GAUGES = 5 };        /* Casimirs whose multiples are taken from H: C1, C2, C3, C4, C5 */
 
 /* State vectors: x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4, x5, y5, z5. Casimirs: C1, C2, C3, C4, C5. */
 typedef struct {
     double J; /* exchange constant, ferromagnetic if positive */
 } spin_chain5_params;
-
 extern const spin_chain5_params spin_chain5_default_params;
-
-enum { spin_chain5_COEFFICIENTS = 33 }; /* numbers that depend on params and h only */
-enum { spin_chain5_GAUGES = 5 };        /* Casimirs whose multiples are taken from H: C1, C2, C3, C4, C5 */
 
 /* How a step ends; spin_chain5_status_string says it in words. */
 typedef enum {
     spin_chain5_OK = 0, spin_chain5_NO_CONVERGENCE, spin_chain5_SINGULAR, spin_chain5_NOT_FINITE,
         spin_chain5_BAD_ARGUMENT
 } spin_chain5_status;
+const char *spin_chain5_status_string(spin_chain5_status status);
 
 enum { spin_chain5_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[spin_chain5_DIFFERENCES][spin_chain5_DIM];
 } spin_chain5_history;
 
@@ -69,10 +66,8 @@ spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_par
 spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chain5_params *params,
     const double x0[spin_chain5_DIM], const double gauge[spin_chain5_GAUGES]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 spin_chain5_status spin_chain5_step(spin_chain5_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 spin_chain5_status spin_chain5_integrate(spin_chain5_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on spin_chain5_BAD_ARGUMENT.
@@ -91,8 +86,6 @@ void spin_chain5_casimirs(const spin_chain5_params *params, const double x[spin_
 void spin_chain5_vector_field(const spin_chain5_params *params, const double x[spin_chain5_DIM],
     double out[spin_chain5_DIM]);
 
-const char *spin_chain5_status_string(spin_chain5_status status);
-
 /* For bindings: the size of spin_chain5_solver, and its count of good steps. */
 size_t spin_chain5_solver_size(void);
 size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s);
@@ -100,5 +93,4 @@ size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SPIN_CHAIN5_H */

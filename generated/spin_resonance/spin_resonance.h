@@ -2,11 +2,10 @@
  * spin_resonance.h: the declarations; spin_resonance.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6468efbdb0a0e9b0a37ea5596c42aad4bcd0674cda48aad504cf27fd49219767
+ * body-sha256: 80144491fae4d6a79a306f320dea4259ecdbfce053d30a2af30c7f7d84dabf2b
  */
 #ifndef SPIN_RESONANCE_H
 #define SPIN_RESONANCE_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,7 @@ extern "C" {
 #define spin_resonance_CASIMIRS 1
 #define spin_resonance_PHIGEN_VERSION "0.1.0"
 #define spin_resonance_SPEC_SHA256 "5ddcd1cafa805e373cf495543a70a36ab54b37b0b9b46774ed678f920e677a3b"
+enum { spin_resonance_COEFFICIENTS = 15 }; /* numbers that depend on params and h, and on the time */
 
 /* State vectors: m1, m2, m3. Casimirs: size. */
 typedef struct {
@@ -25,23 +25,20 @@ typedef struct {
     double omega; /* its frequency */
     double D;     /* anisotropy: an easy plane if it is positive */
 } spin_resonance_params;
-
 extern const spin_resonance_params spin_resonance_default_params;
-
-enum { spin_resonance_COEFFICIENTS = 15 }; /* numbers that depend on params and h, and on the time */
 
 /* How a step ends; spin_resonance_status_string says it in words. */
 typedef enum {
     spin_resonance_OK = 0, spin_resonance_NO_CONVERGENCE, spin_resonance_SINGULAR, spin_resonance_NOT_FINITE,
         spin_resonance_BAD_ARGUMENT
 } spin_resonance_status;
+const char *spin_resonance_status_string(spin_resonance_status status);
 
 enum { spin_resonance_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[spin_resonance_DIFFERENCES][spin_resonance_DIM];
 } spin_resonance_history;
 
@@ -71,10 +68,8 @@ spin_resonance_status spin_resonance_init(spin_resonance_solver *s, const spin_r
 spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spin_resonance_params *params,
     const double x0[spin_resonance_DIM], double t0);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 spin_resonance_status spin_resonance_step(spin_resonance_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 spin_resonance_status spin_resonance_integrate(spin_resonance_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -99,8 +94,6 @@ void spin_resonance_casimirs(const spin_resonance_params *params, const double x
 void spin_resonance_vector_field(const spin_resonance_params *params, double t,
     const double x[spin_resonance_DIM], double out[spin_resonance_DIM]);
 
-const char *spin_resonance_status_string(spin_resonance_status status);
-
 /* For bindings: the size of spin_resonance_solver, and its count of good steps. */
 size_t spin_resonance_solver_size(void);
 size_t spin_resonance_solver_steps_done(const spin_resonance_solver *s);
@@ -108,5 +101,4 @@ size_t spin_resonance_solver_steps_done(const spin_resonance_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* SPIN_RESONANCE_H */

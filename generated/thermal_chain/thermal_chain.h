@@ -2,11 +2,10 @@
  * thermal_chain.h: the declarations; thermal_chain.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3eee8da9c1cc48a65662249057d50dbe076934892baaf070b2d927cf6938ed67
+ * body-sha256: 7abfa93c355802edc4721cd1e62f595595e2cdb0465cc4b3bac0d2503daa40fc
  */
 #ifndef THERMAL_CHAIN_H
 #define THERMAL_CHAIN_H
-
 #include <stddef.h>
 #include <stdint.h>
 #ifdef __cplusplus
@@ -18,6 +17,12 @@ extern "C" {
 #define thermal_chain_CASIMIRS 4
 #define thermal_chain_PHIGEN_VERSION "0.1.0"
 #define thermal_chain_SPEC_SHA256 "5d3df38060fdd4f00d014c45e35eeeca792676acb8c0de5c5229638247bbb939"
+enum { thermal_chain_COEFFICIENTS = 17 }; /* numbers that depend on params and h, and on the noise */
+/* of noise: bath_x1, bath_y1, bath_z1, bath_x2, bath_y2, bath_z2, bath_x3, bath_y3, bath_z3, bath_x4,
+   bath_y4, bath_z4 */
+enum { thermal_chain_SOURCES = 12 };
+enum { thermal_chain_DRAWS = 12 }; /* increments of the noise in a step */
+enum { thermal_chain_PARTS = 1 };  /* increments of one source in a step, each of a part of it */
 
 /* State vectors: x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4. Casimirs: length1, length2, length3,
    length4. */
@@ -26,21 +31,14 @@ typedef struct {
     double T;            /* temperature */
     double damping_rate; /* of Landau and Lifshitz */
 } thermal_chain_params;
-
 extern const thermal_chain_params thermal_chain_default_params;
-
-enum { thermal_chain_COEFFICIENTS = 17 }; /* numbers that depend on params and h, and on the noise */
-/* of noise: bath_x1, bath_y1, bath_z1, bath_x2, bath_y2, bath_z2, bath_x3, bath_y3, bath_z3, bath_x4,
-   bath_y4, bath_z4 */
-enum { thermal_chain_SOURCES = 12 };
-enum { thermal_chain_DRAWS = 12 }; /* increments of the noise in a step */
-enum { thermal_chain_PARTS = 1 };  /* increments of one source in a step, each of a part of it */
 
 /* How a step ends; thermal_chain_status_string says it in words. */
 typedef enum {
     thermal_chain_OK = 0, thermal_chain_NO_CONVERGENCE, thermal_chain_SINGULAR, thermal_chain_NOT_FINITE,
         thermal_chain_BAD_ARGUMENT
 } thermal_chain_status;
+const char *thermal_chain_status_string(thermal_chain_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thermal_chain_init. */
 typedef struct {
@@ -72,10 +70,8 @@ thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_c
 thermal_chain_status thermal_chain_set_noise(thermal_chain_solver *s, uint64_t seed, uint32_t member,
     uint64_t step);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 thermal_chain_status thermal_chain_step(thermal_chain_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 thermal_chain_status thermal_chain_integrate(thermal_chain_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on thermal_chain_BAD_ARGUMENT.
@@ -110,8 +106,6 @@ void thermal_chain_vector_field(const thermal_chain_params *params, const double
 void thermal_chain_noise_fields(const thermal_chain_params *params, const double x[thermal_chain_DIM],
     double out[thermal_chain_SOURCES * thermal_chain_DIM]);
 
-const char *thermal_chain_status_string(thermal_chain_status status);
-
 /* For bindings: the size of thermal_chain_solver, and its count of good steps. */
 size_t thermal_chain_solver_size(void);
 size_t thermal_chain_solver_steps_done(const thermal_chain_solver *s);
@@ -119,5 +113,4 @@ size_t thermal_chain_solver_steps_done(const thermal_chain_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* THERMAL_CHAIN_H */

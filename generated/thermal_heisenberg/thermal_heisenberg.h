@@ -2,11 +2,10 @@
  * thermal_heisenberg.h: the declarations; thermal_heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d32c03c9c768991083aca7eb63379771088a7908e7f3807a648fb4bc1bd632b9
+ * body-sha256: f0a26d02d42004ce0a6f28a46fff906a5b2e01787efd99e309b2b6da66fc90b0
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
-
 #include <stddef.h>
 #include <stdint.h>
 #ifdef __cplusplus
@@ -114,5 +113,4 @@ size_t thermal_heisenberg_solver_steps_done(const thermal_heisenberg_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* THERMAL_HEISENBERG_H */

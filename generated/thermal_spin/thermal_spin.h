@@ -2,11 +2,10 @@
  * thermal_spin.h: the declarations; thermal_spin.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d316b22bb1414d6580b7b4e23002e6100bd54b48b182848b3f08dc6507cc10b9
+ * body-sha256: 32112f5669a4e92a5821078a8e11ef496b42d68862eab1a09b67b99185f43304
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
-
 #include <stddef.h>
 #include <stdint.h>
 #ifdef __cplusplus
@@ -18,6 +17,10 @@ extern "C" {
 #define thermal_spin_CASIMIRS 1
 #define thermal_spin_PHIGEN_VERSION "0.1.0"
 #define thermal_spin_SPEC_SHA256 "94027d99f63156278559cc210d53326037ddbd17e39528977f9fdc3b323e1de6"
+enum { thermal_spin_COEFFICIENTS = 13 }; /* numbers that depend on params and h, and on the noise */
+enum { thermal_spin_SOURCES = 3 };       /* of noise: bath_x, bath_y, bath_z */
+enum { thermal_spin_DRAWS = 3 };         /* increments of the noise in a step */
+enum { thermal_spin_PARTS = 1 };         /* increments of one source in a step, each of a part of it */
 
 /* State vectors: x, y, z. Casimirs: length. */
 typedef struct {
@@ -25,19 +28,14 @@ typedef struct {
     double T;            /* temperature */
     double damping_rate; /* of Landau and Lifshitz */
 } thermal_spin_params;
-
 extern const thermal_spin_params thermal_spin_default_params;
-
-enum { thermal_spin_COEFFICIENTS = 13 }; /* numbers that depend on params and h, and on the noise */
-enum { thermal_spin_SOURCES = 3 };       /* of noise: bath_x, bath_y, bath_z */
-enum { thermal_spin_DRAWS = 3 };         /* increments of the noise in a step */
-enum { thermal_spin_PARTS = 1 };         /* increments of one source in a step, each of a part of it */
 
 /* How a step ends; thermal_spin_status_string says it in words. */
 typedef enum {
     thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR, thermal_spin_NOT_FINITE,
         thermal_spin_BAD_ARGUMENT
 } thermal_spin_status;
+const char *thermal_spin_status_string(thermal_spin_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thermal_spin_init. */
 typedef struct {
@@ -69,10 +67,8 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
 thermal_spin_status thermal_spin_set_noise(thermal_spin_solver *s, uint64_t seed, uint32_t member,
     uint64_t step);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 thermal_spin_status thermal_spin_step(thermal_spin_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 thermal_spin_status thermal_spin_integrate(thermal_spin_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on thermal_spin_BAD_ARGUMENT.
@@ -106,8 +102,6 @@ void thermal_spin_vector_field(const thermal_spin_params *params, const double x
 void thermal_spin_noise_fields(const thermal_spin_params *params, const double x[thermal_spin_DIM],
     double out[thermal_spin_SOURCES * thermal_spin_DIM]);
 
-const char *thermal_spin_status_string(thermal_spin_status status);
-
 /* For bindings: the size of thermal_spin_solver, and its count of good steps. */
 size_t thermal_spin_solver_size(void);
 size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s);
@@ -115,5 +109,4 @@ size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* THERMAL_SPIN_H */

@@ -2,11 +2,10 @@
  * thruster_body.h: the declarations; thruster_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f902f2d99cc776e3dd7f6ca44c8f75fb42eba9094884559b4783e2a6ed95108b
+ * body-sha256: fd7d6c347bca2b41c7e8621f30306f1ccc820acc14f8a58d3e232565cf4b0f85
  */
 #ifndef THRUSTER_BODY_H
 #define THRUSTER_BODY_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,6 +16,8 @@ extern "C" {
 #define thruster_body_CASIMIRS 1
 #define thruster_body_PHIGEN_VERSION "0.1.0"
 #define thruster_body_SPEC_SHA256 "d7008fc5692e1b59f1c3b14bb2c026902f9cbe75a2384109edc23562163c7f67"
+enum { thruster_body_STAGES = 5 };       /* of a step */
+enum { thruster_body_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
 
 /* State vectors: m1, m2, m3. Casimirs: C. */
 typedef struct {
@@ -26,24 +27,20 @@ typedef struct {
     double torque; /* about the third axis */
     double drag;   /* default 0.05 */
 } thruster_body_params;
-
 extern const thruster_body_params thruster_body_default_params;
-
-enum { thruster_body_STAGES = 5 };       /* of a step */
-enum { thruster_body_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
 
 /* How a step ends; thruster_body_status_string says it in words. */
 typedef enum {
     thruster_body_OK = 0, thruster_body_NO_CONVERGENCE, thruster_body_SINGULAR, thruster_body_NOT_FINITE,
         thruster_body_BAD_ARGUMENT
 } thruster_body_status;
+const char *thruster_body_status_string(thruster_body_status status);
 
 enum { thruster_body_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[thruster_body_DIFFERENCES][thruster_body_DIM];
 } thruster_body_history;
 
@@ -68,10 +65,8 @@ typedef struct {
 thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_body_params *params,
     const double x0[thruster_body_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 thruster_body_status thruster_body_step(thruster_body_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 thruster_body_status thruster_body_integrate(thruster_body_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on thruster_body_BAD_ARGUMENT.
@@ -91,8 +86,6 @@ void thruster_body_casimirs(const thruster_body_params *params, const double x[t
 void thruster_body_vector_field(const thruster_body_params *params, const double x[thruster_body_DIM],
     double out[thruster_body_DIM]);
 
-const char *thruster_body_status_string(thruster_body_status status);
-
 /* For bindings: the size of thruster_body_solver, and its count of good steps. */
 size_t thruster_body_solver_size(void);
 size_t thruster_body_solver_steps_done(const thruster_body_solver *s);
@@ -100,5 +93,4 @@ size_t thruster_body_solver_steps_done(const thruster_body_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* THRUSTER_BODY_H */

@@ -2,11 +2,10 @@
  * toda.h: the declarations; toda.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ac19d4bd45ff5cdbf191c76f9130285005a98512af08d65bbb5d069e27ee865e
+ * body-sha256: f9d376d856197d8d9fd3605b056285b44c1fcdf2dd07f5829bf2156215d00403
  */
 #ifndef TODA_H
 #define TODA_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -96,5 +95,4 @@ size_t toda_solver_steps_done(const toda_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* TODA_H */

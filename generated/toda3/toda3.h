@@ -2,11 +2,10 @@
  * toda3.h: the declarations; toda3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a677b2aba78ec1da234a6c49dfb04a738598862dcbafd0d39d6478fcbb29cf4b
+ * body-sha256: 33f1d6ff49666da9460a04e24a3447de4f4465c37e466766f9f432f5a3960d68
  */
 #ifndef TODA3_H
 #define TODA3_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,27 +16,25 @@ extern "C" {
 #define toda3_CASIMIRS 1
 #define toda3_PHIGEN_VERSION "0.1.0"
 #define toda3_SPEC_SHA256 "813743f0c214e25a500552f5cc291b9b59649d4122a822c50e413b8a48c6bba9"
+enum { toda3_COEFFICIENTS = 10 }; /* numbers that depend on params and h only */
 
 /* State vectors: a1, a2, b1, b2, b3. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } toda3_params;
-
 extern const toda3_params toda3_default_params;
-
-enum { toda3_COEFFICIENTS = 10 }; /* numbers that depend on params and h only */
 
 /* How a step ends; toda3_status_string says it in words. */
 typedef enum {
     toda3_OK = 0, toda3_NO_CONVERGENCE, toda3_SINGULAR, toda3_NOT_FINITE, toda3_BAD_ARGUMENT
 } toda3_status;
+const char *toda3_status_string(toda3_status status);
 
 enum { toda3_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[toda3_DIFFERENCES][toda3_DIM];
 } toda3_history;
 
@@ -61,10 +58,8 @@ typedef struct {
    positive is not, or what is computed from parameters alone is not finite. */
 toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[toda3_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 toda3_status toda3_step(toda3_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 toda3_status toda3_integrate(toda3_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on toda3_BAD_ARGUMENT. Either
@@ -82,8 +77,6 @@ double toda3_hamiltonian(const toda3_params *params, const double x[toda3_DIM]);
 void toda3_casimirs(const toda3_params *params, const double x[toda3_DIM], double out[]);
 void toda3_vector_field(const toda3_params *params, const double x[toda3_DIM], double out[toda3_DIM]);
 
-const char *toda3_status_string(toda3_status status);
-
 /* For bindings: the size of toda3_solver, and its count of good steps. */
 size_t toda3_solver_size(void);
 size_t toda3_solver_steps_done(const toda3_solver *s);
@@ -91,5 +84,4 @@ size_t toda3_solver_steps_done(const toda3_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* TODA3_H */

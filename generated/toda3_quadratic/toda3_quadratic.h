@@ -2,11 +2,10 @@
  * toda3_quadratic.h: the declarations; toda3_quadratic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 296cbc8f9e54004b31fb0b9a70ccd6b812ba7e92d57812090da80e687ade850d
+ * body-sha256: 59c8d6ec042f8a236e3273baf453909f664e87e6dd101b1a138d6eb57b3d3886
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,24 +16,23 @@ extern "C" {
 #define toda3_quadratic_CASIMIRS 1
 #define toda3_quadratic_PHIGEN_VERSION "0.1.0"
 #define toda3_quadratic_SPEC_SHA256 "7af77757733d7da7009fd5c930b7974289267141d3afbc870017a911873e4cad"
+enum { toda3_quadratic_COEFFICIENTS = 1 }; /* numbers that depend on params and h only */
+enum { toda3_quadratic_REMEMBERED = 112 }; /* values that a recurrence is fitted to */
+enum { toda3_quadratic_WINDOW = 40 };      /* of them that it may use */
+enum { toda3_quadratic_AHEAD = 1 };        /* values that it foresees */
 
 /* State vectors: a1, a2, b1, b2, b3. Casimirs: det. */
 typedef struct {
     char unused; /* this system has no parameters */
 } toda3_quadratic_params;
-
 extern const toda3_quadratic_params toda3_quadratic_default_params;
-
-enum { toda3_quadratic_COEFFICIENTS = 1 }; /* numbers that depend on params and h only */
-enum { toda3_quadratic_REMEMBERED = 112 }; /* values that a recurrence is fitted to */
-enum { toda3_quadratic_WINDOW = 40 };      /* of them that it may use */
-enum { toda3_quadratic_AHEAD = 1 };        /* values that it foresees */
 
 /* How a step ends; toda3_quadratic_status_string says it in words. */
 typedef enum {
     toda3_quadratic_OK = 0, toda3_quadratic_NO_CONVERGENCE, toda3_quadratic_SINGULAR,
         toda3_quadratic_NOT_FINITE, toda3_quadratic_BAD_ARGUMENT
 } toda3_quadratic_status;
+const char *toda3_quadratic_status_string(toda3_quadratic_status status);
 
 enum { toda3_quadratic_KEPT = 2 * toda3_quadratic_REMEMBERED };
 
@@ -75,10 +73,8 @@ typedef struct {
 toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
     const double x0[toda3_quadratic_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 toda3_quadratic_status toda3_quadratic_integrate(toda3_quadratic_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on
@@ -107,8 +103,6 @@ void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double
 void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[toda3_quadratic_DIM],
     double out[toda3_quadratic_DIM]);
 
-const char *toda3_quadratic_status_string(toda3_quadratic_status status);
-
 /* For bindings: the size of toda3_quadratic_solver, and its count of good steps. */
 size_t toda3_quadratic_solver_size(void);
 size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s);
@@ -116,5 +110,4 @@ size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* TODA3_QUADRATIC_H */

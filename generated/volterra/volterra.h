@@ -2,11 +2,10 @@
  * volterra.h: the declarations; volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cf31f29c7c22b6b2a1248ac3881ad49eaf01618656f1e09f66f16afd579300ff
+ * body-sha256: 51d00e2ce039a87b52e7419b648381f852d529a2424e274266a6be8db72678f3
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -96,5 +95,4 @@ size_t volterra_solver_steps_done(const volterra_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* VOLTERRA_H */

@@ -2,11 +2,10 @@
  * volterra5.h: the declarations; volterra5.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b1b067186bc98ec4339f75c9a69e66cd01bbfe01543a53b3fb34ebc2eed36652
+ * body-sha256: 2d4cd2e8444f325bac002dc8dff510d2c8ec07d6d9b2e69482494934cd70049d
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define volterra5_CASIMIRS 1
 #define volterra5_PHIGEN_VERSION "0.1.0"
 #define volterra5_SPEC_SHA256 "dd128093b5704f6c0aeea964a546614f9b636714a89d9b639a6d0eec7b0d3270"
+enum { volterra5_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
 
 /* State vectors: v1, v2, v3, v4, v5. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } volterra5_params;
-
 extern const volterra5_params volterra5_default_params;
-
-enum { volterra5_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
 
 /* How a step ends; volterra5_status_string says it in words. */
 typedef enum {
     volterra5_OK = 0, volterra5_NO_CONVERGENCE, volterra5_SINGULAR, volterra5_NOT_FINITE,
         volterra5_BAD_ARGUMENT
 } volterra5_status;
+const char *volterra5_status_string(volterra5_status status);
 
 enum { volterra5_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[volterra5_DIFFERENCES][volterra5_DIM];
 } volterra5_history;
 
@@ -63,10 +60,8 @@ typedef struct {
 volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params,
     const double x0[volterra5_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 volterra5_status volterra5_step(volterra5_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 volterra5_status volterra5_integrate(volterra5_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on volterra5_BAD_ARGUMENT.
@@ -85,8 +80,6 @@ void volterra5_casimirs(const volterra5_params *params, const double x[volterra5
 void volterra5_vector_field(const volterra5_params *params, const double x[volterra5_DIM],
     double out[volterra5_DIM]);
 
-const char *volterra5_status_string(volterra5_status status);
-
 /* For bindings: the size of volterra5_solver, and its count of good steps. */
 size_t volterra5_solver_size(void);
 size_t volterra5_solver_steps_done(const volterra5_solver *s);
@@ -94,5 +87,4 @@ size_t volterra5_solver_steps_done(const volterra5_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* VOLTERRA5_H */

@@ -2,11 +2,10 @@
  * vortices3.h: the declarations; vortices3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f8e3c0eea88edb4319144066c047ba89a5d7eaff5560b14451de54522b068661
+ * body-sha256: 77f04911e56ec068b506a6a5507ecfc7e02717ffde1333adebc1d71e5dacac23
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -17,28 +16,26 @@ extern "C" {
 #define vortices3_CASIMIRS 0
 #define vortices3_PHIGEN_VERSION "0.1.0"
 #define vortices3_SPEC_SHA256 "037a04eba07f271265722e4dcbf9a974884f1b57a9cde7f8c30f2ddfde0882bc"
+enum { vortices3_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* State vectors: x1, y1, x2, y2, x3, y3. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } vortices3_params;
-
 extern const vortices3_params vortices3_default_params;
-
-enum { vortices3_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
 /* How a step ends; vortices3_status_string says it in words. */
 typedef enum {
     vortices3_OK = 0, vortices3_NO_CONVERGENCE, vortices3_SINGULAR, vortices3_NOT_FINITE,
         vortices3_BAD_ARGUMENT
 } vortices3_status;
+const char *vortices3_status_string(vortices3_status status);
 
 enum { vortices3_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[vortices3_DIFFERENCES][vortices3_DIM];
 } vortices3_history;
 
@@ -63,10 +60,8 @@ typedef struct {
 vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params,
     const double x0[vortices3_DIM]);
 
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 vortices3_status vortices3_step(vortices3_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 vortices3_status vortices3_integrate(vortices3_solver *s, double h, size_t steps);
 
 /* Between steps: stand at x, or move by change, all else being as it was, also on vortices3_BAD_ARGUMENT.
@@ -85,8 +80,6 @@ void vortices3_casimirs(const vortices3_params *params, const double x[vortices3
 void vortices3_vector_field(const vortices3_params *params, const double x[vortices3_DIM],
     double out[vortices3_DIM]);
 
-const char *vortices3_status_string(vortices3_status status);
-
 /* For bindings: the size of vortices3_solver, and its count of good steps. */
 size_t vortices3_solver_size(void);
 size_t vortices3_solver_steps_done(const vortices3_solver *s);
@@ -94,5 +87,4 @@ size_t vortices3_solver_steps_done(const vortices3_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* VORTICES3_H */

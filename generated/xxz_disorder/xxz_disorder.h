@@ -2,11 +2,10 @@
  * xxz_disorder.h: the declarations; xxz_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a0f33b9e05f0413d997fda8092ec8a44ecab0e5240ec8a0ccb57711362788b36
+ * body-sha256: cb33ee7ac1430c8096c2897b401c738a48f2b550f2e91191db2500bd6ec18141
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
-
 #include <stddef.h>
 #ifdef __cplusplus
 extern "C" {
@@ -100,5 +99,4 @@ size_t xxz_disorder_solver_steps_done(const xxz_disorder_solver *s);
 #ifdef __cplusplus
 }
 #endif
-
 #endif /* XXZ_DISORDER_H */

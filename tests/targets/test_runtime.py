@@ -167,6 +167,13 @@ def test_lines_are_broken_before_what_binds_least():
     ]
 
 
+def test_conditions_are_broken_before_comparisons_rather_than_behind():
+    """But best between them."""
+    wide, wider = "a" * 40, "b" * 62
+    assert fitted(f"    if ({wide} && {wider} >= 1) return 0;").split("\n")[1] == f"        && {wider} >= 1) return 0;"
+    assert fitted(f"    if ({wider} + {wide[:30]} >= 12345) return;").split("\n")[1].strip() == ">= 12345) return;"
+
+
 def test_loops_are_broken_behind_their_heads():
     head = "    for (size_t k = 0; k < count; ++k)"
     assert fitted(f"{head} place[k] = first + ({'a' * 45} + k) * block;").split("\n")[0] == head

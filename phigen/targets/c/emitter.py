@@ -7,6 +7,7 @@ What depends on the model is printed: sizes, constants, kernels (`printed`). All
 from __future__ import annotations
 
 import re
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
 from phigen.errors import Diagnostic, SpecError
@@ -62,8 +63,8 @@ def emit(program: Program, command: str, *, single_file: bool = False) -> dict[s
         body = fitted(f"{headers}\n{declared}\n{defined}")
         return {f"{name}.c": _sealed(lines, body)}
     guard = f"{name.upper()}_H"
-    header = fitted(f"#ifndef {guard}\n#define {guard}\n\n{declared}\n#endif /* {guard} */\n")
-    body = fitted(f'#include "{name}.h"\n\n{headers}\n\n{defined}')
+    header = fitted(f"#ifndef {guard}\n#define {guard}\n{declared}#endif /* {guard} */\n")
+    body = fitted(f'#include "{name}.h"\n{headers}\n\n{defined}')
     return {f"{name}.h": _sealed(_declared_lines(program), header), f"{name}.c": _sealed(lines, body)}
 
 
@@ -106,7 +107,7 @@ def _declared_lines(program: Program) -> list[str]:
 
 def _sealed(lines: Sequence[str], body: str) -> str:
     chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", body, re.MULTILINE)
-    contents = [""] * bool(chapters) + [f"  {k}. {chapter}" for k, chapter in enumerate(chapters, 1)]
+    contents = textwrap.wrap(f"Contents: {'; '.join(chapters)}", 100, subsequent_indent="  ") if chapters else []
     text = "\n".join(f" * {line}".rstrip() for line in [*lines, *contents])
     return f"/*\n{text}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
 

@@ -16,7 +16,7 @@ _STRING = re.compile(r'"[^"]*"')
 _DEPTH = 18
 
 #: The same for operators that bind: where one of them is broken at, what it holds together falls apart.
-_BOUND = dict.fromkeys("*/", 30) | dict.fromkeys("+-", 16) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 13)
+_BOUND = dict.fromkeys("*/", 50) | dict.fromkeys("+-", 36) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 28)
 
 
 def fitted(text: str) -> str:
@@ -120,6 +120,7 @@ def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
         head = None if after_loop else head
         operator = re.match(r" ([-+*/?:<>]|&&|\|\||[<>=!]=) ", line[k:])
         label = line[k - 1] == ":" and line.lstrip().startswith("case ")
-        if line[k - 1] in ",;=" or operator or after_loop or label:
-            bound = _BOUND.get(operator[1], 0) if operator else 12 * (line[k - 1] == "=")
+        assigned = line[k - 1] == "=" and line[k - 2] not in "<>=!"
+        if line[k - 1] in ",;" or assigned or operator or after_loop or label:
+            bound = _BOUND.get(operator[1], 0) if operator else 12 * assigned
             yield k - _DEPTH * depth - bound + (WIDTH if after_loop else 0), k

@@ -8,7 +8,7 @@
 #if PHI_IMPLICIT
 /* ---- Compensated sums, linear equations ---- */
 #else
-/* ---- Compensated sums ---- */
+/* ---- The explicit step ---- */
 #endif
 static int phi_finite(const double *values, int count)
 {
@@ -17,8 +17,8 @@ static int phi_finite(const double *values, int count)
 }
 
 #if PHI_ADVANCE
-/* x + change + small in compensated arithmetic, where small is the carry and what is as small: were that rounded with
-   the change, corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
+/* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the change,
+   corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
 static int phi_advance(phi_solver *s, const double change[PHI_DIM], const double small[PHI_DIM])
 {
     double x[PHI_DIM], carry[PHI_DIM];

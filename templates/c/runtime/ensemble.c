@@ -13,7 +13,9 @@
 #include "solver.c"
 #endif
 
+#if PHI_EACH || PHI_NOISE
 /* ---- Ensembles ---- */
+#endif
 #if PHI_GROUPS || PHI_PACKS
 /* All members. The first status that is not OK. */
 static phi_status phi_run(const phi_members *all)
@@ -100,20 +102,17 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 #endif
     for (size_t m = 0; m < members; ++m) {
         phi_solver s;
-        double x0[PHI_DIM];
-        for (size_t i = 0; i < PHI_DIM; ++i) x0[i] = x[i * members + m];
+        for (size_t i = 0; i < PHI_DIM; ++i) s.x[i] = x[i * members + m];
 #if PHI_TIMED
-        phi_status member = phi_init_at(&s, params, x0, t0);
+        phi_status member = phi_init_at(&s, params, s.x, t0);
 #else
-        phi_status member = phi_init(&s, params, x0);
+        phi_status member = phi_init(&s, params, s.x);
 #endif
-        if (member == PHI_OK) {
 #if PHI_NOISE
-            phi_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
+        if (member == PHI_OK) phi_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
 #endif
-            member = phi_integrate(&s, h, steps);
-            for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + m] = s.x[i];
-        }
+        if (member == PHI_OK) member = phi_integrate(&s, h, steps);
+        for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + m] = s.x[i];
         if (status != NULL) status[m] = (unsigned char)member;
 #if PHI_NOISE
         if (member == PHI_OK) continue;

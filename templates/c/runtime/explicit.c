@@ -6,7 +6,6 @@
 #include "algebra.c"
 #include "model.h"
 
-/* ---- The explicit step ---- */
 #if PHI_EXPLICIT
 /* One explicit stage: x + increment(x). */
 static phi_status phi_stage(phi_solver *s, int stage)

@@ -5,9 +5,9 @@
 #include <string.h>
 
 #include "model.h"
+#if PHI_GAUGE_SEARCH
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
-#if PHI_GAUGE_SEARCH
 enum {
     PHI_SAMPLES = 32, /* states along a short piece of the trajectory */
     PHI_DEGREE = 6, /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */

@@ -5,11 +5,12 @@
 
 #include "model.h"
 
-#if PHI_GUESSED
-/* ---- Starting guesses ---- */
 #if PHI_RECURRENCES
 #include "recurrence.c"
+
 #endif
+#if PHI_GUESSED
+/* ---- Starting guesses ---- */
 #define PHI_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
 
 #if PHI_RECURRENCES
@@ -136,7 +137,7 @@ static int phi_predict(const phi_history *history, double value[PHI_DIM])
     return history->order > 0 && distance <= PHI_REACH * size;
 }
 
-/* Take in the solved value. The guess of order k missed it by its k-th difference: the next is of the best order. */
+/* Take in a solved value. The guess of order k missed it by its k-th difference: the next has the best. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM])
 {
     double least = HUGE_VAL, next[PHI_DIM];
@@ -167,12 +168,10 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM])
    away, at another energy, that has nothing to do with it. */
 static int phi_plausible(const phi_solver *s, int stage, const double increment[PHI_DIM])
 {
-    double moved = 0.0, size = 0.0, field[PHI_DIM], middle[PHI_DIM], end[PHI_DIM];
+    double moved = 0.0, size = 0.0, field[PHI_DIM], point[PHI_DIM], H[3];
     for (int i = 0; i < PHI_DIM; ++i) {
         moved += fabs(increment[i]);
         size += fabs(s->x[i]);
-        middle[i] = s->x[i] + 0.5 * increment[i];
-        end[i] = s->x[i] + increment[i];
     }
     if (moved <= PHI_PLAUSIBLE * size) return 1;
 #if PHI_TIMED
@@ -196,13 +195,14 @@ static int phi_plausible(const phi_solver *s, int stage, const double increment[
     for (int k = 0; k < PHI_SOURCES * PHI_DIM; ++k) size += fabs(s->dw[k / PHI_DIM] * fields[k]);
 #endif
     if (moved <= PHI_PLAUSIBLE * size) return 1;
+    for (int k = 0; k < 3; ++k) { /* before, halfway, after */
+        for (int i = 0; i < PHI_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
 #if PHI_TIMED
-    const double before = phi_hamiltonian(&s->params, s->t, s->x), after = phi_hamiltonian(&s->params, s->t, end);
-    const double between = phi_hamiltonian(&s->params, s->t, middle);
+        H[k] = phi_hamiltonian(&s->params, s->t, point);
 #else
-    const double before = phi_hamiltonian(&s->params, s->x);
-    const double after = phi_hamiltonian(&s->params, end), between = phi_hamiltonian(&s->params, middle);
+        H[k] = phi_hamiltonian(&s->params, point);
 #endif
-    return fabs(after - before) <= PHI_LOST * (fabs(before) + fabs(between) + fabs(after));
+    }
+    return fabs(H[2] - H[0]) <= PHI_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }
 #endif

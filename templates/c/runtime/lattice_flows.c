@@ -75,6 +75,7 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 
 #if PHI_WAVES
 #include "lattice_waves.c"
+
 #endif
 #if PHI_NOISE
 /* The increments of a part of a step after so many, at all sites. */

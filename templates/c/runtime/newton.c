@@ -45,13 +45,13 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 #define PHI_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
 #define PHI_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
-/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
-   increment is corrected to first order by the last Newton correction, so that correction costs no evaluation:
-   a correction is accepted when the error that remains after it, quadratic in it, is below PHI_TOLERANCE. */
+/* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The last
+   correction changes the increment to first order, without an evaluation: it is accepted if the error that remains,
+   quadratic in it, is below PHI_TOLERANCE. */
 static phi_status phi_attempt(phi_solver *s, int stage)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];
-    double jacobian[PHI_DIM * PHI_DIM], increment_jacobian[PHI_DIM * PHI_DIM];
+    double jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM];
     double previous = HUGE_VAL;
 #if PHI_GUESSED
     if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
@@ -59,10 +59,9 @@ static phi_status phi_attempt(phi_solver *s, int stage)
     memcpy(y, s->x, sizeof y);
 #endif
     for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
-        phi_linearise(s->coef[stage], y, displacement, increment, jacobian, increment_jacobian);
+        phi_linearise(s->coef[stage], y, displacement, increment, jacobian, slope);
         ++s->evaluations;
-        for (int i = 0; i < PHI_DIM; ++i)
-            delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
+        for (int i = 0; i < PHI_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = phi_solve(jacobian, delta);
         const double size = phi_size(y, delta), growth = size / (previous * previous);
         if (!isfinite(size)) return PHI_NOT_FINITE;
@@ -73,10 +72,9 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         previous = size;
         if (!(remaining <= PHI_TOLERANCE || stalled)) continue;
         double small[PHI_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
-        for (int i = 0; i < PHI_DIM; ++i) {
-            for (int j = 0; j < PHI_DIM; ++j) small[i] -= increment_jacobian[i * PHI_DIM + j] * delta[j];
-            small[i] += s->carry[i];
-        }
+        for (int i = 0; i < PHI_DIM; ++i)
+            for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
+        for (int i = 0; i < PHI_DIM; ++i) small[i] += s->carry[i];
         if (!phi_plausible(s, stage, increment)) return PHI_NO_CONVERGENCE;
 #if PHI_MONITOR
         double elapsed[1];

@@ -50,6 +50,7 @@ static void phi_sizes(phi_lanes y[restrict PHI_DIM], phi_lanes delta[restrict PH
 }
 
 #include "largest.c"
+
 #if PHI_SPARSE
 /* Correct y by the residuals, with the factors in the table, and measure the corrections; also find what they take from
    the increments. */

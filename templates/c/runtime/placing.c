@@ -14,8 +14,7 @@
 #if PHI_ATTITUDE
 #include "attitude.c"
 #endif
-/* ---- Between steps ---- */
-#if PHI_GUESSED
+#if PHI_RECURRENCES
 #define PHI_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
 
 #endif
@@ -38,13 +37,9 @@ static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const doubl
 }
 
 #endif
-#if PHI_GUESSED
 #if PHI_RECURRENCES
 /* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion as it was. From
    far away all begins anew, with the next step. */
-#else
-/* Guesses move with the state. From far away all begins anew, with the next step. */
-#endif
 static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
 {
     double distance = 0.0, size = 0.0;
@@ -57,22 +52,15 @@ static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
         size += fabs(from[i]);
 #endif
     }
-    if (!(distance <= PHI_NEAR_BY * size)) {
-        s->h = (double)NAN;
-        return;
-    }
+    if (!(distance <= PHI_NEAR_BY * size)) s->h = (double)NAN;
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_history *history = &s->history[stage];
-#if PHI_RECURRENCES
         const int count = history->count < PHI_HISTORY ? history->count : PHI_HISTORY;
         memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
         for (int k = 0; k < count; ++k)
             for (int i = 0; i < PHI_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
         history->count = count;
         history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
-#else
-        for (int i = 0; i < PHI_DIM; ++i) history->difference[0][i] += s->x[i] - from[i];
-#endif
     }
 }
 
@@ -105,8 +93,12 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 #if PHI_MONITOR
     if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;
 #endif
-#if PHI_GUESSED
+#if PHI_RECURRENCES
     phi_move_guesses(s, from);
+#elif PHI_GUESSED
+    /* what guesses begin from moves with the state */
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        for (int i = 0; i < PHI_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
 #endif
 #if PHI_RATE_OF_GAUGE
     phi_take_rate(s);
@@ -129,8 +121,11 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 #if PHI_MONITOR
     if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;
 #endif
-#if PHI_GUESSED
+#if PHI_RECURRENCES
     phi_move_guesses(s, from);
+#elif PHI_GUESSED
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
+        for (int i = 0; i < PHI_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
 #endif
 #if PHI_RATE_OF_GAUGE
     phi_take_rate(s);

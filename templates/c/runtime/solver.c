@@ -16,11 +16,8 @@
 #endif
 #if PHI_MONITOR
 #include "level.c"
-#elif PHI_GAUGE
+#elif PHI_GAUGE_SEARCH
 #include "gauge.c"
-#endif
-#if PHI_KICKED
-#include "placing.c"
 #endif
 #if PHI_BLOCKS
 #include <limits.h>
@@ -33,6 +30,10 @@
 #endif
 
 /* ---- The solver ---- */
+#if PHI_GAUGE && !PHI_MONITOR && !PHI_GAUGE_SEARCH
+#include "gauge.c"
+
+#endif
 /* The arguments may be parts of *s, which is therefore written last. */
 #if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
@@ -48,20 +49,19 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #else
     if (s == NULL || x0 == NULL) return PHI_BAD_ARGUMENT;
 #endif
-    phi_solver fresh = { .h = (double)NAN };
-    fresh.params = params != NULL ? *params : phi_default_params;
+    phi_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params : phi_default_params };
     memcpy(fresh.x, x0, sizeof fresh.x);
 #if PHI_TIMED
     fresh.t = t0;
 #endif
 #if PHI_PARAMETERS
-    if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params)) return PHI_BAD_ARGUMENT;
 #if PHI_GAUGE
     phi_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef[0]); /* so short a step does not matter */
 #else
     phi_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
 #endif
-    if (!phi_finite(fresh.coef[0], PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
+    if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params) || !phi_finite(fresh.coef[0], PHI_COEFFICIENTS))
+        return PHI_BAD_ARGUMENT;
 #else
     if (!phi_finite(fresh.x, PHI_DIM)) return PHI_BAD_ARGUMENT;
 #endif
@@ -295,6 +295,10 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_int
 
 #endif
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
+
+#endif
+#if PHI_KICKED
+#include "placing.c"
 
 #endif
 #include "status.c"

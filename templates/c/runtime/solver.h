@@ -2,14 +2,14 @@
 #define PHI_FILE_SOLVER_H
 #include "declarations.h"
 #include "status.h"
+const char *phi_status_string(phi_status status);
 
 #if PHI_GUESSED && !PHI_RECURRENCES
 enum { PHI_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
-    int count; /* differences that are known */
-    int order; /* how many of them the extrapolation adds up */
+    int count, order; /* differences that are known; how many of them the extrapolation adds up */
     double difference[PHI_DIFFERENCES][PHI_DIM];
 } phi_history;
 
@@ -151,14 +151,12 @@ phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double 
 
 #endif
 #if PHI_MONITOR
-/* One step of size h in tau, of either sign; s->t gains the physical time that it takes. On failure the state is as
-   before. */
+/* One step of size h in tau, of either sign, or many; s->t gains the physical time that they take. On failure s->x is
+   the last good state, after s->steps steps. */
 #else
-/* One step of size h, of either sign. On failure the state is as before. */
+/* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
 #endif
 phi_status phi_step(phi_solver *s, double h);
-
-/* Many steps. On failure s->x is the last good state and s->steps counts the good steps. */
 phi_status phi_integrate(phi_solver *s, double h, size_t steps);
 
 #if PHI_KICKED
@@ -325,8 +323,6 @@ double phi_modified_hamiltonian(const phi_params *params, double h, const double
 #endif
 
 #endif
-const char *phi_status_string(phi_status status);
-
 /* For bindings: the size of phi_solver, and its count of good steps. */
 size_t phi_solver_size(void);
 size_t phi_solver_steps_done(const phi_solver *s);

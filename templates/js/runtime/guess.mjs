@@ -14,11 +14,6 @@ const DIFFERENCES = 9;
 /** How far from the last value a guess may be, in sizes of that value. */
 const REACH = 4;
 
-// #if KICKED
-/** How far the state may be moved between steps, in its own size, for guesses to move with it. */
-const NEAR_BY = 0.125;
-
-// #endif
 /**
  * The last value of the unknown and its backward differences, which the next is extrapolated by. For
  * speed only.
@@ -38,21 +33,13 @@ export class History {
 
   // #if KICKED
   /**
-   * The state has been moved: the last value moves with it, and its differences stay; nothing is kept from
-   * far away.
+   * The state has been moved: the last value moves with it, and its differences stay.
    *
    * @param {Float64Array} from
    * @param {Float64Array} to
    */
   move(from, to) {
-    let distance = 0;
-    let size = 0;
-    for (let i = 0; i < DIM; i++) {
-      distance += Math.abs(to[i] - from[i]);
-      size += Math.abs(from[i]);
-    }
-    if (!(distance <= NEAR_BY * size)) this.clear();
-    else for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
+    for (let i = 0; i < DIM; i++) this.#difference[0][i] += to[i] - from[i];
   }
 
   // #endif
