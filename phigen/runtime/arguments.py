@@ -249,6 +249,22 @@ def states(x: ArrayLike, what: str, interface: Interface) -> Floats:
     return found
 
 
+def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface, members: int) -> Floats:
+    """`first` for each of some members, (members, numbers): one for all, or one for each; by default the identity."""
+    if not interface.attitude:
+        first(np.eye(1), None, interface)  # which says why there is none
+    several = np.ndim(attitude0) > len(interface.attitude) if attitude0 is not None else False
+    placed = position0 is not None and np.ndim(position0) > 1
+    turns = _array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
+    places = _array(position0, "position0", (members, 3)) if placed and interface.position else None  # type: ignore[arg-type]
+    begin = np.empty((members, interface.element))
+    identity = np.eye(interface.attitude[0])[0] if len(interface.attitude) == 1 else np.eye(interface.attitude[0])
+    for m in range(members):
+        own = attitude0 if turns is None else turns[m]
+        begin[m] = first(identity if own is None else own, position0 if places is None else places[m], interface)
+    return begin
+
+
 def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: Interface) -> Floats | None:
     """The numbers of an attitude, a quaternion of length 1 or a matrix, and a position; None if neither is given."""
     if attitude0 is None and position0 is None:

@@ -100,7 +100,7 @@ class CSolver:
             self._expect_parameters(members)
         alike = members.alike and not members.stride and self._gauge is None
         if not (alike or hasattr(self._c, "ensemble_each")):
-            return one_by_one(self, members)
+            return one_by_one(self, members, threads)
         final, status = np.empty_like(members.x0, order="C"), np.zeros(len(members), dtype=np.uint8)
         frames = members.frames() if members.stride else None
 

@@ -19,11 +19,12 @@ from phigen.runtime.given import Given
 from phigen.runtime.gradients import Jacobian, Pullback
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
+from phigen.runtime.members import one_by_one
 from phigen.runtime.named import Named
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Followed, Session, rows_along
 from phigen.runtime.timed import along_until, states_at
-from phigen.runtime.trajectory import Trajectory, turned_into
+from phigen.runtime.trajectory import Trajectory, Turned, turned_into
 
 _ADVICE = {
     "NO_CONVERGENCE": "the inner iteration did not converge; a smaller step helps",
@@ -322,6 +323,46 @@ class Solver(Named[Backend, Interface]):
         except BackendError as error:
             h, values, _ = asked.numbers(error.members[0] if error.members else 0)
             raise self.failure(error, h, error.states, values) from error
+
+    def attitudes(
+        self,
+        X0: ArrayLike,
+        h: ArrayLike,
+        steps: int,
+        stride: int | None = None,
+        *,
+        attitude0: ArrayLike | None = None,
+        position0: ArrayLike | None = None,
+        t0: ArrayLike | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
+        threads: int | None = None,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        **more: ArrayLike,
+    ) -> Turned:
+        """`ensemble` with the attitudes of its members: (x, attitude, position), position None where there is none.
+
+        These are (members, …) at the end, with a ``stride`` (rows, members, …): quaternions (4,) or matrices (n, n),
+        and positions (3,). Members begin with ``attitude0`` and ``position0``, one for all or (members, …), by default
+        with the identity and at the origin. Each is integrated by itself, as by `integrate`. Raises the same as
+        `ensemble`, and `TypeError` where the spec does not say ``reconstruct``.
+        """
+        own: dict[str, Any] = dict(more)
+        draws = arguments.draws(self.interface, own, {"seed": seed, "member": member, "step0": step0})
+        asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
+        threads = threads if threads is None else arguments.count(threads, "threads", 1)
+        rows = len(row_steps(asked.steps, asked.stride or max(asked.steps, 1)))
+        turned = np.full((rows, len(asked), self.interface.element), np.nan)
+        turned[0] = arguments.firsts(attitude0, position0, self.interface, len(asked))
+        try:
+            x = one_by_one(self.backend, asked, threads, turned)
+        except BackendError as error:
+            h, values, _ = asked.numbers(error.members[0])
+            raise self.failure(error, h, error.states, values) from error
+        attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
+        assert attitude is not None
+        return Turned(x, attitude, position)
 
     def pullback(
         self,

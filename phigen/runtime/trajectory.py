@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -153,13 +153,22 @@ class Trajectory:
         return {**about, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
 
+class Turned(NamedTuple):
+    """What `Solver.attitudes` gives: states, attitudes, and positions, if there are such."""
+
+    x: Floats
+    attitude: Floats
+    position: Floats | None
+
+
 def turned_into(interface: Interface, elements: Floats) -> tuple[Floats | None, Floats | None]:
-    """Attitudes (rows, …) and positions (rows, 3) of rows of their numbers; None for what is not followed."""
+    """Attitudes (rows, …) and positions (rows, 3) of rows of their numbers, of any shape in front; None for what is not
+    followed."""
     if not interface.attitude:
         return None, None
     size = math.prod(interface.attitude)
-    attitude = elements[:, :size].reshape(len(elements), *interface.attitude)
-    return attitude, elements[:, size:] if interface.position else None
+    attitude = elements[..., :size].reshape(*elements.shape[:-1], *interface.attitude)
+    return attitude, elements[..., size:] if interface.position else None
 
 
 def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:

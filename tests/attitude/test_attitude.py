@@ -415,11 +415,38 @@ def test_members_are_turned_each_by_itself():
     assert np.abs(positions[:, 3] - alone.position).max() < 1e-15 * 5
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_members_of_ensembles_have_attitudes_and_positions(target):
+    """Each begins with its own and ends where a run of it alone does, in rows and without; failures are told apart."""
+    top, rng = solver("top", target), np.random.default_rng(2)
+    x0, attitude0, position0 = rng.normal(size=(3, 6)), rng.normal(size=(3, 4)), rng.normal(size=(3, 3))
+    found = top.attitudes(x0, 0.05, 10, 4, attitude0=attitude0, position0=position0, threads=2)
+    assert (found.x.shape, found.attitude.shape, found.position.shape) == ((4, 3, 6), (4, 3, 4), (4, 3, 3))
+    ends = top.attitudes(x0, 0.05, 10, attitude0=attitude0, position0=position0[0])
+    for m in range(3):
+        alone = top.integrate(x0[m], 0.05, 10, 4, attitude0=attitude0[m], position0=position0[m])
+        assert np.array_equal(found.x[:, m], alone.x)
+        assert np.abs(found.attitude[:, m] - alone.attitude).max() < 5e-15
+        assert np.abs(found.position[:, m] - alone.position).max() < 5e-15
+        assert np.abs(ends.attitude[m] - alone.attitude[-1]).max() < 5e-15
+    assert np.abs(ends.position[0] - found.position[-1, 0]).max() < 5e-15
+    still = top.attitudes(x0, 0.05, 0)
+    assert np.array_equal(still.attitude, [[1, 0, 0, 0]] * 3)
+    assert np.array_equal(still.position, np.zeros((3, 3)))
+    with pytest.raises(phigen.StepError) as failed:
+        top.attitudes([x0[0], 1e9 * x0[1]], [0.05, 1e3], 4)
+    assert failed.value.members == (1,)
+
+
 def test_other_solvers_have_none():
     plain = phigen.compile(compiled_text(BODY.replace("reconstruct: quaternion", "")), target="numpy")
     assert plain.integrate([1, 0, 0.1], 0.1, 2).attitude is None
     with pytest.raises(TypeError, match="no attitude"):
         plain.integrate([1, 0, 0.1], 0.1, 2, attitude0=[1, 0, 0, 0])
+    with pytest.raises(TypeError, match="no attitude"):
+        plain.attitudes([[1, 0, 0.1]], 0.1, 2)
+    with pytest.raises(ValueError, match="attitude0 must"):
+        solver("body").attitudes([[1, 0, 0.1]], 0.1, 2, attitude0=np.eye(3))
     with pytest.raises(TypeError, match="no position"):
         solver("body").integrate([1, 0, 0.1], 0.1, 2, position0=[1, 0, 0])
     with pytest.raises(ValueError, match="must not be 0"):
