@@ -116,10 +116,10 @@ class Compilation:
         return self.gauged.series
 
     def _repr_latex_(self) -> str:
-        """The formulas of the system and of the method, for notebooks."""
-        from phigen.notation.latex import document
+        """The formulas of the system and of the method, of a lattice those of the cell, for notebooks."""
+        from phigen.notation import latex, lattices
 
-        return document(self)
+        return lattices.document(self.cell) if self.cell else latex.document(self)
 
     def _repr_html_(self) -> str:
         """The system and what it was compiled to, for notebooks."""

@@ -80,7 +80,7 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
         axes.set_xlabel("t")
         axes.set_ylabel("change at the sites")
         axes.grid(True)
-        axes.legend(loc="lower right", ncols=2)
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=4)
     return figure
 
 
@@ -127,7 +127,7 @@ def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]
     axes.set_xlabel("t")
     axes.set_ylabel("error")
     axes.grid(True)
-    axes.legend(loc="lower right", ncols=3)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=4)
 
 
 def _largest(values: Floats) -> float:

@@ -12,8 +12,10 @@ import numpy as np
 
 from phigen.compilation import Compilation
 from phigen.geometry.system import System
-from phigen.notation import latex, mathml
+from phigen.lattice.cell import Cell
+from phigen.notation import latex, lattices, mathml
 from phigen.runtime.interface import Floats
+from phigen.runtime.lattice import LatticeTrajectory
 from phigen.runtime.trajectory import Trajectory
 
 
@@ -43,7 +45,14 @@ def compilation_html(compilation: Compilation) -> str:
     """The system, and what it was compiled to."""
     program = compilation.program
     said = f"compiled to order {program.order}: {compilation.label}, {program.step.manner}"
-    return system_html(compilation.system).removesuffix("</div>") + f"<p>{escape(said)}</p></div>"
+    about = _cell_html(compilation.cell) if compilation.cell else system_html(compilation.system)
+    return about.removesuffix("</div>") + f"<p>{escape(said)}</p></div>"
+
+
+def _cell_html(cell: Cell) -> str:
+    """The brackets, the density of H, Casimirs and invariants of a lattice."""
+    lines = [_formula(left, "".join(right)) for _, equations in lattices.formulas(cell) for left, right in equations]
+    return f"<div><strong>{escape(cell.name)}</strong> {escape(lattices.described(cell))}{''.join(lines)}</div>"
 
 
 def trajectory_html(trajectory: Trajectory) -> str:
@@ -54,6 +63,23 @@ def trajectory_html(trajectory: Trajectory) -> str:
     blank = [""] * (1 + len(trajectory.coordinates))
     body.append(["spread", *blank, *(_spread(v) for v in (trajectory.energy, *trajectory.casimirs.values()))])
     said = f"{trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} rows"
+    rows = "".join(_row("td", cells) for cells in body)
+    return f"<table><caption>{escape(said)}</caption>{_row('th', head)}{rows}</table>"
+
+
+def lattice_trajectory_html(trajectory: LatticeTrajectory) -> str:
+    """Means of the fields and the energy in the first and last frame, and how far energy and Casimirs went."""
+    changes = trajectory.changes()
+    head = ["", "t", *(f"mean {c}" for c in trajectory.coordinates), "energy", *[*changes][1:]]
+    body = []
+    for said, k in (("start", 0), ("end", -1)):
+        means = trajectory.x[k].reshape(len(trajectory.coordinates), -1).mean(axis=1)
+        numbers = [trajectory.t[k], *means.tolist(), trajectory.energy[k]]
+        body.append([said, *map(_number, numbers), *[""] * (len(changes) - 1)])
+    blank = [""] * (1 + len(trajectory.coordinates))
+    body.append(["largest change", *blank, *(f"{v.max():.2g}" for v in changes.values())])
+    sizes = "×".join(map(str, trajectory.x.shape[2:]))
+    said = f"{sizes} sites, {trajectory.steps} steps of {trajectory.h!r}, {len(trajectory)} frames"
     rows = "".join(_row("td", cells) for cells in body)
     return f"<table><caption>{escape(said)}</caption>{_row('th', head)}{rows}</table>"
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from phigen.errors import MissingPackageError
+from phigen.runtime.lattice import LatticeTrajectory
 from phigen.runtime.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -36,6 +39,28 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
     frame: pd.DataFrame = pandas.DataFrame(trajectory.rows(), columns=names).set_index(names[0])
     frame.attrs.update({"h": trajectory.h, "steps": trajectory.steps, **_parameters(trajectory)})
     return frame
+
+
+def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
+    """A Dataset: ``x`` (t, coordinate, *axes), ``energy`` (t), Casimirs, and parameters that are arrays."""
+    xarray = _imported("xarray")
+    about = trajectory.solver.interface
+    axes = trajectory.axes
+    arrays = {n: v for n, v in trajectory.parameters.items() if np.ndim(v)}
+    shapes: dict[str, tuple[str, ...]] = dict.fromkeys(about.at_sites, axes) | dict.fromkeys(about.at_bonds, ("bond",))
+    numbers = {f"parameter_{n}": v for n, v in trajectory.parameters.items() if n not in arrays}
+    found: xr.Dataset = xarray.Dataset(
+        {
+            "x": (("t", "coordinate", *axes), trajectory.x),
+            "energy": ("t", trajectory.energy),
+            **{f"casimir_{n}": (("t", *axes)[: np.ndim(v)], v) for n, v in trajectory.casimirs.items()},
+            **{f"parameter_{n}": (shapes[n], v) for n, v in arrays.items() if n in shapes},
+            **({"bonds": (("bond", "end"), arrays["bonds"])} if "bonds" in arrays else {}),
+        },
+        coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},
+        attrs={"h": trajectory.h, "steps": trajectory.steps, **numbers},
+    )
+    return found
 
 
 def _parameters(trajectory: Trajectory) -> dict[str, float]:

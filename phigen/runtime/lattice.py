@@ -7,7 +7,7 @@ import zipfile
 from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,6 +30,10 @@ from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream
 from phigen.runtime.live import LiveLattice
 from phigen.runtime.named import Named
 from phigen.writing import replacing
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
 
 
 class LatticeSession(Protocol):
@@ -139,6 +143,41 @@ class LatticeTrajectory:
     def __repr__(self) -> str:
         sizes = "×".join(map(str, self.x.shape[2:]))
         return f"<LatticeTrajectory of ({', '.join(self.coordinates)}) on {sizes} sites: {len(self)} frames>"
+
+    def _repr_html_(self) -> str:
+        """First and last frame, and what was conserved, for notebooks."""
+        from phigen.notation.notebook import lattice_trajectory_html
+
+        return lattice_trajectory_html(self)
+
+    def plot(self) -> Figure:
+        """A figure of the fields: a chain over space and time, planes at some times; below, what was conserved.
+
+        Notebooks show it; ``.savefig(path)`` writes it. Raises `MissingPackageError` without matplotlib.
+        """
+        from phigen.drawing.lattices import lattice_figure
+
+        return lattice_figure(self, self.changes(), "")
+
+    def to_xarray(self) -> xr.Dataset:
+        """An `xarray.Dataset`: ``x`` (t, coordinate, *axes), ``energy`` (t), ``casimir_NAME`` (t, *axes) or (t).
+
+        Parameters that are arrays are variables ``parameter_NAME``; the rest are attributes. Raises
+        `MissingPackageError` without xarray.
+        """
+        from phigen.runtime.exchange import lattice_to_xarray
+
+        return lattice_to_xarray(self)
+
+    def changes(self) -> dict[str, Floats]:
+        """How far the energy, in units of `energy_scale`, and each Casimir went since the start, (frames,).
+
+        What time, forces or noise did to the energy is in it. Of Casimirs of sites it is the site at the worst.
+        """
+        found = {"energy": np.abs(self.energy - self.energy[0]) / (self.energy_scale or 1.0)}
+        for name, values in self.casimirs.items():
+            found[name] = np.abs(values - values[0]).reshape(len(self), -1).max(axis=1)
+        return found
 
     @property
     def energy_scale(self) -> float:

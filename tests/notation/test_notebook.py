@@ -2,6 +2,7 @@
 
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 from sympy import sympify
 
@@ -45,6 +46,23 @@ def test_a_trajectory_says_what_was_conserved(body):
     assert rows[0] == ["", "t", "x1", "x2", "x3", "energy", "C"]
     assert [row[:2] for row in rows[1:]] == [["start", "0"], ["end", "1"], ["spread", ""]]
     assert float(rows[3][6]) < 1e-14
+
+
+def test_lattices_show_themselves_as_other_systems_do():
+    compilation = compile_spec(load(SPECS / "lattices" / "xxz_disorder.yaml"))
+    assert "\\sum_{i}" in compilation._repr_latex_()
+    assert "compiled to order" in ElementTree.fromstring(compilation._repr_html_().replace("&#x2062;", ""))[-1].text
+    states, field = np.random.default_rng(1).normal(size=(3, 4)), np.arange(4.0)
+    trajectory = phigen.compile(compilation, target="numpy").integrate(states, 0.05, steps=6, stride=3, B=field)
+    rows = [[cell.text or "" for cell in row] for row in ElementTree.fromstring(trajectory._repr_html_()).iter("tr")]
+    assert rows[0] == ["", "t", "mean x", "mean y", "mean z", "energy", "C"]
+    assert [row[:2] for row in rows[1:]] == [["start", "0"], ["end", "0.3"], ["largest change", ""]]
+    assert float(rows[3][6]) < 1e-14
+    assert len(trajectory.plot().axes) == 3 * 2 + 1  # diagrams with their scales, and what was conserved
+    found = trajectory.to_xarray()
+    assert dict(found.sizes) == {"t": 3, "coordinate": 3, "i": 4}
+    assert (found.x.sel(coordinate="y").values[0] == states[1]).all()
+    assert (found.casimir_C.dims, found.parameter_B.values.tolist()) == (("t", "i"), field.tolist())
 
 
 def test_representations_fit_on_a_line(body):
