@@ -19,6 +19,7 @@ RING = {"bonds": np.array([[i, (i + 1) % SITES] for i in range(SITES)] + [[0, 2]
 #: Kicks, open ends with parameters at sites, several sweeps of one part, colours, graphs, pairs; the series.
 LATTICES = {
     "fput": {},
+    "volterra": {},
     "xxz_disorder": {"B": 0.5 + np.arange(SITES) / 7},
     "kdv": {"d": 1.3},
     "food_web": RING | {"A": 0.4 + np.arange(7) / 9, "k": 0.3 + np.arange(SITES) / 8},
@@ -39,15 +40,16 @@ hamiltonian: p**2/2 + (1 + cos(t))*(q[i+1] - q)**2/2
 """
 
 
-#: In C: kicks, colours, open ends along two axes with parameters of neighbours.
-IN_C = {"fput": SITES, "volterra": SITES, "far_open": (4, 3)}
+#: In C: kicks, colours, open ends along two axes with parameters of neighbours; a graph with colours and parameters at
+#: bonds, pairs.
+IN_C = {"fput": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
 
 
 @cache
 def made(name, target="numpy"):
     lattice, *series = name.split()
     more = {"scheme": "series", "order": 2} if series else {}
-    more |= {"tangent": True} if target == "c" else {}
+    more |= {"tangent": target == "c"}
     spec = phigen.spec.loads(SPECS[lattice]) if lattice == "far_open" else lattice
     return phigen.compile(spec, target=target, adjoint=True, **more)
 
@@ -178,7 +180,7 @@ def weighed_tangents(solver, x, bar, stride, parameters):
 def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     solver, numpy, random = made(name, "c"), made(name), np.random.default_rng(5)
     x = beginning(solver, IN_C[name])
-    bar, given = random.normal(size=(4, *x.shape)), {"w": 1 + random.random(x.shape[1:])} if name == "far_open" else {}
+    bar, given = random.normal(size=(4, *x.shape)), LATTICES.get(name, {"w": 1 + random.random(x.shape[1:])})
     frames, x0_bar, found = solver.pullback(x, H, STEPS + 1, bar, 2, parameters=given)
     assert np.array_equal(frames, solver.integrate(x, H, STEPS + 1, 2, parameters=given).x)
     expected = numpy.pullback(x, H, STEPS + 1, bar, 2, parameters=given)
@@ -227,7 +229,7 @@ def test_what_cannot_be_pulled_back_is_told():
     with pytest.raises(SpecError, match="adjoint is not offered for lattices with a time, forces or noise"):
         phigen.compile(phigen.spec.loads(SHAKEN), target="numpy")
     with pytest.raises(SpecError, match="not offered in C"):
-        made("chiral_magnet", "c")
+        made("kdv", "c")
     in_c = made("fput", "c")
     with pytest.raises(StepError) as failed:
         in_c.pullback(1e90 * x, H, 9, x)

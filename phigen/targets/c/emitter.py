@@ -48,11 +48,11 @@ Sizes = list[tuple[str, int, str]]
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header.
 
-    Raises `SpecError` for what is not offered: adjoints of graphs, pairs, and the series of lattices.
+    Raises `SpecError` for what is not offered: adjoints of the series on lattices.
     """
     name, lines = program.name, header_lines(program, command)
-    if isinstance(program.step, Sweeps) and program.step.adjoint and (program.step.partners or program.step.equation):
-        message = f"{name} asks for the transpose of steps, adjoint, which is not offered in C on graphs and by series"
+    if isinstance(program.step, Sweeps) and program.step.adjoint and program.step.equation:
+        message = f"{name} asks for the transpose of steps, adjoint, not offered in C for the series on lattices"
         raise SpecError([Diagnostic(message, hint="the target numpy has it")])
     amalgam, header, code = _amalgam(program)
     written = single if program.single else str

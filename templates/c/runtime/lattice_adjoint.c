@@ -9,7 +9,11 @@
 #include "rows.c"
 
 /* ---- The transpose of steps ---- */
+#if PHI_GATHER
+enum { PHI_ADDED = 2 * PHI_PIECE }; /* sites whose shares in a sum are kept apart before they are added */
+#else
 enum { PHI_ADDED = 256 }; /* sites whose shares in a sum are kept apart before they are added */
+#endif
 
 /* The sum of some values, in an order that lets loops vectorise. */
 static inline double phi_added(const double *values, ptrdiff_t count)
@@ -43,8 +47,8 @@ static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_
 
 /* What is pulled back through steps, and the memory for it. */
 typedef struct {
-    double *bar[PHI_ARRAYS];     /* cotangents of the fields, then of parameters at sites */
-    double *row_bar[PHI_ARRAYS]; /* those of the fields of one row, and the same of parameters */
+    double *bar[PHI_BARS];       /* cotangents of the fields, then of parameters at sites, and at the bonds of each site */
+    double *row_bar[PHI_BARS];   /* those of the fields of one row, and the same of parameters */
     double *handed[PHI_HANDED];  /* what sites hand to those that they have read */
     double *sums;                /* of each piece of a row those of the coefficients */
     double *kept;                /* of each step of a segment, and each of its sweeps, the fields before that it changes */
@@ -152,7 +156,11 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
 #if PHI_HANDS
     if (!phi_hands[phi_part_of(s, sweep)]) return;
     phi_wait();
+#if PHI_GATHER
+    phi_hand_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+#else
     phi_hand_rows(s, sweep, x, bar, g->handed, first, end);
+#endif
     phi_wait();
 #endif
 }
@@ -277,11 +285,20 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     return status;
 }
 
+#if PHI_BOND_PARAMETERS
+/* Room for values at the bonds of each site. */
+static size_t phi_at_bonds(const phi_solver *s) { return ((size_t)s->bonds[s->sites] + 7) / 8 * 8; }
+
+#endif
 /* The numbers that any transpose has room for. */
 static size_t phi_always(const phi_solver *s)
 {
     const size_t block = phi_block(s->rows, s->width), units = s->rows * phi_pieces(s);
-    return (PHI_ARRAYS + 2 * PHI_DIM) * block + PHI_HANDED * (block + (size_t)s->width) + units * PHI_COEFFICIENTS;
+    size_t numbers = (PHI_ARRAYS + 2 * PHI_DIM) * block + PHI_HANDED * (block + (size_t)s->width);
+#if PHI_BOND_PARAMETERS
+    numbers += PHI_BOND_ARRAYS * phi_at_bonds(s);
+#endif
+    return numbers + units * PHI_COEFFICIENTS;
 }
 
 /* The bytes of the state that a segment begins with. */
@@ -321,6 +338,9 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     for (int f = 0; f < PHI_DIM; ++f, next += block) g->row_bar[f] = next + PHI_LEAD;
     for (int f = 0; f < PHI_DIM; ++f, next += block) g->end[f] = next + PHI_LEAD;
     for (int k = 0; k < PHI_HANDED; ++k, next += block + (size_t)s->width) g->handed[k] = next + PHI_LEAD;
+#if PHI_BOND_PARAMETERS
+    for (int k = PHI_ARRAYS; k < PHI_BARS; ++k, next += phi_at_bonds(s)) g->bar[k] = g->row_bar[k] = next;
+#endif
     g->states = next;
     g->kept = next + g->most * PHI_DIM * block;
     g->sums = g->kept + g->longest * g->of_step;

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Sweep, Sweeps
@@ -18,6 +19,8 @@ from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.layout import Layout, layout_of
 from phigen.targets.c.lattice.loops import Loop, forms_of, in_loops
 from phigen.targets.c.lattice.names import SiteNames, beside
+from phigen.targets.c.lattice.partners import gathering
+from phigen.targets.c.lattice.partners_back import gathering_back
 from phigen.targets.c.lattice.parts import Case, calls_over_sites, over_rows
 from phigen.targets.code import Code, lower
 from phigen.targets.rendering import render
@@ -32,67 +35,109 @@ class Handed:
     offset: tuple[int, ...]
 
 
+@dataclass(frozen=True)
+class Back:
+    """How a part goes back: its loops, what is called for each piece of a row in the first and in the second go, and
+    how many arrays of values are handed."""
+
+    loops: tuple[Loop, ...]
+    first: tuple[str, ...]
+    second: tuple[str, ...]
+    handed: int
+
+
 def printed(program: Program, step: Sweeps, adjoint: Adjoint) -> str:
     """The loops, and which of them go back through which part."""
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     found = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     found += [function(program, adjoint.refresh)] if adjoint.refresh else []
-    back, hand, handed = list[Case](), list[Case](), list[list[Handed]]()
-    for part in step.parts:
-        own, calls, given = list[Handed](), list[str](), 0
-        for sweep in part:
-            kernel = kernels[f"{sweep.kernel.name}_back"]
-            listed = _handed(layout, kernel, given)
-            given = max([given, *(h.array + 1 for h in listed)])
-            loops = [_loop(program, layout, sweep, form, more, listed) for form, more in forms_of(program, kernel)]
-            found += [loop.text(program) for loop in loops]
-            sums = f"sums + unit * {program.name}_COEFFICIENTS"
-            calls += [
-                f"{program.name}_{call.loop.name}(coef, &at.row, {call.sites}, {sums});"
-                for call in calls_over_sites(loops)
-            ]
-            own += listed
-        calls += _ends(program, layout, own)
-        setup = ["at.row.x = x;", "at.row.bar = bar;", "at.row.handed = handed;"]
-        back.append(Case(calls, setup, any("second" in line for line in calls)))
-        handed.append(own)
-        if own:
-            loop = _handing(program, layout, len(handed), own)
-            found.append(loop.text(program))
-            where = [] if len(step.sites.axes) == 1 else _givers(program)
-            hand.append(Case([f"{program.name}_{loop.name}(&at.row, at.from, at.to);"], [*setup, *where], beside=False))
-    arguments = "const double *coef, double *const *x, double *const *bar, double *const *handed, double *sums"
-    found.append(_over(program, layout, back, "How a part goes back", "back_rows", arguments))
-    if hand:
-        labels = [k for k, own in enumerate(handed, 1) if own]
-        title = "What sites are handed"
-        arguments = arguments.removeprefix("const double *coef, ").removesuffix(", double *sums")
-        found.append(_over(program, layout, hand, title, "hand_rows", arguments, labels))
-    return "\n".join([_tables(program, step, handed), *found, _added(program, step, layout)])
+    parts = [_part(program, layout, kernels, k) for k in range(len(step.parts))]
+    found += [loop.text(program) for part in parts for loop in part.loops]
+    setups = [
+        [*_SETUP, *["at.row.chosen = colour;"] * bool(step.by_colour and step.by_colour[k])] for k in range(len(parts))
+    ]
+    back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
+    found.append(_over(program, layout, "How a part goes back", "back_rows", dict(enumerate(back, 1))))
+    where = _givers(program) if len(step.sites.axes) > 1 else []
+    hand = {
+        k: Case(p.second, [*setup, *where], beside=False)
+        for k, (p, setup) in enumerate(zip(parts, setups, strict=True), 1)
+        if p.second
+    }
+    found += [_over(program, layout, "What sites are handed", "hand_rows", hand)] if hand else []
+    return "\n".join([_tables(program, step, parts), *found, _added(program, step, layout)])
 
 
-def _over(
-    program: Program,
-    layout: Layout,
-    cases: Sequence[Case],
-    title: str,
-    head: str,
-    arguments: str,
-    labels: Sequence[int] = (),
-) -> str:
-    more = {"title": title, "head": head, "arguments": f"int part, {arguments}", "coloured": False}
-    return over_rows(program, layout, cases, labels, unused=["part"] * (len(cases) == 1), **more)
+_SETUP = ("at.row.x = x;", "at.row.bar = bar;", "at.row.handed = handed;")
 
 
-def _tables(program: Program, step: Sweeps, handed: Sequence[Sequence[Handed]]) -> str:
+def _has_ends(calls: Sequence[str]) -> bool:
+    """Whether sites beside open ends have loops of their own."""
+    return any("second" in call for call in calls)
+
+
+def _part(program: Program, layout: Layout, kernels: Mapping[str, Kernel], number: int) -> Back:
+    """The two goes of all sweeps of a part."""
+    loops, first, second = list[Loop](), list[str](), list[str]()
+    beside, given = list[Handed](), 0
+    sums = f"sums + unit * {program.name}_COEFFICIENTS"
+
+    def called(loop: Loop, sites: str = "at.from, at.to") -> str:
+        return f"{program.name}_{loop.name}(coef, &at.row, {sites}, {sums});"
+
+    for sweep in layout.step.parts[number]:
+        kernel = kernels[sweep.kernel.name + BACK]
+        listed, begin = _handed(layout, kernel, given), given
+        given = max([given, *(h.array + 1 for h in listed)]) + (len(sweep.gather.names) if sweep.gather else 0)
+        own = [_loop(program, layout, sweep, form, more, listed, begin) for form, more in forms_of(program, kernel)]
+        first += _gathered(program, layout, sweep)
+        first += [called(call.loop, call.sites) for call in calls_over_sites(own)]
+        ends = sweep.gather.ends if sweep.gather else ()
+        bonds = [
+            loop for e in ends for loop in gathering_back(program, layout, e, kernels[e.kernel.name + BACK], begin)
+        ]
+        second += map(called, bonds)
+        loops += [*own, *bonds]
+        beside += listed
+    first += _ends(program, layout, beside)
+    if beside:
+        loop = _handing(program, layout, number + 1, beside)
+        second.append(f"{program.name}_{loop.name}(&at.row, at.from, at.to);")
+        loops.append(loop)
+    return Back(tuple(loops), tuple(first), tuple(second), given)
+
+
+def _gathered(program: Program, layout: Layout, sweep: Sweep) -> Iterator[str]:
+    """The calls of what bonds or pairs add up, of which those of equal code are one: the first."""
+    names: dict[str, str] = {}
+    for other in (s for part in layout.step.parts for s in part if s.gather):
+        for loop in gathering(program, layout, other.gather, "coef") if other.gather else ():
+            names.setdefault(loop.code, loop.name)
+    for loop in gathering(program, layout, sweep.gather, "coef") if sweep.gather else ():
+        yield f"{program.name}_{names[loop.code]}(coef, &at.row, at.from, at.to);"
+
+
+def _over(program: Program, layout: Layout, title: str, head: str, cases: Mapping[int, Case]) -> str:
+    """A function that does what is called for pieces of rows, of some parts."""
+    coloured, arguments = bool(layout.step.by_colour), "double *const *x, double *const *bar, double *const *handed"
+    if head == "back_rows" or layout.step.partners:
+        arguments = f"const double *coef, {arguments}, double *sums"
+    more = {"title": title, "head": head, "coloured": coloured}
+    more["arguments"] = f"int {'flow' if coloured else 'part'}, {arguments}"
+    unused = ["part"] * (len(cases) == 1 and not coloured)
+    return over_rows(program, layout, list(cases.values()), list(cases), unused=unused, **more)
+
+
+def _tables(program: Program, step: Sweeps, parts: Sequence[Back]) -> str:
     moved = [{f for sweep in part for f in sweep.moved} for part in step.parts]
     rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in moved]
     values = {
         "NAME": program.name,
         "parts": len(step.parts),
         "moves": ", ".join(f"{{ {row} }}" for row in rows),
-        "hands": ", ".join(str(int(bool(own))) for own in handed),
-        "handed": max([1, *(h.array + 1 for own in handed for h in own)]),
+        "hands": ", ".join(str(int(bool(part.second))) for part in parts),
+        "handed": max(1, *(part.handed for part in parts)) if parts else 1,
+        "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),
         "numbers": max(1, sum(p.at == "all" for p in program.parameters)),
     }
     return render("c", "lattice_adjoint.c", values)
@@ -106,32 +151,38 @@ def _handed(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
         base, offset = layout.step.sites.places[name]
         if any(offset) and not value.is_zero:
             array = arrays.setdefault(id(value), first + len(arrays))
-            found.append(Handed(array, layout.arrays.index(base), offset))
+            found.append(Handed(array, layout.bar(base), offset))
     return found
 
 
-def _loop(program: Program, layout: Layout, sweep: Sweep, kernel: Kernel, form: str, handed: Sequence[Handed]) -> Loop:
-    """The first go of a sweep."""
+def _loop(
+    program: Program, layout: Layout, sweep: Sweep, kernel: Kernel, form: str, handed: Sequence[Handed], begin: int
+) -> Loop:
+    """The first go of a sweep; the cotangents of sums over bonds or pairs are handed in arrays from ``begin`` on."""
     name, code, step = program.name, lower(kernel), layout.step
     moved = [program.coordinates[i] for i in sweep.moved]
-    seeds = {"change_bar": [f"bar_{layout.arrays.index(f)}[i]" for f in moved]}
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds)
+    seeds, sums = {"change_bar": [f"bar_{layout.bar(f)}" for f in moved]}, sweep.gather.names if sweep.gather else ()
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), sums, seeds)
     head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
-    used, given = {layout.arrays.index(f) for f in moved}, dict[int, str]()
+    used, given = {layout.bar(f) for f in moved}, dict[int, str]()
     places = {(h.base, h.offset): h.array for h in handed}
     for store in (s for s in code.stores if not s.value.is_zero):
         value = names.show(store.value)
         if store.array == "coef_bar":
             shares.append((store.index, value))
             continue
+        if store.array == "gathered_bar":
+            given[begin + sums.index(kernel.inputs["gathered"][store.index])] = value
+            continue
         base, offset = step.sites.places[kernel.inputs["site"][store.index]]
-        number = layout.arrays.index(base)
+        number = layout.bar(base)
         if any(offset):
             given.setdefault(places[number, offset], value)
         else:
             used.add(number)
             stores.append(f"bar_{number}[i] += {value};")
-    given |= {h.array: "0.0" for h in handed if h.array not in given}
+    arrays = [*(h.array for h in handed), *range(begin, begin + len(sums))]
+    given |= {array: "0.0" for array in arrays if array not in given}
     stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
     head += [f"    double *restrict bar_{k} = row->bar[{k}] + row->at[0];" for k in sorted(used)]
     for array in given:
@@ -211,6 +262,7 @@ def _added(program: Program, step: Sweeps, layout: Layout) -> str:
     """How the derivatives along parameters are added to those of the caller."""
     member = members(program)
     plain = [member[p.name] for p in program.parameters if p.at == "all"]
-    sites: Mapping[str, int] = {member[p]: layout.arrays.index(p) for p in step.sites.parameters}
-    values = {"NAME": program.name, "numbers": plain, "sites": list(sites.items())}
+    sites: Mapping[str, int] = {member[p]: layout.bar(p) for p in step.sites.parameters}
+    bonds = {member[p]: layout.bar(p) for p in step.sites.at_bonds}
+    values = {"NAME": program.name, "numbers": plain, "sites": list(sites.items()), "bonds": list(bonds.items())}
     return render("c", "lattice_bars.c", values)

@@ -40,6 +40,10 @@ class Layout:
         axes = zip(self.step.sites.axes, self.lines[line], strict=False)
         return ", ".join(f"{axis} {offset:+d}".replace("+", "+ ").replace("-", "- ") for axis, offset in axes if offset)
 
+    def bar(self, array: str) -> int:
+        """The number of the cotangents of a field, or of a parameter at sites or bonds."""
+        return [*self.arrays, *self.step.sites.at_bonds].index(array)
+
     @property
     def colour_step(self) -> int:
         """The distance in a row from a site to the next of its colour."""
@@ -132,12 +136,13 @@ def waves(program: Program, step: Sweeps) -> bool:
 
 
 def hands(step: Sweeps) -> list[bool]:
-    """Of each part of H whether its transpose gives anything to sites beside."""
+    """Of each part of H whether its transpose gives anything to other sites."""
     found: list[bool] = []
     back = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
     for part in step.parts if step.adjoint else ():
         read = [(s, e) for sweep in part for s, e in back[sweep.kernel.name + BACK].along("site")]
-        found.append(any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read))
+        beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
+        found.append(beside or any(sweep.gather for sweep in part))
     return found
 
 

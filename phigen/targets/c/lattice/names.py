@@ -17,9 +17,6 @@ from phigen.targets.reserved import C_RESERVED
 #: What the loops call their own.
 _OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far", "now"})
 
-#: Of the sites a and b of a bond or a pair.
-_INDEX = {"a": "i", "b": "j"}
-
 
 class SiteNames:
     """What the symbols of a kernel are called in a loop over sites."""
@@ -34,16 +31,18 @@ class SiteNames:
         calls: Mapping[str, str],
         sums: Sequence[str] = (),
         seeds: Mapping[str, Sequence[str]] = MappingProxyType({}),
+        here: str = "a",
     ) -> None:
         self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
         self.scope = Scope(C_RESERVED | _OWN | called | {"change0", "change1", "change2"})
         self.show = printer(self.scope, calls)
+        self._here = here
         self._pointers: dict[tuple[str, int], str] = {}
         self._loaded: list[str] = []
         self._weights: list[str] = []
-        self._at_a: list[str] = []
-        self._at_b: list[str] = []
+        self._own: list[str] = []
+        self._other: list[str] = []
         self._first: list[str] = []
         self._starts: list[str] = []
         member = members(program)
@@ -63,7 +62,7 @@ class SiteNames:
                 self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
                 self.scope.bind(s, f"{pointer}[i]")
             elif isinstance(s, Symbol) and s.kind in seeds:
-                self._loaded.append(f"{self.scope[s]} = {seeds[s.kind][int(s.key[0])]}")
+                self._bind_seed(s, seeds[s.kind][int(s.key[0])], of_pair=s.kind == "sums_bar")
             elif isinstance(s, Symbol) and s.kind == INCREMENT:
                 self._bind_site(s)
             elif isinstance(s, Symbol):
@@ -75,15 +74,26 @@ class SiteNames:
             elif s in layout.step.sites.places:
                 self._bind_site(s)
             elif s in layout.step.sites.at_bonds:
-                self._at_b.append(f"{self.scope[s]} = row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
+                self._other.append(f"{self.scope[s]} = row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
             else:
                 self._first.append(f"{self.scope[s]} = params->{member[s]}")
 
     def _bind_end(self, s: str) -> None:
         base, end = self.layout.step.sites.ends[s]
         pointer = self.pointer(base, 0)
-        named = self.scope[s]
-        (self._at_a if end == "a" else self._at_b).append(f"{named} = {pointer}[{_INDEX[end]}]")
+        self._bind_at(end, f"{self.scope[s]} = {pointer}")
+
+    def _bind_at(self, end: str, text: str) -> None:
+        """What is read at the site i that a loop is over, or at the other site j of a bond or a pair."""
+        own = end == self._here
+        (self._own if own else self._other).append(f"{text}[{'i' if own else 'j'}]")
+
+    def _bind_seed(self, s: Symbol, text: str, *, of_pair: bool) -> None:
+        """A cotangent, of what is found at a site, or of the sums over its bonds or pairs."""
+        if of_pair:
+            self._bind_at("a", f"{self.scope[s]} = {text}")
+        else:
+            self._loaded.append(f"{self.scope[s]} = {text}[i]")
 
     def _bind_variation(self, s: Symbol, place: str) -> None:
         """The variation of a field at a site, a neighbour, or an end of a bond or a pair."""
@@ -95,13 +105,13 @@ class SiteNames:
         array = f"row->varied[{self._fields.index(field)}]"
         self._starts.append(f"const double *{pointer} = {array} + row->at[{line}];")
         if end:
-            (self._at_a if end == "a" else self._at_b).append(f"{self.scope[s]} = {pointer}[{_INDEX[end]}]")
+            self._bind_at(end, f"{self.scope[s]} = {pointer}")
         else:
             self.scope.bind(s, beside(pointer, offset[-1]))
 
     def of_pair(self) -> tuple[list[str], list[str]]:
-        """What is read at a site b, and at a site a."""
-        return together(self._at_b), together(self._at_a)
+        """What is read at the other site, and at the site that a loop is over."""
+        return together(self._other), together(self._own)
 
     def _bind_weight(self, s: Symbol) -> None:
         k = self.layout.weights.index(s)

@@ -42,6 +42,14 @@ _BONDS = {"": "row->bonds[i]; k < row->bonds[i + 1]", "a": "row->bonds[i]; k < r
 _PASSED = {"there": "row->colours[row->other[k]] != row->chosen"}
 
 
+def bonds_of(ends: Ends) -> tuple[str, list[str]]:
+    """The loop over the bonds of a site i that are meant, and the statement that passes some of them over."""
+    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" else ""
+    bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
+    passed = [f"if ({_PASSED[ends.chosen]}) continue;"] if ends.chosen in _PASSED else []
+    return f"for (ptrdiff_t k = {bounds}; ++k) {{", passed
+
+
 def _over_bonds(program: Program, layout: Layout, ends: Ends, begin: Sequence[str], *, first: bool) -> str:
     """A loop over sites a, in it one over the bonds that they have to sites b."""
     kernel = ends.kernel
@@ -53,9 +61,7 @@ def _over_bonds(program: Program, layout: Layout, ends: Ends, begin: Sequence[st
     values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     added = [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
     out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
-    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" else ""
-    bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
-    passed = [f"if ({_PASSED[ends.chosen]}) continue;"] if ends.chosen in _PASSED else []
+    loop, passed = bonds_of(ends)
     reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
     inner = [*passed, *reads, *other, *values, *added]
     return "\n".join(
@@ -63,7 +69,7 @@ def _over_bonds(program: Program, layout: Layout, ends: Ends, begin: Sequence[st
             *(f"    {line}" for line in [*begin, *names.pointers()]),
             "    for (ptrdiff_t i = from; i < to; ++i) {",
             *(f"        {line}" for line in [*own, *sums]),
-            f"        for (ptrdiff_t k = {bounds}; ++k) {{",
+            f"        {loop}",
             *(f"            {line}" for line in inner),
             "        }",
             *(f"        {line}" for line in out),

@@ -1,0 +1,123 @@
+"""The transpose of what bonds, or pairs of sites, add up at a site, as loops in C.
+
+What sites get of the sums of others is found by each of them for itself: it goes over its bonds, or over all other
+sites, once as the site where a sum belongs, and once as the other one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Ends
+from phigen.symbolic.expression import ZERO
+from phigen.targets.c.lattice.layout import Layout
+from phigen.targets.c.lattice.loops import Loop, in_loops
+from phigen.targets.c.lattice.names import SiteNames
+from phigen.targets.c.lattice.partners import bonds_of
+from phigen.targets.code import Store, lower
+
+#: The bonds of a site at the other end of those that begin or end at another, and how these are chosen.
+_OPPOSITE = {"": "", "a": "b", "b": "a"}
+_CHOSEN = {"": "", "here": "there", "there": "here"}
+
+
+def gathering_back(program: Program, layout: Layout, ends: Ends, kernel: Kernel, first: int) -> Iterator[Loop]:
+    """The loops for the ends of bonds or pairs, where the cotangents of sums are in arrays from the first on."""
+    for end, turned in (("a", ends), ("b", replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen]))):
+        own = _at_end(layout, kernel, end)
+        if any(not e.is_zero for e in own.roots):
+            yield _loop(program, layout, turned, own, end, first)
+
+
+def _at_end(layout: Layout, kernel: Kernel, end: str) -> Kernel:
+    """What belongs to the site at an end; what belongs to the sum as a whole is left to its own site."""
+    ends = layout.step.sites.ends
+    outputs = []
+    for o in kernel.outputs:
+        names = kernel.inputs["site"] if o.name == "site_bar" else ()
+        kept = [ends[n][1] == end for n in names] if names else [end == "a"] * len(o.values)
+        values = tuple(e if keep else ZERO for e, keep in zip(o.values, kept, strict=True))
+        outputs.append(replace(o, values=values))
+    return replace(kernel, outputs=tuple(outputs))
+
+
+def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str, first: int) -> Loop:
+    name, code = program.name, lower(kernel)
+    count = len(kernel.inputs["sums_bar"])
+    seeds = {"sums_bar": [f"handed_{first + k}" for k in range(count)]}
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end)
+    other, own = names.of_pair()
+    stores = [s for s in code.stores if not s.value.is_zero]
+    bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array != "coef_bar"}
+    head = names.pointers()
+    head += [f"const double *handed_{first + k} = row->handed[{first + k}];" for k in range(count)]
+    head += [f"double *bar_{k} = row->bar[{k}];" for k in sorted(set(bars.values()))]
+    head += ["(void)sums;"] * all(s.array != "coef_bar" for s in stores)
+    head += ["(void)coef;"] * code.used.isdisjoint(kernel.inputs["coef"])
+    values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    shown = [names.show(s.value) for s in stores]
+    if layout.graph:
+        text = _over_bonds(layout, ends, stores, shown, bars, head, own, [*other, *values])
+    else:
+        text = _over_pairs(name, stores, shown, bars, head, own, other, values)
+    arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
+    said = "the site where the sum is" if end == "a" else "the other site"
+    return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
+
+
+def _array_of(layout: Layout, kernel: Kernel, store: Store) -> str:
+    if store.array == "bonds_bar":
+        return kernel.inputs["bonds"][store.index]
+    return layout.step.sites.ends[kernel.inputs["site"][store.index]][0]
+
+
+def _over_bonds(
+    layout: Layout,
+    ends: Ends,
+    stores: Sequence[Store],
+    shown: Sequence[str],
+    bars: Mapping[int, int],
+    head: Sequence[str],
+    own: Sequence[str],
+    values: Sequence[str],
+) -> str:
+    """A loop over sites, in it one over their bonds."""
+    loop, passed = bonds_of(ends)
+    shares = [k for k, s in enumerate(stores) if s.array == "coef_bar"]
+    sites = [k for k, s in enumerate(stores) if s.array == "site_bar"]
+    inner = [*passed, "const ptrdiff_t j = row->other[k];" * any("[j]" in v for v in values), *values]
+    for k, (store, value) in enumerate(zip(stores, shown, strict=True)):
+        kept = {"coef_bar": f"share{k}", "site_bar": f"own{k}"}
+        inner.append(f"{kept.get(store.array, f'bar_{bars.get(k)}[k]')} += {value};")
+    lines = [*head, *(f"double share{k} = 0.0;" for k in shares), "for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines += [f"    {line}" for line in [*own, *(f"double own{k} = 0.0;" for k in sites), loop]]
+    lines += [*(f"        {line}" for line in inner if line), "    }"]
+    lines += [*(f"    bar_{bars[k]}[i] += own{k};" for k in sites), "}"]
+    lines += [f"sums[{stores[k].index}] += share{k};" for k in shares]
+    return "".join(f"    {line}\n" for line in lines)
+
+
+def _over_pairs(
+    name: str,
+    stores: Sequence[Store],
+    shown: Sequence[str],
+    bars: Mapping[int, int],
+    head: Sequence[str],
+    own: Sequence[str],
+    other: Sequence[str],
+    values: Sequence[str],
+) -> str:
+    """A loop over all sites, in it one over those of a piece."""
+    shares = [k for k, s in enumerate(stores) if s.array == "coef_bar"]
+    inner = [*own, *values]
+    for k, value in enumerate(shown):
+        inner.append(f"{f'share{k}[i - from]' if k in shares else f'bar_{bars[k]}[i]'} += i == j ? 0.0 : {value};")
+    lines = [*head, *(f"double share{k}[{name}_ADDED] = {{ 0.0 }};" for k in shares)]
+    lines += ["for (ptrdiff_t j = 0; j < row->length; ++j) {", *(f"    {line}" for line in other)]
+    lines += [f"    {name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines += [*(f"        {line}" for line in inner), "    }", "}"]
+    lines += [f"sums[{stores[k].index}] += {name}_added(share{k}, to - from);" for k in shares]
+    return "".join(f"    {line}\n" for line in lines)
