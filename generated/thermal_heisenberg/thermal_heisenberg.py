@@ -15,7 +15,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c9d298975ce6f62989da9fb9b2ebfd53071e646e3a8777b78285e0a2a6920ce9
+# body-sha256: 9a078768a1c6a77a46f435a50143aa49d5e058d06bba5be0681c40f9d09ab963
 import numpy as np
 
 VERSION = "0.1.0"
@@ -78,6 +78,8 @@ def _finite(values):
 
 class _Sites:
     """The sites of a lattice of some size, with all parameters."""
+
+    given = None
 
     def __init__(self, shape, parameters):
         self.sizes = tuple(shape[1:])
@@ -142,7 +144,12 @@ BOUND = 6.0
 
 
 def _draw(sites, part):
-    """The increments of a part of the step (sources, *sizes): a function of seed, member, step, part and site alone."""
+    """The increments of a part of the step (sources, *sizes): a function of seed, member, step, part and site alone.
+
+    Unless they are given: (parts, sources, *sizes).
+    """
+    if sites.given is not None:
+        return sites.given[part]
     word, found, step = np.uint64(0xFFFFFFFF), [], sites.step
     site = np.arange(np.prod(sites.sizes), dtype=np.uint64).reshape(sites.sizes)
     pairs = (len(SOURCES) + 1) // 2

@@ -12,6 +12,9 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
+#: What makes the strong order 1.
+COMMUTING = "the sources of noise commute, hence strong order 1"
+
 
 def check(system: System) -> list[Statement]:
     """All statements on a system; Casimirs and invariants in the order of the spec, found Casimirs after."""
@@ -103,7 +106,7 @@ def commuting(system: System) -> bool:
 def _commutation(system: System) -> Statement:
     count = len(system.noise)
     brackets = [_noise_bracket(system, i, j) for i in range(count) for j in range(i)]
-    return decide_zero("the sources of noise commute, hence strong order 1", brackets, system.positive)
+    return decide_zero(COMMUTING, brackets, system.positive)
 
 
 def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:

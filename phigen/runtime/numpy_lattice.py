@@ -84,6 +84,15 @@ class NumpyLatticeSession:
                 self._tell_time()
         return np.array(carried).reshape(vectors.shape)
 
+    def advance_along(self, h: float, increments: Floats) -> None:
+        """Make a step with each row of increments of the noise (steps, parts, sources, *sizes), not random ones."""
+        try:
+            for row in increments:
+                self._sites.given = row
+                self.advance(h, 1)
+        finally:
+            self._sites.given = None
+
     def _set_step(self, h: float) -> None:
         if h != self._h:
             self._h, self._rows = h, self._module._coefficients(self._sites, h)

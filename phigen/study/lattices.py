@@ -7,7 +7,7 @@ sweep that is printed wrongly. Its sites start as some of the run.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
@@ -17,16 +17,18 @@ import numpy as np
 from phigen import progress
 from phigen.compilation import Compilation
 from phigen.errors import StepError
-from phigen.lattice.cell import Cell
+from phigen.geometry.checks import COMMUTING
+from phigen.lattice.acting import noise_statements
+from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.expansion import Expansion, expand, ring
 from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MOST_BALANCED, errors_of, works
 from phigen.lattice.series import SeriesPlan
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.scheme.steps import Sweeps
-from phigen.study import single_precision
+from phigen.study import lattice_noise, single_precision
 from phigen.study.conservation import rounding
-from phigen.study.verification import ONE_STEP, ORDER_SLACK, Check, Verification
+from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification
 from phigen.symbolic.arrays import Floats, evaluate
 
 #: Steps times sites that a run is shortened to, and with ``quick``; frames of it.
@@ -35,6 +37,10 @@ MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 GROWTH = 4.0
 #: The Poisson identity on a small lattice, with exact tangent maps; and these against differences of order 6.
 IDENTITY, DIFFERENCES = 1e-12, 1e-9
+#: Sites along each axis where paths of a noise are followed, with one, two and three axes.
+SOME = (32, 6, 4)
+#: Paths of single sites that are followed, with ``quick`` and without.
+FEW_PATHS, MANY_PATHS = 32, 96
 #: What errors are relative to.
 SAID = (
     "Errors of energy are relative to the sum of the magnitudes of the energies of the sites, those of sums to that of "
@@ -104,6 +110,9 @@ def verify_lattice(
     with progress.stage(f"{name}: single steps"):
         checks += [_reversal(subject, made), *_agreement(subject, made)]
         checks += _identity(compilation.cell, subject, made)
+    if seed is not None:
+        with progress.stage(f"{name}: paths of the noise"):
+            checks += _noise(compilation.cell, subject, quick=quick)
         checks += _single(compilation.cell, subject, single, made) if single else []
     label = f"{compilation.label}, order {compilation.order.order}"
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, SAID)
@@ -223,6 +232,27 @@ def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, made: LatticeT
 # --- a lattice of a few sites
 
 
+def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
+    """The strong order along given paths, and that the largest increments leave steps possible, on some sites."""
+    about, start = subject.solver.interface, subject.start
+    some = [SOME[len(start.sizes) - 1]] * len(start.sizes)
+    if cell.relation == PAIRS:  # none may be picked twice
+        some = [min(some[0], *start.sizes)]
+    sizes = [-(-max(size, least) // p) * p for size, least, p in zip(some, about.least, about.periods, strict=True)]
+    bonds = ring(sizes[0]) if about.graph else ()
+    x, parameters = _on_few(cell, start, sizes, bonds)
+    commuting = any(s.holds and s.name == COMMUTING for s in noise_statements(cell))
+    stated = 1.0 if commuting else 0.5
+    given = subject.compilation, x, parameters, subject.t0, subject.h
+    paths = -(-(FEW_PATHS if quick else MANY_PATHS) // x[0].size)
+    found = lattice_noise.strong_order(*given, paths)
+    limit, reason = f"≥ {stated - STRONG_SLACK:g}", f"{found:.2f} instead of {stated:g}"
+    yield Check("strong order, along common paths", found, limit, found >= stated - STRONG_SLACK, reason)
+    failed = lattice_noise.failures(*given)
+    name, reason = "steps that fail, of increments as large as can be", f"{failed} fail; a smaller step helps"
+    yield Check(name, failed, "none", failed == 0, reason)
+
+
 def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
     """The Poisson identity, with the exact tangent maps of all targets; and that these are derivatives of steps.
 
@@ -233,12 +263,9 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
         -(-max(least, 3 if len(about.axes) < 3 else 2) // p) * p
         for least, p in zip(about.least, about.periods, strict=True)
     ]
-    whole = expand(cell, sizes, ring(sizes[0]) if about.graph else ())
-    sites = int(np.prod(subject.start.sizes))
-    wanted = int(np.prod(sizes))
-    picked = np.random.default_rng(1).choice(sites, wanted, replace=sites < wanted).reshape(sizes)
-    x = subject.start.state.reshape(len(cell.fields), -1)[:, picked]
-    few = _Few(whole, subject, _few(cell, subject.start, picked, whole), x)
+    whole, wanted = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
+    x, parameters = _on_few(cell, subject.start, sizes, whole.bonds)
+    few = _Few(whole, subject, parameters, x)
     usual = np.abs(made.x).max(axis=0).reshape(len(x), -1)
     fields = _units(usual.max(axis=1).repeat(wanted))
     where = f"on {'×'.join(map(str, sizes))} sites"
@@ -248,7 +275,8 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
         yield Check(name, defect, limit, defect <= IDENTITY, f"is off by {defect:.1e}")
     # differences are taken in what is usual of each field and at each site, and with two distances; the better, the
     # less their own errors say
-    each = _units(np.maximum(usual[:, picked.reshape(-1)], 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
+    near = usual[:, _picked(subject.start, sizes).reshape(-1)]
+    each = _units(np.maximum(near, 1e-9 * usual.max(axis=1, keepdims=True)).reshape(-1))
     tried = [(units, apart) for units in (fields, each) for apart in (3e-3, 3e-4)]
     slip = min(max(few.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in tried)
     name, limit = f"tangent map against differences {where}", f"≤ {DIFFERENCES:.0e}"
@@ -309,18 +337,27 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
     return np.array(columns).T / apart
 
 
-def _few(cell: Cell, start: Start, picked: Any, whole: Expansion) -> dict[str, Any]:
-    """The parameters of the small lattice: those of the sites that were picked."""
-    found: dict[str, Any] = {}
+def _picked(start: Start, sizes: Sequence[int]) -> Any:
+    """Numbers of sites of a run, in the places of a small lattice."""
+    sites, wanted = int(np.prod(start.sizes)), int(np.prod(sizes))
+    return np.random.default_rng(1).choice(sites, wanted, replace=sites < wanted).reshape(sizes)
+
+
+def _on_few(
+    cell: Cell, start: Start, sizes: Sequence[int], bonds: Sequence[tuple[int, int]]
+) -> tuple[Floats, dict[str, Any]]:
+    """A state of a small lattice, and its parameters: those of sites that are picked."""
+    picked, found = _picked(start, sizes), dict[str, Any]()
     for p in cell.parameters:
         value = np.asarray(start.parameters[p.name])
         if p.at == "sites":
             found[p.name] = value.reshape(-1)[picked]
         elif p.at == "bonds":
-            found[p.name] = np.resize(value, len(whole.bonds))
+            found[p.name] = np.resize(value, len(bonds))
         else:
             found[p.name] = float(value)
-    return found | ({"bonds": np.array(whole.bonds)} if start.graph else {})
+    found |= {"bonds": np.array(bonds)} if start.graph else {}
+    return start.state.reshape(len(cell.fields), -1)[:, picked], found
 
 
 def _poisson(whole: Expansion, x: Floats, parameters: Mapping[str, Any]) -> Floats:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 from phigen import spec as specs
 from phigen.api import lattice_solver_of, solver_of
@@ -21,9 +23,12 @@ from phigen.lattice.expansion import Expansion, expand
 from phigen.lattice.observing import BALANCE, CHANGE, errors_of
 from phigen.lattice.states import Start
 from phigen.proofs import statements
+from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.numpy_lattice import NumpyLatticeSession
 from phigen.spec.model import Extras
 from phigen.spec.yaml_text import spec_text
+from phigen.study import lattice_noise
 from phigen.study.lattices import verify_lattice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.verdict import PROVED
@@ -156,7 +161,9 @@ def test_what_is_claimed_is_proved(name: str) -> None:
 def increments(name: str, h: float, steps: int, draws: dict[str, int]) -> np.ndarray:
     """The increments of all sites in the order of the sources of the expansion (steps, draws)."""
     module, (x, _) = solver(name).backend._module, given(name)  # type: ignore[attr-defined]
-    sites = type("Sites", (), {"sizes": x.shape[1:], "h": h, "seed": draws["seed"], "member": draws["member"]})()
+    sites = type(
+        "Sites", (), {"given": None, "sizes": x.shape[1:], "h": h, "seed": draws["seed"], "member": draws["member"]}
+    )()
     rows = []
     for step in range(steps):
         sites.step = draws["step0"] + step
@@ -181,7 +188,7 @@ def test_noisy_steps_are_those_of_the_expansion_with_the_same_increments(name: s
 
 def test_increments_are_independent_and_of_variance_h() -> None:
     module = solver("free").backend._module  # type: ignore[attr-defined]
-    sites = type("Sites", (), {"sizes": (20_000,), "h": 0.3, "seed": 1, "member": 0, "step": 5})()
+    sites = type("Sites", (), {"given": None, "sizes": (20_000,), "h": 0.3, "seed": 1, "member": 0, "step": 5})()
     first, second = (module._draw(sites, part) for part in (0, 1))
     sites.step = 6
     drawn = np.array([*first, *second, *module._draw(sites, 0), *np.roll(first, 1, axis=1)])
@@ -237,6 +244,58 @@ def test_friction_and_noise_have_the_gibbs_measure() -> None:
     np.testing.assert_allclose((q**2).mean(), (0.7 / (3 - 2 * np.cos(waves))).mean(), rtol=0.03)
 
 
+#: One source and several parts; three that do not commute, before and after the parts of a splitting.
+STRONG = {"langevin": (1.0, 60), "hot": (0.5, (6, 6))}
+
+
+def strongly(name: str, paths: int = 2) -> float:
+    random, sizes = np.random.default_rng(3), STRONG[name][1]
+    x, values = given(name)
+    x = random.uniform(0.2, 1.2, size=(len(x), *np.atleast_1d(sizes)))
+    values = {n: v if n == "bonds" else float(np.mean(v)) for n, v in values.items()}
+    return lattice_noise.strong_order(compiled(name), x, values, None, 0.1, paths)
+
+
+@pytest.mark.parametrize("name", STRONG)
+def test_the_strong_order_is_reached_on_lattices(name: str) -> None:
+    assert strongly(name) == pytest.approx(STRONG[name][0], abs=0.15)
+
+
+def test_steps_along_other_increments_have_no_strong_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = NumpyLatticeSession.advance_along
+    monkeypatch.setattr(NumpyLatticeSession, "advance_along", lambda s, h, dw: right(s, h, 1.05 * dw))
+    assert strongly("langevin", 1) < 0.4
+
+
+def mean_map(made: Compilation, h: float) -> np.ndarray:
+    """E of a step of linear motion at a site, a matrix: every site has increments of its own, all of a quadrature."""
+    points, weights = np.polynomial.hermite_e.hermegauss(5)
+    noise, count = made.program.noise, len(made.program.coordinates)
+    assert noise is not None
+    draws = len(noise.sources) * noise.parts
+    nodes = np.array(list(product(points, repeat=draws))).T.reshape(noise.parts, len(noise.sources), -1)
+    weight = np.prod(list(product(weights / weights.sum(), repeat=draws)), axis=1)
+    found, columns = lattice_solver_of(made, "numpy"), []
+    for unit in np.eye(count):
+        x = np.tile(unit[:, None], len(weight))
+        session: Any = found.started(Beginning(x, h, found.values(None, {}, x.shape[1:])))
+        session.advance_along(h, np.sqrt(h / noise.parts) * nodes[None])
+        columns.append(session.state() @ weight)
+    return np.array(columns).T
+
+
+@pytest.mark.parametrize(("scheme", "order"), [("splitting", 2), ("series", 1)])
+def test_the_weak_order_is_reached_on_lattices(scheme: str, order: int) -> None:
+    noise = "noise: {x: {hamiltonian: x, amplitude: 0.7}, y: {hamiltonian: y, amplitude: 0.9}}\n"
+    text = f"lattice: {{axes: [i]}}\nscheme: {scheme}\norder: 2\n{noise}{SPINS}hamiltonian: -z - x/2"
+    made = compile_spec(specs.loads(f"phigen: 1\nname: turning\n{text}\n"))
+    fields = [lattice_noise._field(made.spec, s) for s in ("x", "y")]
+    drift, *spread = (s.vector_field(np.eye(3)) for s in (lattice_solver_of(made, "numpy"), *fields))
+    exact = expm(drift + sum(b @ b for b in spread) / 2)
+    coarse, fine = (np.abs(np.linalg.matrix_power(mean_map(made, 1 / n), n) - exact).max() for n in (8, 16))
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.25)
+
+
 def test_an_open_chain_of_spins_has_its_energy_at_every_temperature() -> None:
     text = TEXTS["bath"].replace("axes: [i, j], boundary: [periodic, open]", "axes: [i], boundary: open")
     text = text.replace(" + x*x[j+1] + y*y[j+1] + z*z[j+1]", "")
@@ -270,11 +329,12 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
     start = Start(y.shape[1:], y, heat, np.empty((0, 2), dtype=np.int64))
     carrying = compile_spec(compiled("langevin").spec, extras=Extras(tangent=True))
     solvers = {"numpy": lattice_solver_of(carrying, "numpy")}
-    found = verify_lattice(carrying, solvers, "run", start, 0.05, 20, seed=1)
+    found = verify_lattice(carrying, solvers, "run", start, 0.05, 20, seed=1, quick=True)
     assert found.failures == []
     names = {c.name for c in found.checks}
     assert {"observed order, without the noise", "energy: largest change", "reversibility"} <= names
     assert any("tangent map against differences" in name for name in names)
+    assert {"strong order, along common paths", "steps that fail, of increments as large as can be"} <= names
     assert not any("Poisson identity" in c.name for c in found.checks)
 
 

@@ -1,0 +1,131 @@
+"""What noise makes of steps of lattices: strong orders along common paths, with the sites as many paths at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from phigen.api import lattice_solver_of
+from phigen.compilation import Compilation
+from phigen.compiler import compile_spec
+from phigen.runtime.arguments import Beginning
+from phigen.runtime.interface import BackendError
+from phigen.runtime.lattice import LatticeSolver
+from phigen.scheme.program import BOUND
+from phigen.spec.model import Spec, SpecForces
+from phigen.study.stochastic import BEYOND, LEVELS, SEED, SIGNS
+from phigen.symbolic.arrays import Floats
+from phigen.symbolic.expression import ZERO
+
+#: Coarsest steps of a path.
+STEPS = 2
+
+
+def strong_order(
+    compilation: Compilation,
+    x0: Floats,
+    parameters: Mapping[str, Any],
+    t0: float | None,
+    h: float,
+    paths: int,
+) -> float:
+    """The strong order: the slope of the errors of steps of h, h/2, h/4, … of the NumPy along some paths of all sites.
+
+    Errors are against the motion along each path joined by straight lines, which knows the vector fields only. ``x0``
+    has the shape (fields, *sizes), ``parameters`` are those of a solver. NaN where a step fails.
+    """
+    solver = lattice_solver_of(compilation, "numpy")
+    noise = compilation.program.noise
+    assert noise is not None
+    kinds, parts = len(noise.sources), noise.parts
+    fields = [_field(compilation.spec, name) for name in noise.sources]
+    finest = STEPS << (LEVELS + BEYOND)
+    random, errors = np.random.default_rng(SEED), np.zeros(LEVELS)
+    for _ in range(paths):
+        # of each finest step as many increments as a step has parts
+        size = np.sqrt(abs(h) * STEPS / finest / parts)
+        path = random.normal(size=(finest * parts, kinds, *x0.shape[1:])) * size
+        end = _along_lines(solver, fields, x0, parameters, t0, h * STEPS / finest, path, parts)
+        for level in range(LEVELS):
+            many = STEPS << level
+            coarse = path.reshape(many, parts, -1, *path.shape[1:]).sum(axis=2)
+            session = _session(solver, x0, parameters, t0)
+            try:
+                session.advance_along(h / 2**level, coarse)
+            except BackendError:
+                return np.nan
+            errors[level] += np.sum((session.state() - end) ** 2)
+    return float(-np.polyfit(np.arange(LEVELS), np.log2(errors) / 2, 1)[0]) if errors.all() else np.inf
+
+
+def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:
+    """How many steps from a state fail of those whose increments are all as large as they can be."""
+    solver, noise = lattice_solver_of(compilation, "numpy"), compilation.program.noise
+    assert noise is not None
+    random, failed = np.random.default_rng(SEED), 0
+    for _ in range(SIGNS):
+        signs = random.choice([-1.0, 1.0], size=(1, noise.parts, len(noise.sources), *x0.shape[1:]))
+        try:
+            _session(solver, x0, parameters, t0).advance_along(h, BOUND * np.sqrt(abs(h) / noise.parts) * signs)
+        except BackendError:
+            failed += 1
+    return failed
+
+
+def _field(spec: Spec, name: str) -> LatticeSolver:
+    """σ π∇g of a source as the vector field of a lattice."""
+    source = spec.noise[name]
+    quiet = replace(spec, hamiltonian=source.amplitude * source.hamiltonian, noise={}, forces=SpecForces(), order=2)
+    quiet = replace(quiet, casimirs={}, invariants={}, runs={}, terms=None, composition="auto", scheme="auto")
+    if quiet.lattice:
+        quiet = replace(quiet, lattice=replace(quiet.lattice, bonds=ZERO))
+    return lattice_solver_of(compile_spec(quiet), "numpy")
+
+
+def _along_lines(
+    solver: LatticeSolver,
+    sources: Sequence[LatticeSolver],
+    x: Floats,
+    parameters: Mapping[str, Any],
+    t0: float | None,
+    h: float,
+    path: Floats,
+    parts: int,
+) -> Floats:
+    """The end of a path of increments (steps·parts, sources, *sizes) from x, by RK4 along each piece."""
+    drift, *spread = (_slope(s, x, parameters, t0) for s in (solver, *sources))
+    begin = t0 or 0.0
+    for k, dw in enumerate(path.reshape(-1, parts, *path.shape[1:]).sum(axis=1)):
+
+        def push(at: Floats, t: float, dw: Floats = dw) -> Floats:
+            return np.asarray(h * drift(at, t) + sum(w * field(at, t) for w, field in zip(dw, spread, strict=True)))
+
+        t = begin + k * h
+        first = push(x, t)
+        second = push(x + first / 2, t + h / 2)
+        third = push(x + second / 2, t + h / 2)
+        x = x + (first + 2 * second + 2 * third + push(x + third, t + h)) / 6
+    return x
+
+
+def _slope(
+    solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None
+) -> Callable[[Floats, float], Floats]:
+    """The vector field of a solver in NumPy, without what is checked each time."""
+    session = _session(solver, x, parameters, t0)
+
+    def slope(at: Floats, t: float) -> Floats:
+        session.place(at)
+        session._sites.t = t
+        found: Floats = session.vector_field()
+        return found
+
+    return slope
+
+
+def _session(solver: LatticeSolver, x: Floats, parameters: Mapping[str, Any], t0: float | None) -> Any:
+    """The NumPy of a lattice at a state."""
+    return solver.started(Beginning(x, 1.0, solver.values(parameters, {}, x.shape[1:]), t0 or 0.0))
