@@ -52,7 +52,8 @@ figures: $(STAMP)
 	$(BIN)/python docs/make_paper.py
 
 # The site of the documentation, in build/site.
-docs: $(STAMP)
+docs: export NO_MKDOCS_2_WARNING := 1
+docs: $(RUNS)
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[docs]'
 	$(BIN)/mkdocs build --quiet
 
