@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 63498bc4e417a13c6b35c36336c1c52f120511accad97c23f1191b66ab0ab377
+ * body-sha256: 9dcf557ceb7ba4d60d39c7117e52688d5ce6b7659dcc05bc5810c8f5ae5cbb06
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -110,12 +110,10 @@ static inline void ablowitz_ladik_locate(const ablowitz_ladik_solver *s, size_t 
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { ablowitz_ladik_PIECE = 1024 };
+enum { ablowitz_ladik_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t ablowitz_ladik_pieces(const ablowitz_ladik_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t ablowitz_ladik_units(const ablowitz_ladik_solver *s)
 {
     return s->length < 2 * ablowitz_ladik_PIECE ? 1 : (size_t)s->length / ablowitz_ladik_PIECE;
 }
@@ -125,13 +123,13 @@ typedef struct {
     ptrdiff_t from, to;
 } ablowitz_ladik_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline ablowitz_ladik_piece ablowitz_ladik_piece_of(const ablowitz_ladik_solver *s, size_t unit)
 {
     ablowitz_ladik_piece piece;
     ablowitz_ladik_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * ablowitz_ladik_PIECE;
-    piece.to = unit == ablowitz_ladik_pieces(s) - 1 ? s->length : piece.from + ablowitz_ladik_PIECE;
+    piece.to = unit == ablowitz_ladik_units(s) - 1 ? s->length : piece.from + ablowitz_ladik_PIECE;
     return piece;
 }
 
@@ -257,29 +255,23 @@ static void ablowitz_ladik_sweep_rows(const ablowitz_ladik_solver *s, int part, 
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
             ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+            break;
+        case 2: /* H_2 */
             ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
             ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+            break;
+        default: /* H_3 */
             ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
             ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -327,38 +319,6 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_params *params,
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define ablowitz_ladik_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define ablowitz_ladik_THREADS (size_t)omp_get_num_threads()
-#define ablowitz_ladik_THREAD (size_t)omp_get_thread_num()
-#else
-#define ablowitz_ladik_PARALLEL
-#define ablowitz_ladik_THREADS (size_t)1
-#define ablowitz_ladik_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t ablowitz_ladik_share(size_t units, size_t *first)
-{
-    const size_t threads = ablowitz_ladik_THREADS, own = ablowitz_ladik_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void ablowitz_ladik_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (ablowitz_ladik_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     ablowitz_ladik_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     ablowitz_ladik_LEAD = (ablowitz_ladik_HALO + 7) / 8 * 8,
@@ -387,13 +347,8 @@ static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrd
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t ablowitz_ladik_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / ablowitz_ladik_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t ablowitz_ladik_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
@@ -418,9 +373,8 @@ static void ablowitz_ladik_put(const ablowitz_ladik_solver *s, double *rows, con
 /* ---- The solver ---- */
 static void ablowitz_ladik_prepare_step(const ablowitz_ladik_params *params, double h, double *coef)
 {
-    for (int k = 0; k < ablowitz_ladik_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < ablowitz_ladik_ROWS_OF_FLOWS; ++k)
         ablowitz_ladik_prepare(params, ablowitz_ladik_times[k] * h, coef + k * ablowitz_ladik_ROW);
-    }
 }
 
 static int ablowitz_ladik_finite(const double *values, size_t count)
@@ -497,47 +451,31 @@ static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *co
 /* One part of H. */
 static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = ablowitz_ladik_share(s->rows * ablowitz_ladik_pieces(s), &first);
-    ablowitz_ladik_sweep_rows(s, part, coef, far, first, end);
-    ablowitz_ladik_wait();
+    const size_t units = ablowitz_ladik_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) ablowitz_ladik_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} ablowitz_ladik_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void ablowitz_ladik_find_flow(const ablowitz_ladik_solver *s, size_t steps, int number,
-    ablowitz_ladik_flow *flow)
+static void ablowitz_ladik_make_flow(const ablowitz_ladik_solver *s, size_t steps, int number)
 {
     const int joined = number == ablowitz_ladik_FLOWS, row = joined ? ablowitz_ladik_JOINED
         : ablowitz_ladik_flow_rows[number];
-    flow->part = ablowitz_ladik_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * ablowitz_ladik_ROW;
     (void)steps;
-    flow->coef = s->coef + row * ablowitz_ladik_ROW;
-}
-
-static void ablowitz_ladik_make_flow(const ablowitz_ladik_solver *s, size_t steps, int number)
-{
-    ablowitz_ladik_flow flow;
-    ablowitz_ladik_find_flow(s, steps, number, &flow);
-    ablowitz_ladik_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void ablowitz_ladik_steps(const ablowitz_ladik_solver *s, size_t steps)
 {
-    ablowitz_ladik_PARALLEL
-    {
-        if (steps == 0) ablowitz_ladik_make_flow(s, s->steps - 1, ablowitz_ladik_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            ablowitz_ladik_make_flow(s, step, ablowitz_ladik_FLOWS > 1 && (step > s->steps || s->open)
-                ? ablowitz_ladik_FLOWS : 0);
-            for (int flow = 1; flow < ablowitz_ladik_FLOWS - 1; ++flow)
-                ablowitz_ladik_make_flow(s, step, flow);
-        }
+    if (steps == 0) ablowitz_ladik_make_flow(s, s->steps - 1, ablowitz_ladik_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        ablowitz_ladik_make_flow(s, step, ablowitz_ladik_FLOWS > 1 && (step > s->steps || s->open)
+            ? ablowitz_ladik_FLOWS : 0);
+        for (int flow = 1; flow < ablowitz_ladik_FLOWS - 1; ++flow) ablowitz_ladik_make_flow(s, step, flow);
     }
 }
 
@@ -550,10 +488,11 @@ static int ablowitz_ladik_try(ablowitz_ladik_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static ablowitz_ladik_status ablowitz_ladik_march(ablowitz_ladik_solver *s, size_t steps)
+ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
 {
-    ablowitz_ladik_status status = ablowitz_ladik_OK;
+    ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
+    if (status != ablowitz_ladik_OK || steps == 0) return status;
+    ablowitz_ladik_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = ablowitz_ladik_STRETCH; s->steps < end && status == ablowitz_ladik_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -567,15 +506,6 @@ static ablowitz_ladik_status ablowitz_ladik_march(ablowitz_ladik_solver *s, size
             status = ablowitz_ladik_NOT_FINITE;
         }
     }
-    return status;
-}
-
-ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
-{
-    ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
-    if (status != ablowitz_ladik_OK || steps == 0) return status;
-    ablowitz_ladik_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = ablowitz_ladik_march(s, steps);
     if (s->open && !ablowitz_ladik_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = ablowitz_ladik_NOT_FINITE;
         s->open = 0;

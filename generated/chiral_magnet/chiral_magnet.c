@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: dee1de60cf54fd76d184bd6f3790eecda07c4dd419ffd8b86a492511ee16b3ce
+ * body-sha256: 4c5d5ec3973e4ba89902c4c9d316b3fbd85d842e5f578779971fbc3595489227
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -123,9 +123,8 @@ static inline void chiral_magnet_locate(const chiral_magnet_solver *s, size_t in
 
 enum { chiral_magnet_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t chiral_magnet_pieces(const chiral_magnet_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t chiral_magnet_units(const chiral_magnet_solver *s)
 {
     return s->length < 2 * chiral_magnet_PIECE ? 1 : (size_t)s->length / chiral_magnet_PIECE;
 }
@@ -135,13 +134,13 @@ typedef struct {
     ptrdiff_t from, to;
 } chiral_magnet_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline chiral_magnet_piece chiral_magnet_piece_of(const chiral_magnet_solver *s, size_t unit)
 {
     chiral_magnet_piece piece;
     chiral_magnet_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * chiral_magnet_PIECE;
-    piece.to = unit == chiral_magnet_pieces(s) - 1 ? s->length : piece.from + chiral_magnet_PIECE;
+    piece.to = unit == chiral_magnet_units(s) - 1 ? s->length : piece.from + chiral_magnet_PIECE;
     return piece;
 }
 
@@ -196,8 +195,14 @@ static inline void chiral_magnet_gather1_0_a(const double *coef, const chiral_ma
 }
 
 /* the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): x, y turned
+   the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): y, z turned, where x, y, z stand for its y, z, x
+   the flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned, where x, y, z stand for its y, z, x
+   the flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned, where x, y, z stand for its z, x, y
+   the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, z turned, where x, y, z stand for its z, x, y
    the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, y turned
    the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, y turned
+   the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, z turned, where x, y, z stand for its z, x, y
+   the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): y, z turned, where x, y, z stand for its y, z, x
    the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): x, y turned */
 static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -236,29 +241,9 @@ static inline void chiral_magnet_gather1_1_b(const double *coef, const chiral_ma
     }
 }
 
-/* the flow of H_1 = sum of D*(Dy*(x[b]*z[a])): y, z turned
-   the flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned
-   the flow of H_7 = sum of -D*(Dy*(x[a]*z[b])): y, z turned */
-static inline void chiral_magnet_sweep_y_z(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = chiral_magnet_sin_lane(t1);
-        const double t3 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double change0 = -(z * t2 + y * t3);
-        const double change1 = y * t2 - z * t3;
-        y_row[i] = y + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* what all other sites b add to the forces of H_2 at a site a */
+/* what all other sites b add to the forces of H_2 at a site a
+   what all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, x, z
+   what all other sites b add to the forces of H_4 at a site a, where x, y, z stand for its z, x, y */
 static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
@@ -270,62 +255,6 @@ static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet
             const ptrdiff_t j = row->other[k];
             const double x_b_ = x_row[j];
             sum0 += -(c2 * x_b_);
-        }
-        row->gathered[0][i] = sum0;
-    }
-}
-
-/* what all other sites b add to the forces of H_3 at a site a */
-static inline void chiral_magnet_gather3(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c2 = coef[2];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double y_b_ = y_row[j];
-            sum0 += -(c2 * y_b_);
-        }
-        row->gathered[0][i] = sum0;
-    }
-}
-
-/* the flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned
-   the flow of H_5 = sum of D*(Dx*(y[a]*z[b])): x, z turned
-   the flow of H_6 = sum of -D*(Dx*(y[b]*z[a])): x, z turned */
-static inline void chiral_magnet_sweep_x_z(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], z = z_row[i];
-        const double t1 = c0 * row->gathered[0][i];
-        const double t2 = chiral_magnet_sin_lane(t1);
-        const double t3 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
-        const double change0 = z * t2 - x * t3;
-        const double change1 = -(z * t3 + x * t2);
-        x_row[i] = x + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* what all other sites b add to the forces of H_4 at a site a */
-static inline void chiral_magnet_gather4(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c2 = coef[2];
-    const double *restrict z_row = row->x[2] + row->at[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double z_b_ = z_row[j];
-            sum0 += -(c2 * z_b_);
         }
         row->gathered[0][i] = sum0;
     }
@@ -465,68 +394,64 @@ static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, co
     int part = 1, colour = flow;
     for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
         colour -= own;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+    double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
+    double *const y_x_z[] = { s->x[1], s->x[0], s->x[2] };
+    double *const z_x_y[] = { s->x[2], s->x[0], s->x[1] };
+    for (size_t unit = first; unit < end; ++unit) {
+        chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             at.row.chosen = colour;
             chiral_magnet_gather1_0_a(coef, &at.row, at.from, at.to);
             chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
             chiral_magnet_gather1_1_b(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_y_z(coef, &at.row, at.from, at.to);
-        }
-        break;
-    case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            at.row.x = y_z_x;
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            break;
+        case 2: /* H_2 */
             chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_y_z(coef, &at.row, at.from, at.to);
-        }
-        break;
-    case 3: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-            chiral_magnet_gather3(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_x_z(coef, &at.row, at.from, at.to);
-        }
-        break;
-    case 4: /* H_4 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-            chiral_magnet_gather4(coef, &at.row, at.from, at.to);
+            at.row.x = y_z_x;
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            break;
+        case 3: /* H_3 */
+            at.row.x = y_x_z;
+            chiral_magnet_gather2(coef, &at.row, at.from, at.to);
+            at.row.x = z_x_y;
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            break;
+        case 4: /* H_4 */
+            at.row.x = z_x_y;
+            chiral_magnet_gather2(coef, &at.row, at.from, at.to);
+            at.row.x = s->x;
             chiral_magnet_sweep4(coef, &at.row, at.from, at.to);
-        }
-        break;
-    case 5: /* H_5 */
-        for (size_t unit = first; unit < end; ++unit) {
-            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            break;
+        case 5: /* H_5 */
             at.row.chosen = colour;
             chiral_magnet_gather5_0_a(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_x_z(coef, &at.row, at.from, at.to);
+            at.row.x = z_x_y;
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            at.row.x = s->x;
             chiral_magnet_gather5_1_b(coef, &at.row, at.from, at.to);
             chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-        }
-        break;
-    case 6: /* H_6 */
-        for (size_t unit = first; unit < end; ++unit) {
-            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            break;
+        case 6: /* H_6 */
             at.row.chosen = colour;
             chiral_magnet_gather6_0_a(coef, &at.row, at.from, at.to);
             chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
             chiral_magnet_gather6_1_b(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_x_z(coef, &at.row, at.from, at.to);
-        }
-        break;
-    default: /* H_7 */
-        for (size_t unit = first; unit < end; ++unit) {
-            chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+            at.row.x = z_x_y;
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            break;
+        default: /* H_7 */
             at.row.chosen = colour;
             chiral_magnet_gather7_0_a(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_y_z(coef, &at.row, at.from, at.to);
+            at.row.x = y_z_x;
+            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            at.row.x = s->x;
             chiral_magnet_gather7_1_b(coef, &at.row, at.from, at.to);
             chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -779,38 +704,6 @@ static void chiral_magnet_put_at_bond(const chiral_magnet_solver *s, double *at,
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define chiral_magnet_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define chiral_magnet_THREADS (size_t)omp_get_num_threads()
-#define chiral_magnet_THREAD (size_t)omp_get_thread_num()
-#else
-#define chiral_magnet_PARALLEL
-#define chiral_magnet_THREADS (size_t)1
-#define chiral_magnet_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t chiral_magnet_share(size_t units, size_t *first)
-{
-    const size_t threads = chiral_magnet_THREADS, own = chiral_magnet_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void chiral_magnet_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (chiral_magnet_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     chiral_magnet_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     chiral_magnet_LEAD = (chiral_magnet_HALO + 7) / 8 * 8,
@@ -840,13 +733,8 @@ static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdif
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t chiral_magnet_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / chiral_magnet_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t chiral_magnet_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bonds)
 {
@@ -871,9 +759,8 @@ static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const
 /* ---- The solver ---- */
 static void chiral_magnet_prepare_step(const chiral_magnet_params *params, double h, double *coef)
 {
-    for (int k = 0; k < chiral_magnet_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < chiral_magnet_ROWS_OF_FLOWS; ++k)
         chiral_magnet_prepare(params, chiral_magnet_times[k] * h, coef + k * chiral_magnet_ROW);
-    }
 }
 
 static int chiral_magnet_finite(const double *values, size_t count)
@@ -957,9 +844,11 @@ static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *cons
 /* One part of H, of one colour. */
 static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = chiral_magnet_share(s->rows * chiral_magnet_pieces(s), &first);
-    chiral_magnet_sweep_rows(s, part, coef, far, first, end);
-    chiral_magnet_wait();
+    const size_t units = chiral_magnet_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) chiral_magnet_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
@@ -973,41 +862,24 @@ static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, co
         for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_colour(s, flow, coef, far);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} chiral_magnet_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void chiral_magnet_find_flow(const chiral_magnet_solver *s, size_t steps, int number,
-    chiral_magnet_flow *flow)
+static void chiral_magnet_make_flow(const chiral_magnet_solver *s, size_t steps, int number)
 {
     const int joined = number == chiral_magnet_FLOWS, row = joined ? chiral_magnet_JOINED
         : chiral_magnet_flow_rows[number];
-    flow->part = chiral_magnet_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * chiral_magnet_ROW;
     (void)steps;
-    flow->coef = s->coef + row * chiral_magnet_ROW;
-}
-
-static void chiral_magnet_make_flow(const chiral_magnet_solver *s, size_t steps, int number)
-{
-    chiral_magnet_flow flow;
-    chiral_magnet_find_flow(s, steps, number, &flow);
-    chiral_magnet_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void chiral_magnet_steps(const chiral_magnet_solver *s, size_t steps)
 {
-    chiral_magnet_PARALLEL
-    {
-        if (steps == 0) chiral_magnet_make_flow(s, s->steps - 1, chiral_magnet_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            chiral_magnet_make_flow(s, step, chiral_magnet_FLOWS > 1 && (step > s->steps || s->open)
-                ? chiral_magnet_FLOWS : 0);
-            for (int flow = 1; flow < chiral_magnet_FLOWS - 1; ++flow) chiral_magnet_make_flow(s, step, flow);
-        }
+    if (steps == 0) chiral_magnet_make_flow(s, s->steps - 1, chiral_magnet_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        chiral_magnet_make_flow(s, step, chiral_magnet_FLOWS > 1 && (step > s->steps || s->open)
+            ? chiral_magnet_FLOWS : 0);
+        for (int flow = 1; flow < chiral_magnet_FLOWS - 1; ++flow) chiral_magnet_make_flow(s, step, flow);
     }
 }
 
@@ -1020,10 +892,11 @@ static int chiral_magnet_try(chiral_magnet_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static chiral_magnet_status chiral_magnet_march(chiral_magnet_solver *s, size_t steps)
+chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
 {
-    chiral_magnet_status status = chiral_magnet_OK;
+    chiral_magnet_status status = chiral_magnet_set_step(s, h);
+    if (status != chiral_magnet_OK || steps == 0) return status;
+    chiral_magnet_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = chiral_magnet_STRETCH; s->steps < end && status == chiral_magnet_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -1037,15 +910,6 @@ static chiral_magnet_status chiral_magnet_march(chiral_magnet_solver *s, size_t 
             status = chiral_magnet_NOT_FINITE;
         }
     }
-    return status;
-}
-
-chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
-{
-    chiral_magnet_status status = chiral_magnet_set_step(s, h);
-    if (status != chiral_magnet_OK || steps == 0) return status;
-    chiral_magnet_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = chiral_magnet_march(s, steps);
     if (s->open && !chiral_magnet_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = chiral_magnet_NOT_FINITE;
         s->open = 0;

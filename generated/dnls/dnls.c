@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a324477ed40d6a83f256511ceae077b8968851e6eb839ed0bdfa6ddc49e0856d
+ * body-sha256: cb48144f4f8367239af853b748724cdf4b4cf982e82abf72f0f8753b73193e6f
  */
 #include "dnls.h"
 #include <float.h>
@@ -105,12 +105,10 @@ static inline void dnls_locate(const dnls_solver *s, size_t index, dnls_row *row
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { dnls_PIECE = 1024 };
+enum { dnls_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t dnls_pieces(const dnls_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t dnls_units(const dnls_solver *s)
 {
     return s->length < 2 * dnls_PIECE ? 1 : (size_t)s->length / dnls_PIECE;
 }
@@ -120,13 +118,13 @@ typedef struct {
     ptrdiff_t from, to;
 } dnls_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline dnls_piece dnls_piece_of(const dnls_solver *s, size_t unit)
 {
     dnls_piece piece;
     dnls_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * dnls_PIECE;
-    piece.to = unit == dnls_pieces(s) - 1 ? s->length : piece.from + dnls_PIECE;
+    piece.to = unit == dnls_units(s) - 1 ? s->length : piece.from + dnls_PIECE;
     return piece;
 }
 
@@ -211,29 +209,23 @@ static void dnls_sweep_rows(const dnls_solver *s, int part, const double *coef, 
     size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const dnls_piece at = dnls_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        dnls_piece at = dnls_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             dnls_sweep1(coef, &at.row, at.from, at.to);
             dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const dnls_piece at = dnls_piece_of(s, unit);
+            break;
+        case 2: /* H_2 */
             dnls_sweep2(coef, &at.row, at.from, at.to);
             dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const dnls_piece at = dnls_piece_of(s, unit);
+            break;
+        default: /* H_3 */
             dnls_sweep3(coef, &at.row, at.from, at.to);
             dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -282,37 +274,6 @@ static void dnls_vector_field_row(const dnls_params *params, const dnls_row *row
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define dnls_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define dnls_THREADS (size_t)omp_get_num_threads()
-#define dnls_THREAD (size_t)omp_get_thread_num()
-#else
-#define dnls_PARALLEL
-#define dnls_THREADS (size_t)1
-#define dnls_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t dnls_share(size_t units, size_t *first)
-{
-    const size_t threads = dnls_THREADS, own = dnls_THREAD, each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void dnls_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (dnls_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     dnls_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     dnls_LEAD = (dnls_HALO + 7) / 8 * 8,
@@ -339,13 +300,8 @@ static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t dnls_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / dnls_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t dnls_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
@@ -370,9 +326,7 @@ static void dnls_put(const dnls_solver *s, double *rows, const double *values)
 /* ---- The solver ---- */
 static void dnls_prepare_step(const dnls_params *params, double h, double *coef)
 {
-    for (int k = 0; k < dnls_ROWS_OF_FLOWS; ++k) {
-        dnls_prepare(params, dnls_times[k] * h, coef + k * dnls_ROW);
-    }
+    for (int k = 0; k < dnls_ROWS_OF_FLOWS; ++k) dnls_prepare(params, dnls_times[k] * h, coef + k * dnls_ROW);
 }
 
 static int dnls_finite(const double *values, size_t count)
@@ -444,43 +398,29 @@ static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], 
 /* One part of H. */
 static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = dnls_share(s->rows * dnls_pieces(s), &first);
-    dnls_sweep_rows(s, part, coef, far, first, end);
-    dnls_wait();
+    const size_t units = dnls_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) dnls_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
-
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} dnls_flow;
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void dnls_find_flow(const dnls_solver *s, size_t steps, int number, dnls_flow *flow)
-{
-    const int joined = number == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[number];
-    flow->part = dnls_flow_parts[joined ? 0 : number];
-    (void)steps;
-    flow->coef = s->coef + row * dnls_ROW;
-}
-
 static void dnls_make_flow(const dnls_solver *s, size_t steps, int number)
 {
-    dnls_flow flow;
-    dnls_find_flow(s, steps, number, &flow);
-    dnls_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    const int joined = number == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[number];
+    const double *coef = s->coef + row * dnls_ROW;
+    (void)steps;
+    dnls_sweep_part(s, dnls_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void dnls_steps(const dnls_solver *s, size_t steps)
 {
-    dnls_PARALLEL
-    {
-        if (steps == 0) dnls_make_flow(s, s->steps - 1, dnls_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            dnls_make_flow(s, step, dnls_FLOWS > 1 && (step > s->steps || s->open) ? dnls_FLOWS : 0);
-            for (int flow = 1; flow < dnls_FLOWS - 1; ++flow) dnls_make_flow(s, step, flow);
-        }
+    if (steps == 0) dnls_make_flow(s, s->steps - 1, dnls_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        dnls_make_flow(s, step, dnls_FLOWS > 1 && (step > s->steps || s->open) ? dnls_FLOWS : 0);
+        for (int flow = 1; flow < dnls_FLOWS - 1; ++flow) dnls_make_flow(s, step, flow);
     }
 }
 
@@ -493,10 +433,11 @@ static int dnls_try(dnls_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static dnls_status dnls_march(dnls_solver *s, size_t steps)
+dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
 {
-    dnls_status status = dnls_OK;
+    dnls_status status = dnls_set_step(s, h);
+    if (status != dnls_OK || steps == 0) return status;
+    dnls_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_STRETCH; s->steps < end && status == dnls_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -510,15 +451,6 @@ static dnls_status dnls_march(dnls_solver *s, size_t steps)
             status = dnls_NOT_FINITE;
         }
     }
-    return status;
-}
-
-dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
-{
-    dnls_status status = dnls_set_step(s, h);
-    if (status != dnls_OK || steps == 0) return status;
-    dnls_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = dnls_march(s, steps);
     if (s->open && !dnls_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = dnls_NOT_FINITE;
         s->open = 0;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c2eeb6af671a69a3ea272fbdc1ddd1e3ba94cd35806b63c027ad1299c0ff3abb
+ * body-sha256: f27701140b4c848d3d97120d886c3f84755b8dc3f61db20c54d6b0e9e7320b82
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -85,7 +85,6 @@ typedef struct {
     ptrdiff_t length;    /* sites of a row */
     /* 1 for terms of H that are there as far as the other axes say, else 0 */
     double present[dnls_disorder_WEIGHTS];
-    int whole; /* whether all of them are */
 } dnls_disorder_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -129,23 +128,19 @@ static inline void dnls_disorder_locate(const dnls_disorder_solver *s, size_t in
     row->length = s->length;
     ptrdiff_t place[dnls_disorder_AXES];
     dnls_disorder_place(s, index, place);
-    row->whole = 1;
     for (int k = 0; k < dnls_disorder_WEIGHTS; ++k) {
         int there = 1;
         for (int a = 0; a < dnls_disorder_AXES - 1; ++a)
             there = there && place[a] + dnls_disorder_weights[k][a][0] >= 0 &&
                 place[a] + dnls_disorder_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
         row->present[k] = there ? 1.0 : 0.0;
-        row->whole = row->whole && there;
     }
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { dnls_disorder_PIECE = 1024 };
+enum { dnls_disorder_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t dnls_disorder_pieces(const dnls_disorder_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t dnls_disorder_units(const dnls_disorder_solver *s)
 {
     return s->length < 2 * dnls_disorder_PIECE ? 1 : (size_t)s->length / dnls_disorder_PIECE;
 }
@@ -155,13 +150,13 @@ typedef struct {
     ptrdiff_t from, to;
 } dnls_disorder_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline dnls_disorder_piece dnls_disorder_piece_of(const dnls_disorder_solver *s, size_t unit)
 {
     dnls_disorder_piece piece;
     dnls_disorder_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * dnls_disorder_PIECE;
-    piece.to = unit == dnls_disorder_pieces(s) - 1 ? s->length : piece.from + dnls_disorder_PIECE;
+    piece.to = unit == dnls_disorder_units(s) - 1 ? s->length : piece.from + dnls_disorder_PIECE;
     return piece;
 }
 
@@ -254,29 +249,23 @@ static void dnls_disorder_sweep_rows(const dnls_disorder_solver *s, int part, co
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
             dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+            break;
+        case 2: /* H_2 */
             dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
             dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+            break;
+        default: /* H_3 */
             dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
             dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -341,38 +330,6 @@ static void dnls_disorder_put_parameters(dnls_disorder_solver *s, const dnls_dis
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define dnls_disorder_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define dnls_disorder_THREADS (size_t)omp_get_num_threads()
-#define dnls_disorder_THREAD (size_t)omp_get_thread_num()
-#else
-#define dnls_disorder_PARALLEL
-#define dnls_disorder_THREADS (size_t)1
-#define dnls_disorder_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t dnls_disorder_share(size_t units, size_t *first)
-{
-    const size_t threads = dnls_disorder_THREADS, own = dnls_disorder_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void dnls_disorder_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (dnls_disorder_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     dnls_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     dnls_disorder_LEAD = (dnls_disorder_HALO + 7) / 8 * 8,
@@ -401,13 +358,8 @@ static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdif
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t dnls_disorder_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / dnls_disorder_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t dnls_disorder_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
@@ -444,9 +396,8 @@ static void dnls_disorder_put_parameter(const dnls_disorder_solver *s, double *r
 /* ---- The solver ---- */
 static void dnls_disorder_prepare_step(const dnls_disorder_params *params, double h, double *coef)
 {
-    for (int k = 0; k < dnls_disorder_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < dnls_disorder_ROWS_OF_FLOWS; ++k)
         dnls_disorder_prepare(params, dnls_disorder_times[k] * h, coef + k * dnls_disorder_ROW);
-    }
 }
 
 static int dnls_disorder_finite(const double *values, size_t count)
@@ -524,46 +475,31 @@ static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *cons
 /* One part of H. */
 static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = dnls_disorder_share(s->rows * dnls_disorder_pieces(s), &first);
-    dnls_disorder_sweep_rows(s, part, coef, far, first, end);
-    dnls_disorder_wait();
+    const size_t units = dnls_disorder_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) dnls_disorder_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} dnls_disorder_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void dnls_disorder_find_flow(const dnls_disorder_solver *s, size_t steps, int number,
-    dnls_disorder_flow *flow)
+static void dnls_disorder_make_flow(const dnls_disorder_solver *s, size_t steps, int number)
 {
     const int joined = number == dnls_disorder_FLOWS, row = joined ? dnls_disorder_JOINED
         : dnls_disorder_flow_rows[number];
-    flow->part = dnls_disorder_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * dnls_disorder_ROW;
     (void)steps;
-    flow->coef = s->coef + row * dnls_disorder_ROW;
-}
-
-static void dnls_disorder_make_flow(const dnls_disorder_solver *s, size_t steps, int number)
-{
-    dnls_disorder_flow flow;
-    dnls_disorder_find_flow(s, steps, number, &flow);
-    dnls_disorder_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void dnls_disorder_steps(const dnls_disorder_solver *s, size_t steps)
 {
-    dnls_disorder_PARALLEL
-    {
-        if (steps == 0) dnls_disorder_make_flow(s, s->steps - 1, dnls_disorder_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            dnls_disorder_make_flow(s, step, dnls_disorder_FLOWS > 1 && (step > s->steps || s->open)
-                ? dnls_disorder_FLOWS : 0);
-            for (int flow = 1; flow < dnls_disorder_FLOWS - 1; ++flow) dnls_disorder_make_flow(s, step, flow);
-        }
+    if (steps == 0) dnls_disorder_make_flow(s, s->steps - 1, dnls_disorder_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        dnls_disorder_make_flow(s, step, dnls_disorder_FLOWS > 1 && (step > s->steps || s->open)
+            ? dnls_disorder_FLOWS : 0);
+        for (int flow = 1; flow < dnls_disorder_FLOWS - 1; ++flow) dnls_disorder_make_flow(s, step, flow);
     }
 }
 
@@ -576,10 +512,11 @@ static int dnls_disorder_try(dnls_disorder_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static dnls_disorder_status dnls_disorder_march(dnls_disorder_solver *s, size_t steps)
+dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
 {
-    dnls_disorder_status status = dnls_disorder_OK;
+    dnls_disorder_status status = dnls_disorder_set_step(s, h);
+    if (status != dnls_disorder_OK || steps == 0) return status;
+    dnls_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_disorder_STRETCH; s->steps < end && status == dnls_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -593,15 +530,6 @@ static dnls_disorder_status dnls_disorder_march(dnls_disorder_solver *s, size_t 
             status = dnls_disorder_NOT_FINITE;
         }
     }
-    return status;
-}
-
-dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
-{
-    dnls_disorder_status status = dnls_disorder_set_step(s, h);
-    if (status != dnls_disorder_OK || steps == 0) return status;
-    dnls_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = dnls_disorder_march(s, steps);
     if (s->open && !dnls_disorder_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = dnls_disorder_NOT_FINITE;
         s->open = 0;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3e806a9948b26f196fcd132efb18e8e5396f4ab0762cca0889304d757206b28e
+ * body-sha256: e6a86e85b41052c4836662f12fa9dd6ab4f63356835fb899f44c1ce36e470f63
  */
 #include "food_web.h"
 #include <float.h>
@@ -125,9 +125,8 @@ static inline void food_web_locate(const food_web_solver *s, size_t index, food_
 
 enum { food_web_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t food_web_pieces(const food_web_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t food_web_units(const food_web_solver *s)
 {
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
 }
@@ -137,13 +136,13 @@ typedef struct {
     ptrdiff_t from, to;
 } food_web_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline food_web_piece food_web_piece_of(const food_web_solver *s, size_t unit)
 {
     food_web_piece piece;
     food_web_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * food_web_PIECE;
-    piece.to = unit == food_web_pieces(s) - 1 ? s->length : piece.from + food_web_PIECE;
+    piece.to = unit == food_web_units(s) - 1 ? s->length : piece.from + food_web_PIECE;
     return piece;
 }
 
@@ -460,38 +459,6 @@ static void food_web_put_at_bond(const food_web_solver *s, double *at, const dou
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define food_web_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define food_web_THREADS (size_t)omp_get_num_threads()
-#define food_web_THREAD (size_t)omp_get_thread_num()
-#else
-#define food_web_PARALLEL
-#define food_web_THREADS (size_t)1
-#define food_web_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t food_web_share(size_t units, size_t *first)
-{
-    const size_t threads = food_web_THREADS, own = food_web_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void food_web_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (food_web_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     food_web_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     food_web_LEAD = (food_web_HALO + 7) / 8 * 8,
@@ -520,13 +487,8 @@ static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t food_web_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / food_web_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t food_web_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 {
@@ -562,9 +524,8 @@ static void food_web_put_parameter(const food_web_solver *s, double *rows, const
 /* ---- The solver ---- */
 static void food_web_prepare_step(const food_web_params *params, double h, double *coef)
 {
-    for (int k = 0; k < food_web_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < food_web_ROWS_OF_FLOWS; ++k)
         food_web_prepare(params, food_web_times[k] * h, coef + k * food_web_ROW);
-    }
 }
 
 static int food_web_finite(const double *values, size_t count)
@@ -646,9 +607,11 @@ static void food_web_copy(double *const to[food_web_DIM], double *const from[foo
 /* One part of H, of one colour. */
 static void food_web_sweep_colour(const food_web_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = food_web_share(s->rows * food_web_pieces(s), &first);
-    food_web_sweep_rows(s, part, coef, far, first, end);
-    food_web_wait();
+    const size_t units = food_web_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) food_web_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
@@ -662,39 +625,22 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
         for (int flow = last - 1; flow > 0; --flow) food_web_sweep_colour(s, flow, coef, far);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} food_web_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void food_web_find_flow(const food_web_solver *s, size_t steps, int number, food_web_flow *flow)
-{
-    const int joined = number == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[number];
-    flow->part = food_web_flow_parts[joined ? 0 : number];
-    (void)steps;
-    flow->coef = s->coef + row * food_web_ROW;
-}
-
 static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
 {
-    food_web_flow flow;
-    food_web_find_flow(s, steps, number, &flow);
-    food_web_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    const int joined = number == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[number];
+    const double *coef = s->coef + row * food_web_ROW;
+    (void)steps;
+    food_web_sweep_part(s, food_web_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void food_web_steps(const food_web_solver *s, size_t steps)
 {
-    food_web_PARALLEL
-    {
-        if (steps == 0) food_web_make_flow(s, s->steps - 1, food_web_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            food_web_make_flow(s, step, food_web_FLOWS > 1 && (step > s->steps || s->open) ? food_web_FLOWS
-                : 0);
-            for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_make_flow(s, step, flow);
-        }
+    if (steps == 0) food_web_make_flow(s, s->steps - 1, food_web_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        food_web_make_flow(s, step, food_web_FLOWS > 1 && (step > s->steps || s->open) ? food_web_FLOWS : 0);
+        for (int flow = 1; flow < food_web_FLOWS - 1; ++flow) food_web_make_flow(s, step, flow);
     }
 }
 
@@ -707,10 +653,11 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static food_web_status food_web_march(food_web_solver *s, size_t steps)
+food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
-    food_web_status status = food_web_OK;
+    food_web_status status = food_web_set_step(s, h);
+    if (status != food_web_OK || steps == 0) return status;
+    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -724,15 +671,6 @@ static food_web_status food_web_march(food_web_solver *s, size_t steps)
             status = food_web_NOT_FINITE;
         }
     }
-    return status;
-}
-
-food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
-{
-    food_web_status status = food_web_set_step(s, h);
-    if (status != food_web_OK || steps == 0) return status;
-    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = food_web_march(s, steps);
     if (s->open && !food_web_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = food_web_NOT_FINITE;
         s->open = 0;

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 6a8d4af3dcb59a4ff9611dffc6674a3e27d25f039d9fc9a06a26a215cfbf09ac
+ * body-sha256: 32d404345acb891a81dc1ec716f2da2e324c005abb1856b906f648dedb82eef1
  */
 #include "fput.h"
 #include <float.h>
@@ -109,12 +109,10 @@ static inline void fput_locate(const fput_solver *s, size_t index, fput_row *row
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { fput_PIECE = 1024 };
+enum { fput_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t fput_pieces(const fput_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t fput_units(const fput_solver *s)
 {
     return s->length < 2 * fput_PIECE ? 1 : (size_t)s->length / fput_PIECE;
 }
@@ -124,13 +122,13 @@ typedef struct {
     ptrdiff_t from, to;
 } fput_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
 {
     fput_piece piece;
     fput_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * fput_PIECE;
-    piece.to = unit == fput_pieces(s) - 1 ? s->length : piece.from + fput_PIECE;
+    piece.to = unit == fput_units(s) - 1 ? s->length : piece.from + fput_PIECE;
     if (piece.from < s->from) piece.from = s->from;
     if (piece.to > s->to) piece.to = s->to;
     return piece;
@@ -331,9 +329,7 @@ static void fput_put(const fput_solver *s, double *rows, const double *values)
 /* ---- The solver ---- */
 static void fput_prepare_step(const fput_params *params, double h, double *coef)
 {
-    for (int k = 0; k < fput_ROWS_OF_FLOWS; ++k) {
-        fput_prepare(params, fput_times[k] * h, coef + k * fput_ROW);
-    }
+    for (int k = 0; k < fput_ROWS_OF_FLOWS; ++k) fput_prepare(params, fput_times[k] * h, coef + k * fput_ROW);
 }
 
 static int fput_finite(const double *values, size_t count)
@@ -406,7 +402,7 @@ static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], 
 /* One part of H. */
 static void fput_sweep_part(const fput_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = fput_share(s->rows * fput_pieces(s), &first);
+    size_t first, end = fput_share(fput_units(s), &first);
     fput_sweep_rows(s, part, coef, far, first, end);
     fput_wait();
 }
@@ -444,7 +440,7 @@ enum { fput_DEEPEST = 16, fput_CACHE = 1 << 21 }; /* flows at once; bytes that t
 static size_t fput_slices(const fput_solver *s, size_t *units)
 {
     *units = 1;
-    return fput_pieces(s);
+    return fput_units(s);
 }
 
 /* How many flows are made at once. */
@@ -501,13 +497,16 @@ static void fput_make_waves(const fput_solver *s, size_t steps)
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void fput_shared_steps(const fput_solver *s, size_t steps)
+{
+    if (steps == 0) fput_make_flow(s, s->steps - 1, fput_FLOWS - 1);
+    fput_make_waves(s, steps);
+}
+
 static void fput_steps(const fput_solver *s, size_t steps)
 {
     fput_PARALLEL
-    {
-        if (steps == 0) fput_make_flow(s, s->steps - 1, fput_FLOWS - 1);
-        fput_make_waves(s, steps);
-    }
+    fput_shared_steps(s, steps);
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
@@ -519,10 +518,11 @@ static int fput_try(fput_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static fput_status fput_march(fput_solver *s, size_t steps)
+fput_status fput_integrate(fput_solver *s, double h, size_t steps)
 {
-    fput_status status = fput_OK;
+    fput_status status = fput_set_step(s, h);
+    if (status != fput_OK || steps == 0) return status;
+    fput_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = fput_STRETCH; s->steps < end && status == fput_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -536,15 +536,6 @@ static fput_status fput_march(fput_solver *s, size_t steps)
             status = fput_NOT_FINITE;
         }
     }
-    return status;
-}
-
-fput_status fput_integrate(fput_solver *s, double h, size_t steps)
-{
-    fput_status status = fput_set_step(s, h);
-    if (status != fput_OK || steps == 0) return status;
-    fput_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = fput_march(s, steps);
     if (s->open && !fput_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = fput_NOT_FINITE;
         s->open = 0;
@@ -666,7 +657,7 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
     const int joined = number == fput_FLOWS, part = fput_flow_parts[joined ? 0 : number];
     const int row = joined ? fput_JOINED : fput_flow_rows[number];
     const double *coef = s->coef + row * fput_ROW;
-    const size_t units = fput_rows_of_plane(s) * fput_pieces(s);
+    const size_t units = fput_AXES > 1 ? fput_rows_of_plane(s) : fput_units(s);
     s->open = 0;
     s->from = (ptrdiff_t)from;
     s->to = (ptrdiff_t)to;

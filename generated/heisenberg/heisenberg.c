@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 2204cd702869f3e40b9a7eb3d63d7d2fca11ce59729bc039070bc125193e0331
+ * body-sha256: 35fb237b3b2dac5a088c89c39c88163bc4e29e50d5b730fa8f713f99b89cf3f2
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -122,16 +122,8 @@ static inline void heisenberg_locate(const heisenberg_solver *s, size_t index, h
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { heisenberg_PIECE = 1024 };
-
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t heisenberg_pieces(const heisenberg_solver *s)
-{
-    (void)s;
-    return 1;
-}
+/* what is worked at in one go */
+static size_t heisenberg_units(const heisenberg_solver *s) { return s->rows; }
 
 typedef struct {
     heisenberg_row row;
@@ -139,7 +131,7 @@ typedef struct {
     ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
 } heisenberg_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline heisenberg_piece heisenberg_piece_of(const heisenberg_solver *s, size_t unit)
 {
     heisenberg_piece piece;
@@ -653,9 +645,8 @@ static void heisenberg_find_lines(const heisenberg_solver *s, size_t index, ptrd
 /* ---- The solver ---- */
 static void heisenberg_prepare_step(const heisenberg_params *params, double h, double *coef)
 {
-    for (int k = 0; k < heisenberg_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < heisenberg_ROWS_OF_FLOWS; ++k)
         heisenberg_prepare(params, heisenberg_times[k] * h, coef + k * heisenberg_ROW);
-    }
 }
 
 static int heisenberg_finite(const double *values, size_t count)
@@ -731,7 +722,7 @@ static void heisenberg_copy(double *const to[heisenberg_DIM], double *const from
 /* One part of H. */
 static void heisenberg_sweep_part(const heisenberg_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = heisenberg_share(s->rows * heisenberg_pieces(s), &first);
+    size_t first, end = heisenberg_share(heisenberg_units(s), &first);
     heisenberg_sweep_rows(s, part, coef, far, first, end);
     heisenberg_wait();
 }
@@ -830,13 +821,16 @@ static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
+static void heisenberg_shared_steps(const heisenberg_solver *s, size_t steps)
+{
+    if (steps == 0) heisenberg_make_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
+    heisenberg_make_waves(s, steps);
+}
+
 static void heisenberg_steps(const heisenberg_solver *s, size_t steps)
 {
     heisenberg_PARALLEL
-    {
-        if (steps == 0) heisenberg_make_flow(s, s->steps - 1, heisenberg_FLOWS - 1);
-        heisenberg_make_waves(s, steps);
-    }
+    heisenberg_shared_steps(s, steps);
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
@@ -859,10 +853,11 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
+heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
 {
-    heisenberg_status status = heisenberg_OK;
+    heisenberg_status status = heisenberg_set_step(s, h);
+    if (status != heisenberg_OK || steps == 0) return status;
+    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -881,15 +876,6 @@ static heisenberg_status heisenberg_march(heisenberg_solver *s, size_t steps)
             status = heisenberg_NOT_FINITE;
         }
     }
-    return status;
-}
-
-heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
-{
-    heisenberg_status status = heisenberg_set_step(s, h);
-    if (status != heisenberg_OK || steps == 0) return status;
-    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = heisenberg_march(s, steps);
     if (s->open && !heisenberg_close(s)) { /* the last flow of the last step, before which steps go on */
         status = heisenberg_NOT_FINITE;
         s->open = 0;
@@ -1030,7 +1016,7 @@ heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far,
     const int joined = number == heisenberg_FLOWS, part = heisenberg_flow_parts[joined ? 0 : number];
     const int row = joined ? heisenberg_JOINED : heisenberg_flow_rows[number];
     const double *coef = s->coef + row * heisenberg_ROW;
-    const size_t units = heisenberg_rows_of_plane(s) * heisenberg_pieces(s);
+    const size_t units = heisenberg_AXES > 1 ? heisenberg_rows_of_plane(s) : heisenberg_units(s);
     s->open = 0;
     heisenberg_sweep_rows(s, part, coef, far, from * units, to * units);
     return heisenberg_OK;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b6a879768032fc6e12989892b915d7f426c219e42732dab23ce1c330ccb12ad5
+ * body-sha256: 9a8b73102cfdfd6b9ed8aab1730b29a609bcd8ee2d295e5974406315d71ff95b
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -88,7 +88,6 @@ typedef struct {
     ptrdiff_t length;    /* sites of a row */
     /* 1 for terms of H that are there as far as the other axes say, else 0 */
     double present[heisenberg_plane_WEIGHTS];
-    int whole; /* whether all of them are */
 } heisenberg_plane_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -133,27 +132,17 @@ static inline void heisenberg_plane_locate(const heisenberg_plane_solver *s, siz
     row->length = s->length;
     ptrdiff_t place[heisenberg_plane_AXES];
     heisenberg_plane_place(s, index, place);
-    row->whole = 1;
     for (int k = 0; k < heisenberg_plane_WEIGHTS; ++k) {
         int there = 1;
         for (int a = 0; a < heisenberg_plane_AXES - 1; ++a)
             there = there && place[a] + heisenberg_plane_weights[k][a][0] >= 0 &&
                 place[a] + heisenberg_plane_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
         row->present[k] = there ? 1.0 : 0.0;
-        row->whole = row->whole && there;
     }
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { heisenberg_plane_PIECE = 1024 };
-
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t heisenberg_plane_pieces(const heisenberg_plane_solver *s)
-{
-    (void)s;
-    return 1;
-}
+/* what is worked at in one go */
+static size_t heisenberg_plane_units(const heisenberg_plane_solver *s) { return s->rows; }
 
 typedef struct {
     heisenberg_plane_row row;
@@ -161,7 +150,7 @@ typedef struct {
     ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
 } heisenberg_plane_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline heisenberg_plane_piece heisenberg_plane_piece_of(const heisenberg_plane_solver *s, size_t unit)
 {
     heisenberg_plane_piece piece;
@@ -205,8 +194,9 @@ static inline double heisenberg_plane_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double heisenberg_plane_sin_lane(double u) { return heisenberg_plane_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned */
-static inline void heisenberg_plane_sweep1(const double *coef, const heisenberg_plane_row *row,
+/* the flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned the flow of H_2 = sum of
+   -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned, where x, y, z stand for its y, z, x */
+static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenberg_plane_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
@@ -227,32 +217,6 @@ static inline void heisenberg_plane_sweep1(const double *coef, const heisenberg_
         const double change0 = -(y * t2 + z * t3);
         const double change1 = y * t3 - z * t2;
         y_row[i] = y + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* the flow of H_2 = sum of -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned */
-static inline void heisenberg_plane_sweep2(const double *coef, const heisenberg_plane_row *row,
-    ptrdiff_t from, ptrdiff_t to)
-{
-    const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
-    double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
-    const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    heisenberg_plane_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x = x_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
-        const double t1 = c0 * (w3 * y_row1[i] + w2 * y_row2[i] + (w0 * y_row[i + 1] + w1 * y_row[i - 1]));
-        const double t2 = heisenberg_plane_sin_lane(t1);
-        const double t3 = (2.0 * heisenberg_plane_sin_lane(0.5 * (t1)) * heisenberg_plane_sin_lane(0.5
-            * (t1)));
-        const double change0 = z * t2 - x * t3;
-        const double change1 = -(x * t2 + z * t3);
-        x_row[i] = x + change0;
         z_row[i] = z + change1;
     }
 }
@@ -288,31 +252,27 @@ static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int pa
     int far, size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-            heisenberg_plane_sweep1(coef, &at.row, at.from, at.wide);
+    double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
+    for (size_t unit = first; unit < end; ++unit) {
+        heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
+            heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
             heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
             heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-            heisenberg_plane_sweep2(coef, &at.row, at.from, at.wide);
+            break;
+        case 2: /* H_2 */
+            at.row.x = y_z_x;
+            heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
             heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+            break;
+        default: /* H_3 */
             heisenberg_plane_sweep3(coef, &at.row, at.from, at.wide);
             heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -386,38 +346,6 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define heisenberg_plane_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define heisenberg_plane_THREADS (size_t)omp_get_num_threads()
-#define heisenberg_plane_THREAD (size_t)omp_get_thread_num()
-#else
-#define heisenberg_plane_PARALLEL
-#define heisenberg_plane_THREADS (size_t)1
-#define heisenberg_plane_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t heisenberg_plane_share(size_t units, size_t *first)
-{
-    const size_t threads = heisenberg_plane_THREADS, own = heisenberg_plane_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void heisenberg_plane_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (heisenberg_plane_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     heisenberg_plane_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     heisenberg_plane_LEAD = (heisenberg_plane_HALO + 7) / 8 * 8,
@@ -446,13 +374,8 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t heisenberg_plane_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / heisenberg_plane_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t heisenberg_plane_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
@@ -500,9 +423,8 @@ static void heisenberg_plane_find_lines(const heisenberg_plane_solver *s, size_t
 /* ---- The solver ---- */
 static void heisenberg_plane_prepare_step(const heisenberg_plane_params *params, double h, double *coef)
 {
-    for (int k = 0; k < heisenberg_plane_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < heisenberg_plane_ROWS_OF_FLOWS; ++k)
         heisenberg_plane_prepare(params, heisenberg_plane_times[k] * h, coef + k * heisenberg_plane_ROW);
-    }
 }
 
 static int heisenberg_plane_finite(const double *values, size_t count)
@@ -582,47 +504,33 @@ static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
 static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef,
     int far)
 {
-    size_t first, end = heisenberg_plane_share(s->rows * heisenberg_plane_pieces(s), &first);
-    heisenberg_plane_sweep_rows(s, part, coef, far, first, end);
-    heisenberg_plane_wait();
+    const size_t units = heisenberg_plane_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit)
+        heisenberg_plane_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} heisenberg_plane_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void heisenberg_plane_find_flow(const heisenberg_plane_solver *s, size_t steps, int number,
-    heisenberg_plane_flow *flow)
+static void heisenberg_plane_make_flow(const heisenberg_plane_solver *s, size_t steps, int number)
 {
     const int joined = number == heisenberg_plane_FLOWS, row = joined ? heisenberg_plane_JOINED
         : heisenberg_plane_flow_rows[number];
-    flow->part = heisenberg_plane_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * heisenberg_plane_ROW;
     (void)steps;
-    flow->coef = s->coef + row * heisenberg_plane_ROW;
-}
-
-static void heisenberg_plane_make_flow(const heisenberg_plane_solver *s, size_t steps, int number)
-{
-    heisenberg_plane_flow flow;
-    heisenberg_plane_find_flow(s, steps, number, &flow);
-    heisenberg_plane_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void heisenberg_plane_steps(const heisenberg_plane_solver *s, size_t steps)
 {
-    heisenberg_plane_PARALLEL
-    {
-        if (steps == 0) heisenberg_plane_make_flow(s, s->steps - 1, heisenberg_plane_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            heisenberg_plane_make_flow(s, step, heisenberg_plane_FLOWS > 1 && (step > s->steps || s->open)
-                ? heisenberg_plane_FLOWS : 0);
-            for (int flow = 1; flow < heisenberg_plane_FLOWS - 1; ++flow)
-                heisenberg_plane_make_flow(s, step, flow);
-        }
+    if (steps == 0) heisenberg_plane_make_flow(s, s->steps - 1, heisenberg_plane_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        heisenberg_plane_make_flow(s, step, heisenberg_plane_FLOWS > 1 && (step > s->steps || s->open)
+            ? heisenberg_plane_FLOWS : 0);
+        for (int flow = 1; flow < heisenberg_plane_FLOWS - 1; ++flow)
+            heisenberg_plane_make_flow(s, step, flow);
     }
 }
 
@@ -635,10 +543,11 @@ static int heisenberg_plane_try(heisenberg_plane_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static heisenberg_plane_status heisenberg_plane_march(heisenberg_plane_solver *s, size_t steps)
+heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
 {
-    heisenberg_plane_status status = heisenberg_plane_OK;
+    heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
+    if (status != heisenberg_plane_OK || steps == 0) return status;
+    heisenberg_plane_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_plane_STRETCH; s->steps < end && status == heisenberg_plane_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -652,15 +561,6 @@ static heisenberg_plane_status heisenberg_plane_march(heisenberg_plane_solver *s
             status = heisenberg_plane_NOT_FINITE;
         }
     }
-    return status;
-}
-
-heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
-{
-    heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
-    if (status != heisenberg_plane_OK || steps == 0) return status;
-    heisenberg_plane_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = heisenberg_plane_march(s, steps);
     /* the last flow of the last step, before which steps go on */
     if (s->open && !heisenberg_plane_try(s, 0)) {
         status = heisenberg_plane_NOT_FINITE;

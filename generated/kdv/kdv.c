@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 07509a5eb7ff0341d15f45301ff441d29a7c5d202743127abbd37845b1efd3bf
+ * body-sha256: 16d2d80d04f266cc06325c60a63496584726bf7bdddb19a006c480b9840913ca
  */
 #include "kdv.h"
 #include <float.h>
@@ -107,12 +107,10 @@ static inline void kdv_locate(const kdv_solver *s, size_t index, kdv_row *row)
     row->start = row->out = s->x;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { kdv_PIECE = 1024 };
+enum { kdv_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t kdv_pieces(const kdv_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t kdv_units(const kdv_solver *s)
 {
     return s->length < 2 * kdv_PIECE ? 1 : (size_t)s->length / kdv_PIECE;
 }
@@ -122,13 +120,13 @@ typedef struct {
     ptrdiff_t from, to;
 } kdv_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
 {
     kdv_piece piece;
     kdv_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * kdv_PIECE;
-    piece.to = unit == kdv_pieces(s) - 1 ? s->length : piece.from + kdv_PIECE;
+    piece.to = unit == kdv_units(s) - 1 ? s->length : piece.from + kdv_PIECE;
     return piece;
 }
 
@@ -436,9 +434,7 @@ static void kdv_place_middle(kdv_solver *s, double *memory, size_t block)
 
 static void kdv_prepare_step(const kdv_params *params, double h, double *coef)
 {
-    for (int k = 0; k < kdv_ROWS_OF_FLOWS; ++k) {
-        kdv_prepare(params, kdv_times[k] * h, coef + k * kdv_ROW);
-    }
+    for (int k = 0; k < kdv_ROWS_OF_FLOWS; ++k) kdv_prepare(params, kdv_times[k] * h, coef + k * kdv_ROW);
 }
 
 static int kdv_finite(const double *values, size_t count)
@@ -513,7 +509,7 @@ static double kdv_larger(double a, double b) { return isnan(a) || a > b ? a : b;
    is not. */
 static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
 {
-    const size_t units = s->rows * kdv_pieces(s);
+    const size_t units = kdv_units(s);
     kdv_extent whole = { { 0.0 }, { 0.0 } };
     kdv_PARALLEL
     {
@@ -717,7 +713,7 @@ static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         kdv_ends(s->v[k], sites, 0, sites);
     }
-    kdv_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, kdv_pieces(s));
+    kdv_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, kdv_units(s));
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;
@@ -830,7 +826,7 @@ static kdv_status kdv_newton(kdv_solver *s, const double *coef, double range, in
 /* The stages of a step. */
 static kdv_status kdv_stages(kdv_solver *s, int far)
 {
-    const size_t units = s->rows * kdv_pieces(s);
+    const size_t units = kdv_units(s);
     const double *coef = s->coef;
     int now = 0;
     kdv_predict(s);

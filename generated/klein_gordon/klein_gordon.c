@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: ddb5ff397ef71494c5976e2c1c0dd92fedec8e517b4a297b6cf57c26189c6872
+ * body-sha256: 9ed371966273f16615d89ca906594315bd9355c6196a971506355a45634cf21b
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -104,12 +104,10 @@ static inline void klein_gordon_locate(const klein_gordon_solver *s, size_t inde
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { klein_gordon_PIECE = 1024 };
+enum { klein_gordon_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t klein_gordon_pieces(const klein_gordon_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t klein_gordon_units(const klein_gordon_solver *s)
 {
     return s->length < 2 * klein_gordon_PIECE ? 1 : (size_t)s->length / klein_gordon_PIECE;
 }
@@ -119,13 +117,13 @@ typedef struct {
     ptrdiff_t from, to;
 } klein_gordon_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline klein_gordon_piece klein_gordon_piece_of(const klein_gordon_solver *s, size_t unit)
 {
     klein_gordon_piece piece;
     klein_gordon_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * klein_gordon_PIECE;
-    piece.to = unit == klein_gordon_pieces(s) - 1 ? s->length : piece.from + klein_gordon_PIECE;
+    piece.to = unit == klein_gordon_units(s) - 1 ? s->length : piece.from + klein_gordon_PIECE;
     return piece;
 }
 
@@ -162,21 +160,18 @@ static void klein_gordon_sweep_rows(const klein_gordon_solver *s, int part, cons
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             klein_gordon_sweep1(coef, &at.row, at.from, at.to);
             klein_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+            break;
+        default: /* H_2 */
             klein_gordon_sweep2(coef, &at.row, at.from, at.to);
             klein_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -229,38 +224,6 @@ static void klein_gordon_vector_field_row(const klein_gordon_params *params, con
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define klein_gordon_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define klein_gordon_THREADS (size_t)omp_get_num_threads()
-#define klein_gordon_THREAD (size_t)omp_get_thread_num()
-#else
-#define klein_gordon_PARALLEL
-#define klein_gordon_THREADS (size_t)1
-#define klein_gordon_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t klein_gordon_share(size_t units, size_t *first)
-{
-    const size_t threads = klein_gordon_THREADS, own = klein_gordon_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void klein_gordon_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (klein_gordon_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     klein_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     klein_gordon_LEAD = (klein_gordon_HALO + 7) / 8 * 8,
@@ -289,13 +252,8 @@ static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t klein_gordon_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / klein_gordon_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t klein_gordon_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
@@ -320,9 +278,8 @@ static void klein_gordon_put(const klein_gordon_solver *s, double *rows, const d
 /* ---- The solver ---- */
 static void klein_gordon_prepare_step(const klein_gordon_params *params, double h, double *coef)
 {
-    for (int k = 0; k < klein_gordon_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < klein_gordon_ROWS_OF_FLOWS; ++k)
         klein_gordon_prepare(params, klein_gordon_times[k] * h, coef + k * klein_gordon_ROW);
-    }
 }
 
 static int klein_gordon_finite(const double *values, size_t count)
@@ -397,46 +354,31 @@ static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const 
 /* One part of H. */
 static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = klein_gordon_share(s->rows * klein_gordon_pieces(s), &first);
-    klein_gordon_sweep_rows(s, part, coef, far, first, end);
-    klein_gordon_wait();
+    const size_t units = klein_gordon_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) klein_gordon_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} klein_gordon_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void klein_gordon_find_flow(const klein_gordon_solver *s, size_t steps, int number,
-    klein_gordon_flow *flow)
+static void klein_gordon_make_flow(const klein_gordon_solver *s, size_t steps, int number)
 {
     const int joined = number == klein_gordon_FLOWS, row = joined ? klein_gordon_JOINED
         : klein_gordon_flow_rows[number];
-    flow->part = klein_gordon_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * klein_gordon_ROW;
     (void)steps;
-    flow->coef = s->coef + row * klein_gordon_ROW;
-}
-
-static void klein_gordon_make_flow(const klein_gordon_solver *s, size_t steps, int number)
-{
-    klein_gordon_flow flow;
-    klein_gordon_find_flow(s, steps, number, &flow);
-    klein_gordon_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    klein_gordon_sweep_part(s, klein_gordon_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void klein_gordon_steps(const klein_gordon_solver *s, size_t steps)
 {
-    klein_gordon_PARALLEL
-    {
-        if (steps == 0) klein_gordon_make_flow(s, s->steps - 1, klein_gordon_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            klein_gordon_make_flow(s, step, klein_gordon_FLOWS > 1 && (step > s->steps || s->open)
-                ? klein_gordon_FLOWS : 0);
-            for (int flow = 1; flow < klein_gordon_FLOWS - 1; ++flow) klein_gordon_make_flow(s, step, flow);
-        }
+    if (steps == 0) klein_gordon_make_flow(s, s->steps - 1, klein_gordon_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        klein_gordon_make_flow(s, step, klein_gordon_FLOWS > 1 && (step > s->steps || s->open)
+            ? klein_gordon_FLOWS : 0);
+        for (int flow = 1; flow < klein_gordon_FLOWS - 1; ++flow) klein_gordon_make_flow(s, step, flow);
     }
 }
 
@@ -449,10 +391,11 @@ static int klein_gordon_try(klein_gordon_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static klein_gordon_status klein_gordon_march(klein_gordon_solver *s, size_t steps)
+klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
 {
-    klein_gordon_status status = klein_gordon_OK;
+    klein_gordon_status status = klein_gordon_set_step(s, h);
+    if (status != klein_gordon_OK || steps == 0) return status;
+    klein_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = klein_gordon_STRETCH; s->steps < end && status == klein_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -466,15 +409,6 @@ static klein_gordon_status klein_gordon_march(klein_gordon_solver *s, size_t ste
             status = klein_gordon_NOT_FINITE;
         }
     }
-    return status;
-}
-
-klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
-{
-    klein_gordon_status status = klein_gordon_set_step(s, h);
-    if (status != klein_gordon_OK || steps == 0) return status;
-    klein_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = klein_gordon_march(s, steps);
     if (s->open && !klein_gordon_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = klein_gordon_NOT_FINITE;
         s->open = 0;

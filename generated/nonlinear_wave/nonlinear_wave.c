@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3ecb45196754d5c67e34e3086c542eefcd2aa0049991d7463b619e75fb1a6f0e
+ * body-sha256: 0f403aa6f07ea8191fa799d4f4f88768f49f3ac2180d3dacfaa03c10afce2aa6
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -108,12 +108,10 @@ static inline void nonlinear_wave_locate(const nonlinear_wave_solver *s, size_t 
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { nonlinear_wave_PIECE = 1024 };
+enum { nonlinear_wave_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t nonlinear_wave_pieces(const nonlinear_wave_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t nonlinear_wave_units(const nonlinear_wave_solver *s)
 {
     return s->length < 2 * nonlinear_wave_PIECE ? 1 : (size_t)s->length / nonlinear_wave_PIECE;
 }
@@ -123,13 +121,13 @@ typedef struct {
     ptrdiff_t from, to;
 } nonlinear_wave_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline nonlinear_wave_piece nonlinear_wave_piece_of(const nonlinear_wave_solver *s, size_t unit)
 {
     nonlinear_wave_piece piece;
     nonlinear_wave_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * nonlinear_wave_PIECE;
-    piece.to = unit == nonlinear_wave_pieces(s) - 1 ? s->length : piece.from + nonlinear_wave_PIECE;
+    piece.to = unit == nonlinear_wave_units(s) - 1 ? s->length : piece.from + nonlinear_wave_PIECE;
     return piece;
 }
 
@@ -168,21 +166,18 @@ static void nonlinear_wave_sweep_rows(const nonlinear_wave_solver *s, int part, 
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
             nonlinear_wave_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+            break;
+        default: /* H_2 */
             nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
             nonlinear_wave_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -237,38 +232,6 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define nonlinear_wave_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define nonlinear_wave_THREADS (size_t)omp_get_num_threads()
-#define nonlinear_wave_THREAD (size_t)omp_get_thread_num()
-#else
-#define nonlinear_wave_PARALLEL
-#define nonlinear_wave_THREADS (size_t)1
-#define nonlinear_wave_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t nonlinear_wave_share(size_t units, size_t *first)
-{
-    const size_t threads = nonlinear_wave_THREADS, own = nonlinear_wave_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void nonlinear_wave_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (nonlinear_wave_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     nonlinear_wave_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     nonlinear_wave_LEAD = (nonlinear_wave_HALO + 7) / 8 * 8,
@@ -297,13 +260,8 @@ static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrd
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t nonlinear_wave_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / nonlinear_wave_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t nonlinear_wave_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
@@ -328,9 +286,8 @@ static void nonlinear_wave_put(const nonlinear_wave_solver *s, double *rows, con
 /* ---- The solver ---- */
 static void nonlinear_wave_prepare_step(const nonlinear_wave_params *params, double h, double *coef)
 {
-    for (int k = 0; k < nonlinear_wave_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < nonlinear_wave_ROWS_OF_FLOWS; ++k)
         nonlinear_wave_prepare(params, nonlinear_wave_times[k] * h, coef + k * nonlinear_wave_ROW);
-    }
 }
 
 static int nonlinear_wave_finite(const double *values, size_t count)
@@ -407,47 +364,31 @@ static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *co
 /* One part of H. */
 static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = nonlinear_wave_share(s->rows * nonlinear_wave_pieces(s), &first);
-    nonlinear_wave_sweep_rows(s, part, coef, far, first, end);
-    nonlinear_wave_wait();
+    const size_t units = nonlinear_wave_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) nonlinear_wave_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} nonlinear_wave_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void nonlinear_wave_find_flow(const nonlinear_wave_solver *s, size_t steps, int number,
-    nonlinear_wave_flow *flow)
+static void nonlinear_wave_make_flow(const nonlinear_wave_solver *s, size_t steps, int number)
 {
     const int joined = number == nonlinear_wave_FLOWS, row = joined ? nonlinear_wave_JOINED
         : nonlinear_wave_flow_rows[number];
-    flow->part = nonlinear_wave_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * nonlinear_wave_ROW;
     (void)steps;
-    flow->coef = s->coef + row * nonlinear_wave_ROW;
-}
-
-static void nonlinear_wave_make_flow(const nonlinear_wave_solver *s, size_t steps, int number)
-{
-    nonlinear_wave_flow flow;
-    nonlinear_wave_find_flow(s, steps, number, &flow);
-    nonlinear_wave_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void nonlinear_wave_steps(const nonlinear_wave_solver *s, size_t steps)
 {
-    nonlinear_wave_PARALLEL
-    {
-        if (steps == 0) nonlinear_wave_make_flow(s, s->steps - 1, nonlinear_wave_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            nonlinear_wave_make_flow(s, step, nonlinear_wave_FLOWS > 1 && (step > s->steps || s->open)
-                ? nonlinear_wave_FLOWS : 0);
-            for (int flow = 1; flow < nonlinear_wave_FLOWS - 1; ++flow)
-                nonlinear_wave_make_flow(s, step, flow);
-        }
+    if (steps == 0) nonlinear_wave_make_flow(s, s->steps - 1, nonlinear_wave_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        nonlinear_wave_make_flow(s, step, nonlinear_wave_FLOWS > 1 && (step > s->steps || s->open)
+            ? nonlinear_wave_FLOWS : 0);
+        for (int flow = 1; flow < nonlinear_wave_FLOWS - 1; ++flow) nonlinear_wave_make_flow(s, step, flow);
     }
 }
 
@@ -460,10 +401,11 @@ static int nonlinear_wave_try(nonlinear_wave_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static nonlinear_wave_status nonlinear_wave_march(nonlinear_wave_solver *s, size_t steps)
+nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
 {
-    nonlinear_wave_status status = nonlinear_wave_OK;
+    nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
+    if (status != nonlinear_wave_OK || steps == 0) return status;
+    nonlinear_wave_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = nonlinear_wave_STRETCH; s->steps < end && status == nonlinear_wave_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -477,15 +419,6 @@ static nonlinear_wave_status nonlinear_wave_march(nonlinear_wave_solver *s, size
             status = nonlinear_wave_NOT_FINITE;
         }
     }
-    return status;
-}
-
-nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
-{
-    nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
-    if (status != nonlinear_wave_OK || steps == 0) return status;
-    nonlinear_wave_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = nonlinear_wave_march(s, steps);
     if (s->open && !nonlinear_wave_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = nonlinear_wave_NOT_FINITE;
         s->open = 0;

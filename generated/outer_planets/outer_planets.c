@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c32767e31cef0b7c06e3fd4571c7d2205bc6d2a6df2a2d06ccf1aeaf21c4a582
+ * body-sha256: e8950bfed98e76b571ee36933211d5fc4ecb51b3dc81cc271d9ea1e9b5840018
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -107,9 +107,8 @@ static inline void outer_planets_locate(const outer_planets_solver *s, size_t in
 
 enum { outer_planets_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t outer_planets_pieces(const outer_planets_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t outer_planets_units(const outer_planets_solver *s)
 {
     return s->length < 2 * outer_planets_PIECE ? 1 : (size_t)s->length / outer_planets_PIECE;
 }
@@ -119,13 +118,13 @@ typedef struct {
     ptrdiff_t from, to;
 } outer_planets_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline outer_planets_piece outer_planets_piece_of(const outer_planets_solver *s, size_t unit)
 {
     outer_planets_piece piece;
     outer_planets_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * outer_planets_PIECE;
-    piece.to = unit == outer_planets_pieces(s) - 1 ? s->length : piece.from + outer_planets_PIECE;
+    piece.to = unit == outer_planets_units(s) - 1 ? s->length : piece.from + outer_planets_PIECE;
     return piece;
 }
 
@@ -209,20 +208,17 @@ static void outer_planets_sweep_rows(const outer_planets_solver *s, int part, co
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const outer_planets_piece at = outer_planets_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        const outer_planets_piece at = outer_planets_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             outer_planets_gather1(coef, &at.row, at.from, at.to);
             outer_planets_sweep1(coef, &at.row, at.from, at.to);
-        }
-        break;
-    default: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const outer_planets_piece at = outer_planets_piece_of(s, unit);
+            break;
+        default: /* H_2 */
             outer_planets_sweep2(coef, &at.row, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -343,38 +339,6 @@ static void outer_planets_put_parameters(outer_planets_solver *s, const outer_pl
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define outer_planets_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
-#define outer_planets_THREADS (size_t)omp_get_num_threads()
-#define outer_planets_THREAD (size_t)omp_get_thread_num()
-#else
-#define outer_planets_PARALLEL
-#define outer_planets_THREADS (size_t)1
-#define outer_planets_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t outer_planets_share(size_t units, size_t *first)
-{
-    const size_t threads = outer_planets_THREADS, own = outer_planets_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void outer_planets_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (outer_planets_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     outer_planets_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     outer_planets_LEAD = (outer_planets_HALO + 7) / 8 * 8,
@@ -404,13 +368,8 @@ static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdif
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t outer_planets_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / outer_planets_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t outer_planets_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 {
@@ -447,9 +406,8 @@ static void outer_planets_put_parameter(const outer_planets_solver *s, double *r
 /* ---- The solver ---- */
 static void outer_planets_prepare_step(const outer_planets_params *params, double h, double *coef)
 {
-    for (int k = 0; k < outer_planets_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < outer_planets_ROWS_OF_FLOWS; ++k)
         outer_planets_prepare(params, outer_planets_times[k] * h, coef + k * outer_planets_ROW);
-    }
 }
 
 static int outer_planets_finite(const double *values, size_t count)
@@ -529,46 +487,31 @@ static void outer_planets_copy(double *const to[outer_planets_DIM], double *cons
 /* One part of H. */
 static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = outer_planets_share(s->rows * outer_planets_pieces(s), &first);
-    outer_planets_sweep_rows(s, part, coef, far, first, end);
-    outer_planets_wait();
+    const size_t units = outer_planets_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 512)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) outer_planets_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} outer_planets_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void outer_planets_find_flow(const outer_planets_solver *s, size_t steps, int number,
-    outer_planets_flow *flow)
+static void outer_planets_make_flow(const outer_planets_solver *s, size_t steps, int number)
 {
     const int joined = number == outer_planets_FLOWS, row = joined ? outer_planets_JOINED
         : outer_planets_flow_rows[number];
-    flow->part = outer_planets_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * outer_planets_ROW;
     (void)steps;
-    flow->coef = s->coef + row * outer_planets_ROW;
-}
-
-static void outer_planets_make_flow(const outer_planets_solver *s, size_t steps, int number)
-{
-    outer_planets_flow flow;
-    outer_planets_find_flow(s, steps, number, &flow);
-    outer_planets_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void outer_planets_steps(const outer_planets_solver *s, size_t steps)
 {
-    outer_planets_PARALLEL
-    {
-        if (steps == 0) outer_planets_make_flow(s, s->steps - 1, outer_planets_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            outer_planets_make_flow(s, step, outer_planets_FLOWS > 1 && (step > s->steps || s->open)
-                ? outer_planets_FLOWS : 0);
-            for (int flow = 1; flow < outer_planets_FLOWS - 1; ++flow) outer_planets_make_flow(s, step, flow);
-        }
+    if (steps == 0) outer_planets_make_flow(s, s->steps - 1, outer_planets_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        outer_planets_make_flow(s, step, outer_planets_FLOWS > 1 && (step > s->steps || s->open)
+            ? outer_planets_FLOWS : 0);
+        for (int flow = 1; flow < outer_planets_FLOWS - 1; ++flow) outer_planets_make_flow(s, step, flow);
     }
 }
 
@@ -581,10 +524,11 @@ static int outer_planets_try(outer_planets_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static outer_planets_status outer_planets_march(outer_planets_solver *s, size_t steps)
+outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
 {
-    outer_planets_status status = outer_planets_OK;
+    outer_planets_status status = outer_planets_set_step(s, h);
+    if (status != outer_planets_OK || steps == 0) return status;
+    outer_planets_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = outer_planets_STRETCH; s->steps < end && status == outer_planets_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -598,15 +542,6 @@ static outer_planets_status outer_planets_march(outer_planets_solver *s, size_t 
             status = outer_planets_NOT_FINITE;
         }
     }
-    return status;
-}
-
-outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
-{
-    outer_planets_status status = outer_planets_set_step(s, h);
-    if (status != outer_planets_OK || steps == 0) return status;
-    outer_planets_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = outer_planets_march(s, steps);
     if (s->open && !outer_planets_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = outer_planets_NOT_FINITE;
         s->open = 0;

@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: ae84879dcbafe0a6dbf5b93ef2f9d7da1eda0415716644583f35bed6f27841e1
+ * body-sha256: 3cccb0e7c934b5cf7ce18f2f9fd9c49d6b24afb19a7ee32a8a082071f51a9576
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -102,9 +102,8 @@ static inline void point_vortices_locate(const point_vortices_solver *s, size_t 
 
 enum { point_vortices_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t point_vortices_pieces(const point_vortices_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t point_vortices_units(const point_vortices_solver *s)
 {
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;
 }
@@ -114,13 +113,13 @@ typedef struct {
     ptrdiff_t from, to;
 } point_vortices_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline point_vortices_piece point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
     point_vortices_piece piece;
     point_vortices_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * point_vortices_PIECE;
-    piece.to = unit == point_vortices_pieces(s) - 1 ? s->length : piece.from + point_vortices_PIECE;
+    piece.to = unit == point_vortices_units(s) - 1 ? s->length : piece.from + point_vortices_PIECE;
     return piece;
 }
 
@@ -461,12 +460,6 @@ enum {
         + point_vortices_IMPLICIT
 };
 
-/* The doubles of each row for sums over its pieces. */
-static size_t point_vortices_row_sums(size_t length)
-{
-    return (length / point_vortices_PIECE + 1) * (point_vortices_DIRECTIONS + 1);
-}
-
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
@@ -496,13 +489,19 @@ static size_t point_vortices_block(size_t rows, ptrdiff_t width)
     return block < 512 ? block : block + (512 + apart - block % 512) % 512;
 }
 
+/* The doubles of sums over what is worked at in one go. */
+static size_t point_vortices_sums(size_t rows, size_t length)
+{
+    return rows * (length / point_vortices_PIECE + 1) * (point_vortices_DIRECTIONS + 1);
+}
+
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
-    doubles += rows * point_vortices_row_sums(sizes[point_vortices_AXES - 1]);
+    doubles += point_vortices_sums(rows, sizes[point_vortices_AXES - 1]);
     return doubles * sizeof(double) + rows * point_vortices_LINES * sizeof(ptrdiff_t) + 64;
 }
 
@@ -547,9 +546,8 @@ static void point_vortices_place_middle(point_vortices_solver *s, double *memory
 
 static void point_vortices_prepare_step(const point_vortices_params *params, double h, double *coef)
 {
-    for (int k = 0; k < point_vortices_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < point_vortices_ROWS_OF_FLOWS; ++k)
         point_vortices_prepare(params, point_vortices_times[k] * h, coef + k * point_vortices_ROW);
-    }
 }
 
 static int point_vortices_finite(const double *values, size_t count)
@@ -584,7 +582,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     const size_t block = point_vortices_block(rows, width);
     double *end = aligned - point_vortices_LEAD + point_vortices_RESERVED * block;
     s->sums = end;
-    end += rows * point_vortices_row_sums(length);
+    end += point_vortices_sums(rows, length);
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
@@ -635,7 +633,7 @@ static double point_vortices_larger(double a, double b) { return isnan(a) || a >
    is not. */
 static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int far, int now)
 {
-    const size_t units = s->rows * point_vortices_pieces(s);
+    const size_t units = point_vortices_units(s);
     point_vortices_extent whole = { { 0.0 }, { 0.0 } };
     point_vortices_PARALLEL
     {
@@ -780,7 +778,7 @@ static double point_vortices_product(const double *restrict a, const double *res
 static void point_vortices_products(const point_vortices_solver *s, int first, int count, double *const *v,
     double *products)
 {
-    const size_t units = s->rows * point_vortices_pieces(s);
+    const size_t units = point_vortices_units(s);
     point_vortices_PARALLEL
     {
         size_t unit, end = point_vortices_share(units, &unit);
@@ -808,7 +806,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
 {
     point_vortices_PARALLEL
     {
-        size_t unit, end = point_vortices_share(s->rows * point_vortices_pieces(s), &unit);
+        size_t unit, end = point_vortices_share(point_vortices_units(s), &unit);
         for (; unit < end; ++unit) {
             const point_vortices_piece at = point_vortices_piece_of(s, unit);
             for (int k = 0; k < point_vortices_DIM; ++k) {
@@ -833,7 +831,7 @@ static void point_vortices_subtract(point_vortices_solver *s, const double *coef
 {
     point_vortices_PARALLEL
     {
-        size_t first, end = point_vortices_share(s->rows * point_vortices_pieces(s), &first);
+        size_t first, end = point_vortices_share(point_vortices_units(s), &first);
         if (coef != NULL) point_vortices_slope_rows(s, coef, 1, now, a, b, first, end);
         for (size_t unit = first; unit < end; ++unit) {
             const point_vortices_piece at = point_vortices_piece_of(s, unit);
@@ -956,7 +954,7 @@ static point_vortices_status point_vortices_newton(point_vortices_solver *s, con
 /* The stages of a step. */
 static point_vortices_status point_vortices_stages(point_vortices_solver *s, int far)
 {
-    const size_t units = s->rows * point_vortices_pieces(s);
+    const size_t units = point_vortices_units(s);
     for (int stage = 0; stage < point_vortices_STAGES; ++stage) {
         const double *coef = s->coef + stage * point_vortices_ROW;
         int now = 0;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 519f33b1a86de949962c2504fe6c04ae8f677b1439f86225b2a563b8e83eb2f6
+ * body-sha256: d55bb24e6e49ee6502f3101b37bab8af4e1fad1e06e4ca31e46058bd88909382
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -105,12 +105,10 @@ static inline void sine_gordon_locate(const sine_gordon_solver *s, size_t index,
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { sine_gordon_PIECE = 1024 };
+enum { sine_gordon_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t sine_gordon_pieces(const sine_gordon_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t sine_gordon_units(const sine_gordon_solver *s)
 {
     return s->length < 2 * sine_gordon_PIECE ? 1 : (size_t)s->length / sine_gordon_PIECE;
 }
@@ -120,13 +118,13 @@ typedef struct {
     ptrdiff_t from, to;
 } sine_gordon_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline sine_gordon_piece sine_gordon_piece_of(const sine_gordon_solver *s, size_t unit)
 {
     sine_gordon_piece piece;
     sine_gordon_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * sine_gordon_PIECE;
-    piece.to = unit == sine_gordon_pieces(s) - 1 ? s->length : piece.from + sine_gordon_PIECE;
+    piece.to = unit == sine_gordon_units(s) - 1 ? s->length : piece.from + sine_gordon_PIECE;
     return piece;
 }
 
@@ -199,21 +197,18 @@ static void sine_gordon_sweep_rows(const sine_gordon_solver *s, int part, const 
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             sine_gordon_sweep1(coef, &at.row, at.from, at.to);
             sine_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+            break;
+        default: /* H_2 */
             sine_gordon_sweep2(coef, &at.row, at.from, at.to);
             sine_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -265,38 +260,6 @@ static void sine_gordon_vector_field_row(const sine_gordon_params *params, const
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define sine_gordon_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define sine_gordon_THREADS (size_t)omp_get_num_threads()
-#define sine_gordon_THREAD (size_t)omp_get_thread_num()
-#else
-#define sine_gordon_PARALLEL
-#define sine_gordon_THREADS (size_t)1
-#define sine_gordon_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t sine_gordon_share(size_t units, size_t *first)
-{
-    const size_t threads = sine_gordon_THREADS, own = sine_gordon_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void sine_gordon_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (sine_gordon_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     sine_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     sine_gordon_LEAD = (sine_gordon_HALO + 7) / 8 * 8,
@@ -325,13 +288,8 @@ static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t 
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t sine_gordon_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / sine_gordon_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t sine_gordon_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
@@ -356,9 +314,8 @@ static void sine_gordon_put(const sine_gordon_solver *s, double *rows, const dou
 /* ---- The solver ---- */
 static void sine_gordon_prepare_step(const sine_gordon_params *params, double h, double *coef)
 {
-    for (int k = 0; k < sine_gordon_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < sine_gordon_ROWS_OF_FLOWS; ++k)
         sine_gordon_prepare(params, sine_gordon_times[k] * h, coef + k * sine_gordon_ROW);
-    }
 }
 
 static int sine_gordon_finite(const double *values, size_t count)
@@ -433,46 +390,31 @@ static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const fr
 /* One part of H. */
 static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = sine_gordon_share(s->rows * sine_gordon_pieces(s), &first);
-    sine_gordon_sweep_rows(s, part, coef, far, first, end);
-    sine_gordon_wait();
+    const size_t units = sine_gordon_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) sine_gordon_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} sine_gordon_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void sine_gordon_find_flow(const sine_gordon_solver *s, size_t steps, int number,
-    sine_gordon_flow *flow)
+static void sine_gordon_make_flow(const sine_gordon_solver *s, size_t steps, int number)
 {
     const int joined = number == sine_gordon_FLOWS, row = joined ? sine_gordon_JOINED
         : sine_gordon_flow_rows[number];
-    flow->part = sine_gordon_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * sine_gordon_ROW;
     (void)steps;
-    flow->coef = s->coef + row * sine_gordon_ROW;
-}
-
-static void sine_gordon_make_flow(const sine_gordon_solver *s, size_t steps, int number)
-{
-    sine_gordon_flow flow;
-    sine_gordon_find_flow(s, steps, number, &flow);
-    sine_gordon_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    sine_gordon_sweep_part(s, sine_gordon_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void sine_gordon_steps(const sine_gordon_solver *s, size_t steps)
 {
-    sine_gordon_PARALLEL
-    {
-        if (steps == 0) sine_gordon_make_flow(s, s->steps - 1, sine_gordon_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            sine_gordon_make_flow(s, step, sine_gordon_FLOWS > 1 && (step > s->steps || s->open)
-                ? sine_gordon_FLOWS : 0);
-            for (int flow = 1; flow < sine_gordon_FLOWS - 1; ++flow) sine_gordon_make_flow(s, step, flow);
-        }
+    if (steps == 0) sine_gordon_make_flow(s, s->steps - 1, sine_gordon_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        sine_gordon_make_flow(s, step, sine_gordon_FLOWS > 1 && (step > s->steps || s->open)
+            ? sine_gordon_FLOWS : 0);
+        for (int flow = 1; flow < sine_gordon_FLOWS - 1; ++flow) sine_gordon_make_flow(s, step, flow);
     }
 }
 
@@ -485,10 +427,11 @@ static int sine_gordon_try(sine_gordon_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static sine_gordon_status sine_gordon_march(sine_gordon_solver *s, size_t steps)
+sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
 {
-    sine_gordon_status status = sine_gordon_OK;
+    sine_gordon_status status = sine_gordon_set_step(s, h);
+    if (status != sine_gordon_OK || steps == 0) return status;
+    sine_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = sine_gordon_STRETCH; s->steps < end && status == sine_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -502,15 +445,6 @@ static sine_gordon_status sine_gordon_march(sine_gordon_solver *s, size_t steps)
             status = sine_gordon_NOT_FINITE;
         }
     }
-    return status;
-}
-
-sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
-{
-    sine_gordon_status status = sine_gordon_set_step(s, h);
-    if (status != sine_gordon_OK || steps == 0) return status;
-    sine_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = sine_gordon_march(s, steps);
     if (s->open && !sine_gordon_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = sine_gordon_NOT_FINITE;
         s->open = 0;

@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The stages;
  *   Krylov spaces; Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 7279ac2b2e92e79f993ad66af1fdfe8988dc0390f1d8d351f9514d7d51c0d0fe
+ * body-sha256: 2bc5b35bcd59c3e1e4b64044a6b29d360977408787365c793e75f901d7c0b00c
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -87,7 +87,6 @@ typedef struct {
     double *const *varied; /* a variation of x */
     /* 1 for terms of H that are there as far as the other axes say, else 0 */
     double present[thermal_heisenberg_WEIGHTS];
-    int whole; /* whether all of them are */
 } thermal_heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -133,23 +132,19 @@ static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s,
     row->start = row->out = s->x;
     ptrdiff_t place[thermal_heisenberg_AXES];
     thermal_heisenberg_place(s, index, place);
-    row->whole = 1;
     for (int k = 0; k < thermal_heisenberg_WEIGHTS; ++k) {
         int there = 1;
         for (int a = 0; a < thermal_heisenberg_AXES - 1; ++a)
             there = there && place[a] + thermal_heisenberg_weights[k][a][0] >= 0 &&
                 place[a] + thermal_heisenberg_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
         row->present[k] = there ? 1.0 : 0.0;
-        row->whole = row->whole && there;
     }
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { thermal_heisenberg_PIECE = 1024 };
+enum { thermal_heisenberg_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t thermal_heisenberg_pieces(const thermal_heisenberg_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t thermal_heisenberg_units(const thermal_heisenberg_solver *s)
 {
     return s->length < 2 * thermal_heisenberg_PIECE ? 1 : (size_t)s->length / thermal_heisenberg_PIECE;
 }
@@ -159,14 +154,14 @@ typedef struct {
     ptrdiff_t from, to;
 } thermal_heisenberg_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline thermal_heisenberg_piece thermal_heisenberg_piece_of(const thermal_heisenberg_solver *s,
     size_t unit)
 {
     thermal_heisenberg_piece piece;
     thermal_heisenberg_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * thermal_heisenberg_PIECE;
-    piece.to = unit == thermal_heisenberg_pieces(s) - 1 ? s->length : piece.from + thermal_heisenberg_PIECE;
+    piece.to = unit == thermal_heisenberg_units(s) - 1 ? s->length : piece.from + thermal_heisenberg_PIECE;
     return piece;
 }
 
@@ -705,7 +700,6 @@ static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, siz
     const uint32_t now = (uint32_t)(s->h < 0.0 ? thermal_heisenberg_PARTS - 1 - part
         : part) * ((thermal_heisenberg_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)thermal_heisenberg_PARTS), s->h);
-    const size_t pieces = thermal_heisenberg_pieces(s);
     for (size_t unit = first; unit < end; ++unit) {
         const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
         for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
@@ -713,7 +707,7 @@ static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, siz
             double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)]
                 + at.row.at[0];
             for (ptrdiff_t i = at.from; i < at.to; ++i) {
-                const uint64_t site = thermal_heisenberg_site(s, unit / pieces, i);
+                const uint64_t site = thermal_heisenberg_site(s, thermal_heisenberg_AXES > 1 ? unit : 0, i);
                 const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
                 uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
                     (uint32_t)site };
@@ -773,12 +767,6 @@ enum {
         + thermal_heisenberg_IMPLICIT
 };
 
-/* The doubles of each row for sums over its pieces. */
-static size_t thermal_heisenberg_row_sums(size_t length)
-{
-    return (length / thermal_heisenberg_PIECE + 1) * (thermal_heisenberg_DIRECTIONS + 1);
-}
-
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXES], ptrdiff_t *width)
 {
@@ -800,12 +788,13 @@ static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXE
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t thermal_heisenberg_block(size_t rows, ptrdiff_t width)
+/* Doubles from one array to the next. */
+static size_t thermal_heisenberg_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
+
+/* The doubles of sums over what is worked at in one go. */
+static size_t thermal_heisenberg_sums(size_t rows, size_t length)
 {
-    const size_t block = rows * (size_t)width, apart = 512 / thermal_heisenberg_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
+    return rows * (length / thermal_heisenberg_PIECE + 1) * (thermal_heisenberg_DIRECTIONS + 1);
 }
 
 size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
@@ -814,7 +803,7 @@ size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
     const size_t rows = sizes == NULL ? 0 : thermal_heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = thermal_heisenberg_RESERVED * thermal_heisenberg_block(rows, width);
-    doubles += rows * thermal_heisenberg_row_sums(sizes[thermal_heisenberg_AXES - 1]);
+    doubles += thermal_heisenberg_sums(rows, sizes[thermal_heisenberg_AXES - 1]);
     return doubles * sizeof(double) + rows * thermal_heisenberg_LINES * sizeof(ptrdiff_t) + 64;
 }
 
@@ -855,10 +844,9 @@ static void thermal_heisenberg_place_middle(thermal_heisenberg_solver *s, double
 
 static void thermal_heisenberg_prepare_step(const thermal_heisenberg_params *params, double h, double *coef)
 {
-    for (int k = 0; k < thermal_heisenberg_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < thermal_heisenberg_ROWS_OF_FLOWS; ++k)
         thermal_heisenberg_prepare(params, thermal_heisenberg_times[k] * h,
-            coef + k * thermal_heisenberg_ROW);
-    }
+        coef + k * thermal_heisenberg_ROW);
 }
 
 static int thermal_heisenberg_finite(const double *values, size_t count)
@@ -895,7 +883,7 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     const size_t block = thermal_heisenberg_block(rows, width);
     double *end = aligned - thermal_heisenberg_LEAD + thermal_heisenberg_RESERVED * block;
     s->sums = end;
-    end += rows * thermal_heisenberg_row_sums(length);
+    end += thermal_heisenberg_sums(rows, length);
     s->lines = (ptrdiff_t *)(void *)end;
     s->lines[0] = 0;
     for (size_t k = 0; k < thermal_heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
@@ -960,7 +948,7 @@ static double thermal_heisenberg_larger(double a, double b) { return isnan(a) ||
    is not. */
 static double thermal_heisenberg_relaxed(thermal_heisenberg_solver *s, const double *coef, int far, int now)
 {
-    const size_t units = s->rows * thermal_heisenberg_pieces(s);
+    const size_t units = thermal_heisenberg_units(s);
     thermal_heisenberg_extent whole = { { 0.0 }, { 0.0 } };
     thermal_heisenberg_PARALLEL
     {
@@ -1045,7 +1033,7 @@ static double thermal_heisenberg_product(const double *restrict a, const double 
 static void thermal_heisenberg_products(const thermal_heisenberg_solver *s, int first, int count,
     double *const *v, double *products)
 {
-    const size_t units = s->rows * thermal_heisenberg_pieces(s);
+    const size_t units = thermal_heisenberg_units(s);
     thermal_heisenberg_PARALLEL
     {
         size_t unit, end = thermal_heisenberg_share(units, &unit);
@@ -1073,7 +1061,7 @@ static void thermal_heisenberg_combine(const thermal_heisenberg_solver *s, doubl
 {
     thermal_heisenberg_PARALLEL
     {
-        size_t unit, end = thermal_heisenberg_share(s->rows * thermal_heisenberg_pieces(s), &unit);
+        size_t unit, end = thermal_heisenberg_share(thermal_heisenberg_units(s), &unit);
         for (; unit < end; ++unit) {
             const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
             for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
@@ -1098,7 +1086,7 @@ static void thermal_heisenberg_subtract(thermal_heisenberg_solver *s, const doub
 {
     thermal_heisenberg_PARALLEL
     {
-        size_t first, end = thermal_heisenberg_share(s->rows * thermal_heisenberg_pieces(s), &first);
+        size_t first, end = thermal_heisenberg_share(thermal_heisenberg_units(s), &first);
         if (coef != NULL) thermal_heisenberg_slope_rows(s, coef, 1, now, a, b, first, end);
         for (size_t unit = first; unit < end; ++unit) {
             const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
@@ -1222,7 +1210,7 @@ static thermal_heisenberg_status thermal_heisenberg_newton(thermal_heisenberg_so
 /* The stages of a step. */
 static thermal_heisenberg_status thermal_heisenberg_stages(thermal_heisenberg_solver *s, int far)
 {
-    const size_t units = s->rows * thermal_heisenberg_pieces(s);
+    const size_t units = thermal_heisenberg_units(s);
     thermal_heisenberg_PARALLEL
     {
         size_t first, end = thermal_heisenberg_share(units, &first);

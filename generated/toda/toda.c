@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b7164a4fbee755e9dcb4c01e86b52986cba5edad6f8ed22ff4dd89a59f18b982
+ * body-sha256: 404672f7da71d9564ac9dfee7269068dc72ae619081c917421314dba6ddb2adc
  */
 #include "toda.h"
 #include <float.h>
@@ -101,12 +101,10 @@ static inline void toda_locate(const toda_solver *s, size_t index, toda_row *row
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { toda_PIECE = 1024 };
+enum { toda_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t toda_pieces(const toda_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t toda_units(const toda_solver *s)
 {
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
 }
@@ -116,13 +114,13 @@ typedef struct {
     ptrdiff_t from, to;
 } toda_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline toda_piece toda_piece_of(const toda_solver *s, size_t unit)
 {
     toda_piece piece;
     toda_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * toda_PIECE;
-    piece.to = unit == toda_pieces(s) - 1 ? s->length : piece.from + toda_PIECE;
+    piece.to = unit == toda_units(s) - 1 ? s->length : piece.from + toda_PIECE;
     return piece;
 }
 
@@ -193,21 +191,18 @@ static void toda_sweep_rows(const toda_solver *s, int part, const double *coef, 
     size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const toda_piece at = toda_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        toda_piece at = toda_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             toda_sweep1(coef, &at.row, at.from, at.to);
             toda_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const toda_piece at = toda_piece_of(s, unit);
+            break;
+        default: /* H_2 */
             toda_sweep2(coef, &at.row, at.from, at.to);
             toda_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -256,37 +251,6 @@ static void toda_vector_field_row(const toda_params *params, const toda_row *row
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define toda_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define toda_THREADS (size_t)omp_get_num_threads()
-#define toda_THREAD (size_t)omp_get_thread_num()
-#else
-#define toda_PARALLEL
-#define toda_THREADS (size_t)1
-#define toda_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t toda_share(size_t units, size_t *first)
-{
-    const size_t threads = toda_THREADS, own = toda_THREAD, each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void toda_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (toda_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     toda_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     toda_LEAD = (toda_HALO + 7) / 8 * 8,
@@ -313,13 +277,8 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t toda_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / toda_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t toda_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t toda_work_size(const size_t sizes[toda_AXES])
 {
@@ -344,9 +303,7 @@ static void toda_put(const toda_solver *s, double *rows, const double *values)
 /* ---- The solver ---- */
 static void toda_prepare_step(const toda_params *params, double h, double *coef)
 {
-    for (int k = 0; k < toda_ROWS_OF_FLOWS; ++k) {
-        toda_prepare(params, toda_times[k] * h, coef + k * toda_ROW);
-    }
+    for (int k = 0; k < toda_ROWS_OF_FLOWS; ++k) toda_prepare(params, toda_times[k] * h, coef + k * toda_ROW);
 }
 
 static int toda_finite(const double *values, size_t count)
@@ -418,43 +375,29 @@ static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], 
 /* One part of H. */
 static void toda_sweep_part(const toda_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = toda_share(s->rows * toda_pieces(s), &first);
-    toda_sweep_rows(s, part, coef, far, first, end);
-    toda_wait();
+    const size_t units = toda_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) toda_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
-
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} toda_flow;
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void toda_find_flow(const toda_solver *s, size_t steps, int number, toda_flow *flow)
-{
-    const int joined = number == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[number];
-    flow->part = toda_flow_parts[joined ? 0 : number];
-    (void)steps;
-    flow->coef = s->coef + row * toda_ROW;
-}
-
 static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 {
-    toda_flow flow;
-    toda_find_flow(s, steps, number, &flow);
-    toda_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    const int joined = number == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[number];
+    const double *coef = s->coef + row * toda_ROW;
+    (void)steps;
+    toda_sweep_part(s, toda_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void toda_steps(const toda_solver *s, size_t steps)
 {
-    toda_PARALLEL
-    {
-        if (steps == 0) toda_make_flow(s, s->steps - 1, toda_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            toda_make_flow(s, step, toda_FLOWS > 1 && (step > s->steps || s->open) ? toda_FLOWS : 0);
-            for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_make_flow(s, step, flow);
-        }
+    if (steps == 0) toda_make_flow(s, s->steps - 1, toda_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        toda_make_flow(s, step, toda_FLOWS > 1 && (step > s->steps || s->open) ? toda_FLOWS : 0);
+        for (int flow = 1; flow < toda_FLOWS - 1; ++flow) toda_make_flow(s, step, flow);
     }
 }
 
@@ -467,10 +410,11 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static toda_status toda_march(toda_solver *s, size_t steps)
+toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
-    toda_status status = toda_OK;
+    toda_status status = toda_set_step(s, h);
+    if (status != toda_OK || steps == 0) return status;
+    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -484,15 +428,6 @@ static toda_status toda_march(toda_solver *s, size_t steps)
             status = toda_NOT_FINITE;
         }
     }
-    return status;
-}
-
-toda_status toda_integrate(toda_solver *s, double h, size_t steps)
-{
-    toda_status status = toda_set_step(s, h);
-    if (status != toda_OK || steps == 0) return status;
-    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = toda_march(s, steps);
     if (s->open && !toda_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = toda_NOT_FINITE;
         s->open = 0;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 352e74a252b20d000aec514b6a6e8bce59d2fdfb70745fa13a009682392923bd
+ * body-sha256: 2bdd7b55bc16d05b3bfce2e90523391f7a781143cdf6541e3cb5fc539b55a2b9
  */
 #include "volterra.h"
 #include <float.h>
@@ -130,12 +130,10 @@ static inline void volterra_locate(const volterra_solver *s, size_t index, volte
         row->colour = (int)((row->colour + place[a] * volterra_colours[a]) % volterra_COLOUR_COUNT);
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { volterra_PIECE = 1024 };
+enum { volterra_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t volterra_pieces(const volterra_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t volterra_units(const volterra_solver *s)
 {
     return s->length < 2 * volterra_PIECE ? 1 : (size_t)s->length / volterra_PIECE;
 }
@@ -145,13 +143,13 @@ typedef struct {
     ptrdiff_t from, to;
 } volterra_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline volterra_piece volterra_piece_of(const volterra_solver *s, size_t unit)
 {
     volterra_piece piece;
     volterra_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * volterra_PIECE;
-    piece.to = unit == volterra_pieces(s) - 1 ? s->length : piece.from + volterra_PIECE;
+    piece.to = unit == volterra_units(s) - 1 ? s->length : piece.from + volterra_PIECE;
     return piece;
 }
 
@@ -220,21 +218,18 @@ static void volterra_sweep_rows(const volterra_solver *s, int part, const double
     size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const volterra_piece at = volterra_piece_of(s, unit);
+    for (size_t unit = first; unit < end; ++unit) {
+        volterra_piece at = volterra_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
             volterra_sweep1(coef, &at.row, at.from, at.to);
             volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const volterra_piece at = volterra_piece_of(s, unit);
+            break;
+        default: /* H_2 */
             volterra_sweep2(coef, &at.row, at.from, at.to);
             volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -278,38 +273,6 @@ static void volterra_vector_field_row(const volterra_params *params, const volte
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define volterra_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define volterra_THREADS (size_t)omp_get_num_threads()
-#define volterra_THREAD (size_t)omp_get_thread_num()
-#else
-#define volterra_PARALLEL
-#define volterra_THREADS (size_t)1
-#define volterra_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t volterra_share(size_t units, size_t *first)
-{
-    const size_t threads = volterra_THREADS, own = volterra_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void volterra_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (volterra_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     volterra_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     volterra_LEAD = (volterra_HALO + 7) / 8 * 8,
@@ -337,13 +300,8 @@ static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t volterra_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / volterra_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t volterra_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
@@ -368,9 +326,8 @@ static void volterra_put(const volterra_solver *s, double *rows, const double *v
 /* ---- The solver ---- */
 static void volterra_prepare_step(const volterra_params *params, double h, double *coef)
 {
-    for (int k = 0; k < volterra_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < volterra_ROWS_OF_FLOWS; ++k)
         volterra_prepare(params, volterra_times[k] * h, coef + k * volterra_ROW);
-    }
 }
 
 static int volterra_finite(const double *values, size_t count)
@@ -444,44 +401,29 @@ static void volterra_copy(double *const to[volterra_DIM], double *const from[vol
 /* One part of H. */
 static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = volterra_share(s->rows * volterra_pieces(s), &first);
-    volterra_sweep_rows(s, part, coef, far, first, end);
-    volterra_wait();
+    const size_t units = volterra_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) volterra_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
-
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} volterra_flow;
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void volterra_find_flow(const volterra_solver *s, size_t steps, int number, volterra_flow *flow)
-{
-    const int joined = number == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[number];
-    flow->part = volterra_flow_parts[joined ? 0 : number];
-    (void)steps;
-    flow->coef = s->coef + row * volterra_ROW;
-}
-
 static void volterra_make_flow(const volterra_solver *s, size_t steps, int number)
 {
-    volterra_flow flow;
-    volterra_find_flow(s, steps, number, &flow);
-    volterra_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    const int joined = number == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[number];
+    const double *coef = s->coef + row * volterra_ROW;
+    (void)steps;
+    volterra_sweep_part(s, volterra_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void volterra_steps(const volterra_solver *s, size_t steps)
 {
-    volterra_PARALLEL
-    {
-        if (steps == 0) volterra_make_flow(s, s->steps - 1, volterra_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            volterra_make_flow(s, step, volterra_FLOWS > 1 && (step > s->steps || s->open) ? volterra_FLOWS
-                : 0);
-            for (int flow = 1; flow < volterra_FLOWS - 1; ++flow) volterra_make_flow(s, step, flow);
-        }
+    if (steps == 0) volterra_make_flow(s, s->steps - 1, volterra_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        volterra_make_flow(s, step, volterra_FLOWS > 1 && (step > s->steps || s->open) ? volterra_FLOWS : 0);
+        for (int flow = 1; flow < volterra_FLOWS - 1; ++flow) volterra_make_flow(s, step, flow);
     }
 }
 
@@ -494,10 +436,11 @@ static int volterra_try(volterra_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static volterra_status volterra_march(volterra_solver *s, size_t steps)
+volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
 {
-    volterra_status status = volterra_OK;
+    volterra_status status = volterra_set_step(s, h);
+    if (status != volterra_OK || steps == 0) return status;
+    volterra_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = volterra_STRETCH; s->steps < end && status == volterra_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -511,15 +454,6 @@ static volterra_status volterra_march(volterra_solver *s, size_t steps)
             status = volterra_NOT_FINITE;
         }
     }
-    return status;
-}
-
-volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
-{
-    volterra_status status = volterra_set_step(s, h);
-    if (status != volterra_OK || steps == 0) return status;
-    volterra_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = volterra_march(s, steps);
     if (s->open && !volterra_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = volterra_NOT_FINITE;
         s->open = 0;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 20bae25f0675886f8d93d08d9c7162026e292a782ae558461d5ca1300b58bbb2
+ * body-sha256: 576f08d659e712875b0e8a47f575d881b33829f962cfa69c86876f05f052d010
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -108,12 +108,10 @@ static inline void xxz_disorder_locate(const xxz_disorder_solver *s, size_t inde
     row->length = s->length;
 }
 
-/* sites of a single row that are worked at in one go, with any number of threads */
-enum { xxz_disorder_PIECE = 1024 };
+enum { xxz_disorder_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest,
-   so that no copied end reaches into another. */
-static size_t xxz_disorder_pieces(const xxz_disorder_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t xxz_disorder_units(const xxz_disorder_solver *s)
 {
     return s->length < 2 * xxz_disorder_PIECE ? 1 : (size_t)s->length / xxz_disorder_PIECE;
 }
@@ -123,13 +121,13 @@ typedef struct {
     ptrdiff_t from, to;
 } xxz_disorder_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline xxz_disorder_piece xxz_disorder_piece_of(const xxz_disorder_solver *s, size_t unit)
 {
     xxz_disorder_piece piece;
     xxz_disorder_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * xxz_disorder_PIECE;
-    piece.to = unit == xxz_disorder_pieces(s) - 1 ? s->length : piece.from + xxz_disorder_PIECE;
+    piece.to = unit == xxz_disorder_units(s) - 1 ? s->length : piece.from + xxz_disorder_PIECE;
     return piece;
 }
 
@@ -166,8 +164,9 @@ static inline double xxz_disorder_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double xxz_disorder_sin_lane(double u) { return xxz_disorder_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of J*(y*y[i+1]): x, z turned */
-static inline void xxz_disorder_sweep1(const double *coef, const xxz_disorder_row *row, ptrdiff_t from,
+/* the flow of H_1 = sum of J*(y*y[i+1]): x, z turned
+   the flow of H_2 = sum of J*(x*x[i+1]): y, z turned, where x, y, z stand for its z, x, y */
+static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     const double c0 = coef[0];
@@ -183,27 +182,6 @@ static inline void xxz_disorder_sweep1(const double *coef, const xxz_disorder_ro
         const double change0 = z * t2 - x * t3;
         const double change1 = -(x * t2 + z * t3);
         x_row[i] = x + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* the flow of H_2 = sum of J*(x*x[i+1]): y, z turned */
-static inline void xxz_disorder_sweep2(const double *coef, const xxz_disorder_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
-    xxz_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double y = y_row[i], z = z_row[i];
-        const double t1 = c0 * (x_row[i + 1] + x_row[i - 1]);
-        const double t2 = (2.0 * xxz_disorder_sin_lane(0.5 * (t1)) * xxz_disorder_sin_lane(0.5 * (t1)));
-        const double t3 = xxz_disorder_sin_lane(t1);
-        const double change0 = -(y * t2 + z * t3);
-        const double change1 = y * t3 - z * t2;
-        y_row[i] = y + change0;
         z_row[i] = z + change1;
     }
 }
@@ -235,31 +213,27 @@ static void xxz_disorder_sweep_rows(const xxz_disorder_solver *s, int part, cons
     size_t first, size_t end)
 {
     (void)far;
-    switch (part) {
-    case 1: /* H_1 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
-            xxz_disorder_sweep1(coef, &at.row, at.from, at.to);
+    double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3] };
+    for (size_t unit = first; unit < end; ++unit) {
+        xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+        switch (part) {
+        case 1: /* H_1 */
+            xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
             xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    case 2: /* H_2 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
-            xxz_disorder_sweep2(coef, &at.row, at.from, at.to);
+            break;
+        case 2: /* H_2 */
+            at.row.x = z_x_y;
+            xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
             xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
             xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-        }
-        break;
-    default: /* H_3 */
-        for (size_t unit = first; unit < end; ++unit) {
-            const xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+            break;
+        default: /* H_3 */
             xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
             xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
             xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            break;
         }
-        break;
     }
 }
 
@@ -328,38 +302,6 @@ static void xxz_disorder_put_parameters(xxz_disorder_solver *s, const xxz_disord
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define xxz_disorder_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define xxz_disorder_THREADS (size_t)omp_get_num_threads()
-#define xxz_disorder_THREAD (size_t)omp_get_thread_num()
-#else
-#define xxz_disorder_PARALLEL
-#define xxz_disorder_THREADS (size_t)1
-#define xxz_disorder_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t xxz_disorder_share(size_t units, size_t *first)
-{
-    const size_t threads = xxz_disorder_THREADS, own = xxz_disorder_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void xxz_disorder_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (xxz_disorder_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 enum {
     xxz_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
     xxz_disorder_LEAD = (xxz_disorder_HALO + 7) / 8 * 8,
@@ -388,13 +330,8 @@ static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_
     return rows;
 }
 
-/* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
-   what is being written at the same place of another page. */
-static size_t xxz_disorder_block(size_t rows, ptrdiff_t width)
-{
-    const size_t block = rows * (size_t)width, apart = 512 / xxz_disorder_ARRAYS / 8 * 8;
-    return block < 512 ? block : block + (512 + apart - block % 512) % 512;
-}
+/* Doubles from one array to the next. */
+static size_t xxz_disorder_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
 size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
@@ -431,9 +368,8 @@ static void xxz_disorder_put_parameter(const xxz_disorder_solver *s, double *row
 /* ---- The solver ---- */
 static void xxz_disorder_prepare_step(const xxz_disorder_params *params, double h, double *coef)
 {
-    for (int k = 0; k < xxz_disorder_ROWS_OF_FLOWS; ++k) {
+    for (int k = 0; k < xxz_disorder_ROWS_OF_FLOWS; ++k)
         xxz_disorder_prepare(params, xxz_disorder_times[k] * h, coef + k * xxz_disorder_ROW);
-    }
 }
 
 static int xxz_disorder_finite(const double *values, size_t count)
@@ -509,46 +445,31 @@ static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const 
 /* One part of H. */
 static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef, int far)
 {
-    size_t first, end = xxz_disorder_share(s->rows * xxz_disorder_pieces(s), &first);
-    xxz_disorder_sweep_rows(s, part, coef, far, first, end);
-    xxz_disorder_wait();
+    const size_t units = xxz_disorder_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) xxz_disorder_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
-/* A part of H, and the coefficients of its flow. */
-typedef struct {
-    int part;
-    const double *coef;
-} xxz_disorder_flow;
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void xxz_disorder_find_flow(const xxz_disorder_solver *s, size_t steps, int number,
-    xxz_disorder_flow *flow)
+static void xxz_disorder_make_flow(const xxz_disorder_solver *s, size_t steps, int number)
 {
     const int joined = number == xxz_disorder_FLOWS, row = joined ? xxz_disorder_JOINED
         : xxz_disorder_flow_rows[number];
-    flow->part = xxz_disorder_flow_parts[joined ? 0 : number];
+    const double *coef = s->coef + row * xxz_disorder_ROW;
     (void)steps;
-    flow->coef = s->coef + row * xxz_disorder_ROW;
-}
-
-static void xxz_disorder_make_flow(const xxz_disorder_solver *s, size_t steps, int number)
-{
-    xxz_disorder_flow flow;
-    xxz_disorder_find_flow(s, steps, number, &flow);
-    xxz_disorder_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 static void xxz_disorder_steps(const xxz_disorder_solver *s, size_t steps)
 {
-    xxz_disorder_PARALLEL
-    {
-        if (steps == 0) xxz_disorder_make_flow(s, s->steps - 1, xxz_disorder_FLOWS - 1);
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            xxz_disorder_make_flow(s, step, xxz_disorder_FLOWS > 1 && (step > s->steps || s->open)
-                ? xxz_disorder_FLOWS : 0);
-            for (int flow = 1; flow < xxz_disorder_FLOWS - 1; ++flow) xxz_disorder_make_flow(s, step, flow);
-        }
+    if (steps == 0) xxz_disorder_make_flow(s, s->steps - 1, xxz_disorder_FLOWS - 1);
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        xxz_disorder_make_flow(s, step, xxz_disorder_FLOWS > 1 && (step > s->steps || s->open)
+            ? xxz_disorder_FLOWS : 0);
+        for (int flow = 1; flow < xxz_disorder_FLOWS - 1; ++flow) xxz_disorder_make_flow(s, step, flow);
     }
 }
 
@@ -561,10 +482,11 @@ static int xxz_disorder_try(xxz_disorder_solver *s, size_t steps)
     return 0;
 }
 
-/* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
-static xxz_disorder_status xxz_disorder_march(xxz_disorder_solver *s, size_t steps)
+xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
 {
-    xxz_disorder_status status = xxz_disorder_OK;
+    xxz_disorder_status status = xxz_disorder_set_step(s, h);
+    if (status != xxz_disorder_OK || steps == 0) return status;
+    xxz_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = xxz_disorder_STRETCH; s->steps < end && status == xxz_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -578,15 +500,6 @@ static xxz_disorder_status xxz_disorder_march(xxz_disorder_solver *s, size_t ste
             status = xxz_disorder_NOT_FINITE;
         }
     }
-    return status;
-}
-
-xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
-{
-    xxz_disorder_status status = xxz_disorder_set_step(s, h);
-    if (status != xxz_disorder_OK || steps == 0) return status;
-    xxz_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
-    status = xxz_disorder_march(s, steps);
     if (s->open && !xxz_disorder_try(s, 0)) { /* the last flow of the last step, before which steps go on */
         status = xxz_disorder_NOT_FINITE;
         s->open = 0;

@@ -15,6 +15,7 @@
 #endif
 
 /* ---- The lattice ---- */
+#if PHI_SHARED
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
@@ -57,6 +58,7 @@ static void phi_wait(void)
 }
 
 #endif
+#endif
 enum {
 #if !PHI_SERIES
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
@@ -88,11 +90,6 @@ enum {
 #endif
 };
 
-#if PHI_KRYLOV
-/* The doubles of each row for sums over its pieces. */
-static size_t phi_row_sums(size_t length) { return (length / PHI_PIECE + 1) * (PHI_DIRECTIONS + 1); }
-
-#endif
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
@@ -116,6 +113,7 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     return rows;
 }
 
+#if PHI_SPREAD
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for what is being
    written at the same place of another page. */
 static size_t phi_block(size_t rows, ptrdiff_t width)
@@ -123,7 +121,24 @@ static size_t phi_block(size_t rows, ptrdiff_t width)
     const size_t block = rows * (size_t)width, apart = 512 / PHI_ARRAYS / 8 * 8;
     return block < 512 ? block : block + (512 + apart - block % 512) % 512;
 }
+#else
+/* Doubles from one array to the next. */
+static size_t phi_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
+#endif
 
+#if PHI_KRYLOV
+/* The doubles of sums over what is worked at in one go. */
+static size_t phi_sums(size_t rows, size_t length)
+{
+#if PHI_ONE_ROW
+    return rows * (length / PHI_PIECE + 1) * (PHI_DIRECTIONS + 1);
+#else
+    (void)length;
+    return rows * (PHI_DIRECTIONS + 1);
+#endif
+}
+
+#endif
 #if PHI_GRAPH
 size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds)
 #else
@@ -139,7 +154,7 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 #endif
     size_t doubles = PHI_RESERVED * phi_block(rows, width);
 #if PHI_KRYLOV
-    doubles += rows * phi_row_sums(sizes[PHI_AXES - 1]);
+    doubles += phi_sums(rows, sizes[PHI_AXES - 1]);
 #endif
 #if PHI_BANDED
     phi_matrix matrix;
@@ -225,14 +240,14 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
 #endif
 static void phi_prepare_step(const phi_params *params, double h, double *coef)
 {
-    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
 #if PHI_KICKS
+    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
         const double kick[1] = { phi_multiples[k] * (h * h) };
         phi_prepare(params, phi_times[k] * h, kick, coef + k * PHI_ROW);
-#else
-        phi_prepare(params, phi_times[k] * h, coef + k * PHI_ROW);
-#endif
     }
+#else
+    for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) phi_prepare(params, phi_times[k] * h, coef + k * PHI_ROW);
+#endif
 }
 
 static int phi_finite(const double *values, size_t count)
@@ -310,7 +325,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     double *end = aligned - PHI_LEAD + PHI_RESERVED * block;
 #if PHI_KRYLOV
     s->sums = end;
-    end += rows * phi_row_sums(length);
+    end += phi_sums(rows, length);
 #endif
     s->lines = (ptrdiff_t *)(void *)end;
 #if PHI_ONE_ROW

@@ -110,7 +110,7 @@ static size_t phi_numbers_kept(const phi_solver *s)
 /* Keep the fields that a sweep will change; returns where the next ones are kept. */
 static double *phi_keep(const phi_solver *s, int sweep, double *to)
 {
-    size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+    size_t first, end = phi_share(phi_units(s), &first);
     for (int f = 0; f < PHI_DIM; ++f) {
         if (!phi_moves[phi_part_of(s, sweep)][f]) continue;
         for (size_t unit = first; unit < end; ++unit) {
@@ -151,7 +151,7 @@ static void phi_keep_steps(const phi_solver *s, size_t steps)
 static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int sweep, const double *coef, int row,
     double *const *x, double *const *bar)
 {
-    size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+    size_t first, end = phi_share(phi_units(s), &first);
     phi_back_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #if PHI_HANDS
     if (!phi_hands[phi_part_of(s, sweep)]) return;
@@ -219,7 +219,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
         double *x[PHI_ARRAYS];
         memcpy(x, g->x, sizeof x);
         if (PHI_FLOWS > 1) phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, NULL, x, g->row_bar);
-        size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+        size_t first, end = phi_share(phi_units(s), &first);
         for (size_t unit = first; unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);
             for (int f = 0; f < PHI_DIM; ++f) {
@@ -234,7 +234,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 /* The cotangents of coefficients: sums over all pieces, in their order, which are 0 then. */
 static void phi_add_up(const phi_solver *s, phi_transpose *g, double coef_bar[PHI_COEFFICIENTS])
 {
-    const size_t units = s->rows * phi_pieces(s);
+    const size_t units = phi_units(s);
     for (size_t unit = 0; unit < units; ++unit)
         for (size_t k = 0; k < PHI_COEFFICIENTS; ++k) {
             coef_bar[k] += g->sums[unit * PHI_COEFFICIENTS + k];
@@ -293,7 +293,7 @@ static size_t phi_at_bonds(const phi_solver *s) { return ((size_t)s->bonds[s->si
 /* The numbers that any transpose has room for. */
 static size_t phi_always(const phi_solver *s)
 {
-    const size_t block = phi_block(s->rows, s->width), units = s->rows * phi_pieces(s);
+    const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
     size_t numbers = (PHI_ARRAYS + 2 * PHI_DIM) * block + PHI_HANDED * (block + (size_t)s->width);
 #if PHI_BOND_PARAMETERS
     numbers += PHI_BOND_ARRAYS * phi_at_bonds(s);
@@ -344,8 +344,8 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     g->states = next;
     g->kept = next + g->most * PHI_DIM * block;
     g->sums = g->kept + g->longest * g->of_step;
-    g->marks = (size_t *)(void *)(g->sums + s->rows * phi_pieces(s) * PHI_COEFFICIENTS);
-    memset(g->sums, 0, s->rows * phi_pieces(s) * PHI_COEFFICIENTS * sizeof *next);
+    g->marks = (size_t *)(void *)(g->sums + phi_units(s) * PHI_COEFFICIENTS);
+    memset(g->sums, 0, phi_units(s) * PHI_COEFFICIENTS * sizeof *next);
 }
 
 /* The fields of the state that a segment begins with. */

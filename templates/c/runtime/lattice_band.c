@@ -88,7 +88,7 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         phi_ends(s->v[k], sites, 0, sites);
     }
-    phi_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, phi_pieces(s));
+    phi_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, phi_units(s));
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;

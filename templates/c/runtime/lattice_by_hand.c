@@ -31,7 +31,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #else
     const double *coef = s->coef + row * PHI_ROW;
 #endif
-    const size_t units = phi_rows_of_plane(s) * phi_pieces(s);
+    const size_t units = PHI_AXES > 1 ? phi_rows_of_plane(s) : phi_units(s);
     s->open = 0;
 #if PHI_NOISE
     const int drawing = number == 0 || number == PHI_FLOWS - PHI_SOURCES;

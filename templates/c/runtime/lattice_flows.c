@@ -14,7 +14,8 @@ static void phi_sweep_colour(const phi_solver *s, int part, const double *coef, 
 static void phi_sweep_part(const phi_solver *s, int part, const double *coef, int far)
 #endif
 {
-    size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+#if PHI_SHARED
+    size_t first, end = phi_share(phi_units(s), &first);
 #if PHI_TANGENT
     for (size_t k = 0; k < s->vectors; ++k) { /* of what a part moves only the site itself is read: no thread need wait */
         double *v[PHI_DIM];
@@ -24,6 +25,17 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
 #endif
     phi_sweep_rows(s, part, coef, far, first, end);
     phi_wait();
+#else
+    const size_t units = phi_units(s);
+#ifdef _OPENMP
+#if PHI_PAIRS
+#pragma omp parallel for if (s->sites > 512)
+#else
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+#endif
+    for (size_t unit = 0; unit < units; ++unit) phi_sweep_rows(s, part, coef, far, unit, unit + 1);
+#endif
 }
 
 #if PHI_BY_COLOUR
@@ -43,6 +55,7 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef, in
 }
 
 #endif
+#if PHI_WAVES || PHI_ADJOINT
 /* A part of H, and the coefficients of its flow. */
 typedef struct {
     int part;
@@ -73,6 +86,22 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
     phi_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
+#else
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+static void phi_make_flow(const phi_solver *s, size_t steps, int number)
+{
+    const int joined = number == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[number];
+#if PHI_RENEWED
+    double coef[PHI_ROW];
+    phi_renew(s, row, steps, coef);
+#else
+    const double *coef = s->coef + row * PHI_ROW;
+    (void)steps;
+#endif
+    phi_sweep_part(s, phi_flow_parts[joined ? 0 : number], coef, s->far > 0);
+}
+
+#endif
 #if PHI_WAVES
 #include "lattice_waves.c"
 
@@ -81,7 +110,7 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 /* The increments of a part of a step after so many, at all sites. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
-    size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+    size_t first, end = phi_share(phi_units(s), &first);
     phi_draw_rows(s, steps, part, first, end);
     phi_wait();
 }
@@ -90,31 +119,40 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 #else
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
 #endif
+#if PHI_SHARED
+static void phi_shared_steps(const phi_solver *s, size_t steps)
+#else
+static void phi_steps(const phi_solver *s, size_t steps)
+#endif
+{
+#if PHI_NOISE
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        for (int flow = 0; flow < PHI_FLOWS; ++flow) {
+            if (flow == 0 || flow == PHI_FLOWS - PHI_SOURCES) phi_draw(s, step, flow > 0);
+            phi_make_flow(s, step, flow);
+        }
+    }
+#else
+    if (steps == 0) phi_make_flow(s, s->steps - 1, PHI_FLOWS - 1);
+#if PHI_WAVES
+    phi_make_waves(s, steps);
+#else
+    for (size_t step = s->steps; step < s->steps + steps; ++step) {
+        phi_make_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
+        for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_make_flow(s, step, flow);
+    }
+#endif
+#endif
+}
+
+#if PHI_SHARED
 static void phi_steps(const phi_solver *s, size_t steps)
 {
     PHI_PARALLEL
-    {
-#if PHI_NOISE
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            for (int flow = 0; flow < PHI_FLOWS; ++flow) {
-                if (flow == 0 || flow == PHI_FLOWS - PHI_SOURCES) phi_draw(s, step, flow > 0);
-                phi_make_flow(s, step, flow);
-            }
-        }
-#else
-        if (steps == 0) phi_make_flow(s, s->steps - 1, PHI_FLOWS - 1);
-#if PHI_WAVES
-        phi_make_waves(s, steps);
-#else
-        for (size_t step = s->steps; step < s->steps + steps; ++step) {
-            phi_make_flow(s, step, PHI_FLOWS > 1 && (step > s->steps || s->open) ? PHI_FLOWS : 0);
-            for (int flow = 1; flow < PHI_FLOWS - 1; ++flow) phi_make_flow(s, step, flow);
-        }
-#endif
-#endif
-    }
+    phi_shared_steps(s, steps);
 }
 
+#endif
 #if PHI_ADJOINT
 static size_t phi_numbers_kept(const phi_solver *s);
 static void phi_keep_steps(const phi_solver *s, size_t steps);
@@ -147,10 +185,18 @@ static int phi_close(phi_solver *s)
 }
 
 #endif
+#if PHI_ADJOINT
 /* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
 static phi_status phi_march(phi_solver *s, size_t steps)
 {
     phi_status status = PHI_OK;
+#else
+phi_status phi_integrate(phi_solver *s, double h, size_t steps)
+{
+    phi_status status = phi_set_step(s, h);
+    if (status != PHI_OK || steps == 0) return status;
+    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+#endif
     const size_t end = s->steps + steps;
     for (size_t stretch = PHI_STRETCH; s->steps < end && status == PHI_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -180,6 +226,7 @@ static phi_status phi_march(phi_solver *s, size_t steps)
             status = PHI_NOT_FINITE;
         }
     }
+#if PHI_ADJOINT
     return status;
 }
 
@@ -189,6 +236,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     if (status != PHI_OK || steps == 0) return status;
     phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
     status = phi_march(s, steps);
+#endif
 #if PHI_NEAR
     if (s->open && !phi_close(s)) { /* the last flow of the last step, before which steps go on */
 #else

@@ -27,7 +27,7 @@ static double phi_product(const double *restrict a, const double *restrict b, pt
    added in their order: the bits do not depend on threads. */
 static void phi_products(const phi_solver *s, int first, int count, double *const *v, double *products)
 {
-    const size_t units = s->rows * phi_pieces(s);
+    const size_t units = phi_units(s);
     PHI_PARALLEL
     {
         size_t unit, end = phi_share(units, &unit);
@@ -52,7 +52,7 @@ static void phi_combine(const phi_solver *s, double *const *to, double own, doub
 {
     PHI_PARALLEL
     {
-        size_t unit, end = phi_share(s->rows * phi_pieces(s), &unit);
+        size_t unit, end = phi_share(phi_units(s), &unit);
         for (; unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);
             for (int k = 0; k < PHI_DIM; ++k) {
@@ -76,7 +76,7 @@ static void phi_subtract(phi_solver *s, const double *coef, int now, double *con
 {
     PHI_PARALLEL
     {
-        size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+        size_t first, end = phi_share(phi_units(s), &first);
         if (coef != NULL) phi_slope_rows(s, coef, 1, now, a, b, first, end);
         for (size_t unit = first; unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);

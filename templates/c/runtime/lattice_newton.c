@@ -87,7 +87,7 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
     memcpy(rest, s->y[1 - now], sizeof rest);
     PHI_PARALLEL
     {
-        size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+        size_t first, end = phi_share(phi_units(s), &first);
         phi_side_rows(s, coef, 1, now, v, side, first, end);
     }
     phi_combine(s, dy, 1.0, side, 0, NULL);
@@ -102,7 +102,7 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
         if (left <= 0x1p-54 * size || (left > 0.5 * before && left <= PHI_CARRIED * size)) {
             PHI_PARALLEL
             {
-                size_t first, end = phi_share(s->rows * phi_pieces(s), &first);
+                size_t first, end = phi_share(phi_units(s), &first);
                 phi_follow_rows(s, coef, 1, now, dy, v, first, end);
             }
             return PHI_OK;

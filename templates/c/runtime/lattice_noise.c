@@ -30,14 +30,13 @@ static void phi_draw_rows(const phi_solver *s, size_t steps, int part, size_t fi
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? PHI_PARTS - 1 - part : part) * ((PHI_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h);
-    const size_t pieces = phi_pieces(s);
     for (size_t unit = first; unit < end; ++unit) {
         const phi_piece at = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_SOURCES; k += 2) {
             double *one = s->x[PHI_DRAWN + k] + at.row.at[0];
             double *other = s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)] + at.row.at[0];
             for (ptrdiff_t i = at.from; i < at.to; ++i) {
-                const uint64_t site = phi_site(s, unit / pieces, i);
+                const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
                 const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
                 uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member, (uint32_t)site };
                 double pair[2];

@@ -13,7 +13,7 @@ static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b;
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. */
 static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 {
-    const size_t units = s->rows * phi_pieces(s);
+    const size_t units = phi_units(s);
     phi_extent whole = { { 0.0 }, { 0.0 } };
     PHI_PARALLEL
     {
@@ -140,7 +140,7 @@ static void phi_forget(phi_solver *s)
 /* The stages of a step. */
 static phi_status phi_stages(phi_solver *s, int far)
 {
-    const size_t units = s->rows * phi_pieces(s);
+    const size_t units = phi_units(s);
 #if PHI_NOISE
     PHI_PARALLEL
     {

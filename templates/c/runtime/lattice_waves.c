@@ -17,7 +17,7 @@ static size_t phi_slices(const phi_solver *s, size_t *units)
 {
 #if PHI_ONE_ROW
     *units = 1;
-    return phi_pieces(s);
+    return phi_units(s);
 #else
     *units = s->rows / s->sizes[0];
     return s->sizes[0];

@@ -38,7 +38,9 @@ typedef struct {
 #endif
 #if PHI_OPEN
     double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */
+#if PHI_BESIDE
     int whole;                    /* whether all of them are */
+#endif
 #endif
 #if PHI_COLOURS
     int colour;                   /* of the first site */
@@ -135,14 +137,18 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     phi_place(s, index, place);
 #endif
 #if PHI_OPEN
+#if PHI_BESIDE
     row->whole = 1;
+#endif
     for (int k = 0; k < PHI_WEIGHTS; ++k) {
         int there = 1;
         for (int a = 0; a < PHI_AXES - 1; ++a)
             there = there && place[a] + phi_weights[k][a][0] >= 0 &&
                 place[a] + phi_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
         row->present[k] = there ? 1.0 : 0.0;
+#if PHI_BESIDE
         row->whole = row->whole && there;
+#endif
     }
 #endif
 #if PHI_COLOURS
@@ -152,24 +158,23 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 }
 
+#if PHI_ONE_ROW
 #if PHI_GATHER
 enum { PHI_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
 #else
-enum { PHI_PIECE = 1024 }; /* sites of a single row that are worked at in one go, with any number of threads */
+enum { PHI_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
 #endif
 
-/* The pieces of a row, of which there is more than one only where there is one row; the last is the longest, so that no
-   copied end reaches into another. */
-static size_t phi_pieces(const phi_solver *s)
+/* The pieces of the row; the last is the longest, so that no copied end reaches into another. */
+static size_t phi_units(const phi_solver *s)
 {
-#if PHI_ONE_ROW
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
-#else
-    (void)s;
-    return 1;
-#endif
 }
 
+#else
+static size_t phi_units(const phi_solver *s) { return s->rows; } /* what is worked at in one go */
+
+#endif
 typedef struct {
     phi_row row;
     ptrdiff_t from, to;
@@ -178,14 +183,14 @@ typedef struct {
 #endif
 } phi_piece;
 
-/* The piece of that number. */
+/* The piece of that number, or the row. */
 static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
 {
     phi_piece piece;
 #if PHI_ONE_ROW
     phi_locate(s, 0, &piece.row);
     piece.from = (ptrdiff_t)unit * PHI_PIECE;
-    piece.to = unit == phi_pieces(s) - 1 ? s->length : piece.from + PHI_PIECE;
+    piece.to = unit == phi_units(s) - 1 ? s->length : piece.from + PHI_PIECE;
 #if PHI_BY_HAND
     if (piece.from < s->from) piece.from = s->from;
     if (piece.to > s->to) piece.to = s->to;

@@ -253,7 +253,7 @@ def _givers(program: Program) -> list[str]:
     name = program.name
     return [
         f"ptrdiff_t givers[{name}_LINES];",
-        f"{name}_find_givers(s, unit / {name}_pieces(s), givers);",
+        f"{name}_find_givers(s, unit, givers);",
         "at.row.at = givers;",
     ]
 

@@ -108,6 +108,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
     return {
         "KICKED": program.offers("kicks") and program.profile == "fast",
         "OPEN": bool(layout.weights),
+        "SPREAD": program.profile == "fast",
+        "BESIDE": bool(layout.weights) and program.profile == "fast",
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "COLOURS": step.sites.colours > 1,
@@ -124,6 +126,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "KRYLOV": step.equation is not None and (not banded or program.extras.tangent),
         "BY_HAND": step.is_by_hand and program.offers("by-hand"),
         "WAVES": waves(program, step),
+        "SHARED": program.profile == "fast"
+        or bool(step.equation or step.adjoint or program.extras.tangent or program.noise),
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }

@@ -23,6 +23,7 @@ from phigen.targets.c.lattice.loops import (
     sweep_loop,
 )
 from phigen.targets.c.lattice.partners import gathering, partners
+from phigen.targets.c.lattice.turned import orders, turned
 from phigen.targets.rendering import render
 
 
@@ -74,15 +75,13 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
     """
     step = layout.step
     made = [_forms_of_part(program, layout, rows, part) for part in parts]
-    alike: dict[str, list[Loop]] = {}
-    for call in (call for forms in made for called in forms.values() for call in called):
-        known = alike.setdefault(call.loop.code, [])
-        known += [call.loop] if call.loop not in known else []
+    alike = _alike(made)
     names: dict[str, str] = {}
     for code, same in alike.items():
-        shared = same[0].shared if len(same) > 1 and same[0].shared not in names.values() else ""
-        names[code] = shared or same[0].name
-        yield replace(same[0], name=names[code]).text(program, [loop.purpose for loop in same])
+        shared = same[0].loop.shared if len(same) > 1 and same[0].loop.shared not in names.values() else ""
+        names[code] = shared or same[0].loop.name
+        purposes = [call.purpose(program.coordinates) for call in same]
+        yield replace(same[0].loop, name=names[code]).text(program, purposes)
     unused, varied = ["far"] * all(len(forms) == 1 for forms in made), rows is None
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
     cases: list[Case | str] = []
@@ -115,12 +114,41 @@ def _has_rows_of_its_own(program: Program, layout: Layout) -> bool:
     return program.profile == "fast" and len(layout.step.sites.axes) > 1
 
 
+def _alike(made: Sequence[dict[str, list[_Call]]]) -> dict[str, list[_Call]]:
+    """The calls of all loops, by the code that is to be printed of them: those that another one can make call that."""
+    alike: dict[str, list[_Call]] = {}
+    for forms in made:
+        for called in forms.values():
+            for k, call in enumerate(called):
+                choices = [call, *call.others]
+                called[k] = next((c for c in choices if c.loop.code in alike), call)
+                known = alike.setdefault(called[k].loop.code, [])
+                if all(c.loop.name != call.loop.name for c in known):
+                    known.append(called[k])
+    return alike
+
+
 def _forms_of_part(
     program: Program, layout: Layout, rows: Rows | None, part: Sequence[Sweep]
 ) -> dict[str, list[_Call]]:
-    """What is called for a piece of a row to make a part of H, in each form."""
+    """What is called for a piece of a row to make a part of H, in each form.
+
+    Short code has loops that also serve with the fields in another order.
+    """
     forms = _forms(program, rows, [sweep.kernel for sweep in part])
-    return {f: [c for sweep in part for c in _calls(program, layout, sweep, f, calls)] for f, calls in forms.items()}
+    fields, found = program.coordinates, dict[str, list[_Call]]()
+    tried = [*orders(fields)] if program.profile == "small" and rows is not None else []
+    for form, names in forms.items():
+        found[form] = []
+        for sweep in part:
+            calls = [*_calls(program, layout, sweep, form, names)]
+            for order in tried:
+                other = turned(layout.step.sites, fields, order, sweep)
+                again = [*_calls(program, layout, other, form, names)] if other else []
+                for k, call in enumerate(again):
+                    calls[k] = replace(calls[k], others=(*calls[k].others, replace(call, order=order)))
+            found[form] += calls
+    return found
 
 
 def _case(
@@ -133,31 +161,57 @@ def _case(
 ) -> Case:
     """The statements of a part of H, where the loops have ``names`` by their code."""
     coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
-    lines = {
-        form: [f"{program.name}_{names[call.loop.code]}(coef, &at.row, {call.sites});" for call in called]
-        for form, called in forms.items()
-    }
+    lines = {form: [*_called(program, called, names)] for form, called in forms.items()}
     moved = sorted({f for sweep in part for f in sweep.moved})
     statements = [*_either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
     setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
-    return Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]))
+    orders = [*_reordered(program, layout, [call.order for called in forms.values() for call in called])]
+    return Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]), orders)
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends."""
+    """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends; the
+    declarations of ``orders`` of the fields."""
 
     calls: Sequence[str]
     setup: Sequence[str]
     beside: bool
+    orders: Sequence[str] = ()
 
 
 @dataclass(frozen=True)
 class _Call:
-    """A loop for some sites of a piece: the text of the last two arguments."""
+    """A loop for some sites of a piece: the text of the last two arguments; the fields in the ``order`` that it takes
+    for its own, if another one; ``others`` would do the same."""
 
     loop: Loop
     sites: str = "at.from, at.to"
+    order: tuple[str, ...] = ()
+    others: tuple[_Call, ...] = ()
+
+    def purpose(self, fields: Sequence[str]) -> str:
+        """What the loop is for."""
+        said = f", where {', '.join(fields)} stand for its {', '.join(self.order)}" if self.order else ""
+        return self.loop.purpose + said
+
+
+def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str]) -> Iterator[str]:
+    """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
+    order: tuple[str, ...] = ()
+    for call in called:
+        if call.order != order:
+            order = call.order
+            yield f"at.row.x = {'_'.join(order) or 's->x'};"
+        yield f"{program.name}_{names[call.loop.code]}(coef, &at.row, {call.sites});"
+
+
+def _reordered(program: Program, layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
+    """The arrays over the sites, with the fields in other orders that are used."""
+    for order in dict.fromkeys(order for order in used if order):
+        arrays = [*order, *layout.arrays[len(order) :]]
+        places = ", ".join(f"s->x[{layout.arrays.index(a)}]" for a in arrays)
+        yield f"double *const {'_'.join(order)}[] = {{ {places} }};"
 
 
 def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[_Call]:
@@ -256,12 +310,27 @@ def over_rows(
         "high": max([0, *(high for _, high in last)]),
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and len(layout.step.sites.axes) == 1,
     }
-    loops = [
-        [case] if isinstance(case, str) else render("c", "each_piece.c", {**values, **vars(case)}).splitlines()
-        for case in cases
-    ]
-    body = loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels or range(1, 1 + len(loops))), "}"]
+    body = [line for case in cases if not isinstance(case, str) for line in case.orders]
+    body = [*dict.fromkeys(body), *_over_pieces(program, values, cases, labels or range(1, 1 + len(cases)))]
     return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": body, **more})
+
+
+def _over_pieces(
+    program: Program, values: Mapping[str, object], cases: Sequence[Case | str], labels: Sequence[int]
+) -> list[str]:
+    """The loop over pieces; short code tells the parts of H apart in it, other code has a loop for each."""
+    pieces = [case for case in cases if isinstance(case, Case)]
+    own = [[*case.setup, *case.calls] for case in pieces]
+    if len(own) > 1 and program.profile == "small" and all(lines[0].startswith(("at.", program.name)) for lines in own):
+        changed = ["row"] * any("at.row." in line.split(" = ")[0] for lines in own for line in lines)
+        calls = ["switch (part) {", *_cases(own, labels), "}"]
+        return _piece(values, Case(calls, (), beside=False), changed)
+    loops = [[case] if isinstance(case, str) else _piece(values, case, [*case.setup, *case.orders]) for case in cases]
+    return loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels), "}"]
+
+
+def _piece(values: Mapping[str, object], case: Case, changed: Sequence[str]) -> list[str]:
+    return render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
 
 
 def _cases(loops: Sequence[Sequence[str]], labels: Sequence[int]) -> Iterator[str]:
