@@ -123,11 +123,22 @@ NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
 }  # fmt: skip
 
 
-#: Keys that noise excludes, and the values that do no harm: where steps would have to be made in parts, or of another
-#: size than those whose increments were drawn.
-NOT_WITH_NOISE: Mapping[str, tuple[object, ...]] = {
-    "monitor": (), "modified_hamiltonian": (0,), "terms": (), "adjoint": (False,), "composition": ("auto", "none"),
-}  # fmt: skip
+#: Keys that noise excludes: the values that do no harm, the reason, and what to do.
+NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
+    "monitor": (
+        (),
+        "it changes H, so e = -H(x0) would not be constant, and in tau its amplitude would depend on the state",
+        "remove monitor; steps are equal in the time then",
+    ),
+    "composition": (
+        ("auto", "none"),
+        "stages that go back would have to undo increments that were drawn",
+        "composition: none; with scheme: splitting, all noise comes before and after the composition of the flows of H",
+    ),
+    "modified_hamiltonian": ((0,), "no two steps are of the same Hamiltonian", ""),
+    "terms": ((), "order says what holds without it", "order: 2"),
+    "adjoint": ((False,), "it is not offered", ""),
+}
 #: Keys of runs that it excludes, and those that mean nothing without it.
 NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "every"), ("seed", "members")
 
@@ -150,10 +161,10 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
 def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
     noisy = "noise" in raw
     if noisy:
-        for key, harmless in NOT_WITH_NOISE.items():
+        for key, (harmless, reason, hint) in NOT_WITH_NOISE.items():
             harmless = COMPOSITIONS if key == "composition" and raw.get("scheme") == "splitting" else harmless
             if raw.get(key) is not None and raw[key] not in harmless:
-                problems.add(f"{key}: not with noise in this version", reader.locations[key,])
+                problems.add(f"{key}: not with noise: {reason}", reader.locations[key,], hint)
     for name, (_, run_) in raw.get("runs", {}).items():
         for key in NOT_IN_NOISY_RUNS if noisy else IN_NOISY_RUNS:
             if run_ and key in run_:
