@@ -5,8 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
-from support import TARGETS, compiled, setting, slow_but, solver
+from support import BODY, TARGETS, compile_text, compiled, setting, slow_but, solver
 
+from phigen import solve_ivp
 from phigen.errors import StepError
 from phigen.runtime.crossings import CrossingFinder, root
 
@@ -63,6 +64,52 @@ def test_crossings_lie_on_the_section_and_on_the_leaf(name, target):
     assert np.max(np.abs(it.hamiltonian(section.x, parameters=at.parameters) - rows.energy[0])) <= 2 * np.ptp(
         rows.energy
     )
+
+
+PENDULUM = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 - cos(q)\n"
+DRIVEN = "time: t\n" + PENDULUM.replace("cos(q)", "cos(q) + q*sin(t)/5")
+KEPLER = """coordinates: [x, y, u, v]
+poisson: {canonical: {q: [x, y], p: [u, v]}}
+hamiltonian: (u**2 + v**2)/2 - 1/sqrt(x**2 + y**2)
+runs: {r: {initial: [0.5, 0, 0, 1.7], step: 0.1, steps: 1}}
+"""
+#: The other kinds of step, with where they start and the coordinate that passes through 0.3.
+KINDS = {
+    "composed": (f"{BODY}order: 4\ncomposition: triple-jump\n", [2, 4, 0.8], 1),
+    "kicks": (f"{PENDULUM}order: 4\nscheme: splitting\ncomposition: force-gradient\n", [1, 0], 0),
+    "time": (f"{DRIVEN}order: 4\n", [1, 0], 0),
+    "time, split": (f"{DRIVEN}order: 4\nscheme: splitting\n", [1, 0], 0),
+    "monitor": (f"{BODY}monitor: 1/(1 + x1**2/20)\norder: 2\n", [2, 4, 0.8], 1),
+    "log": (f"{KEPLER}monitor: log\norder: 4\nscheme: splitting\n", [0.5, 0, 0, 1.7], 1),
+    "forces": (f"{BODY}damping: 0.01\norder: 2\n", [2, 4, 0.8], 1),
+    "attitude": (f"{BODY}reconstruct: quaternion\norder: 2\n", [2, 4, 0.8], 1),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind):
+    """Within the step in which its sign changes, to round-off; and a terminal event is the first of the section."""
+    text, start, i = KINDS[kind]
+    drift = 0.01 * kind.startswith("time")
+
+    def g(x, t=0.0):
+        return x[..., i] - 0.3 - drift * t
+
+    it = solver(compile_text(text), "numpy")
+    rows, section = it.integrate(start, 0.1, 60), it.section(start, 0.1, 60, g, direction="both")
+    values = g(rows.x, rows.t)
+    before = np.flatnonzero(values[:-1] * values[1:] < 0)
+    assert len(section) == len(before) >= 2
+    assert np.all((rows.t[before] < section.t) & (section.t < rows.t[before + 1]))
+    assert np.max(np.abs(g(section.x, section.t))) < 2 * ULP
+
+    def event(t, y):
+        return g(y, t)
+
+    event.terminal = True
+    ended = solve_ivp(it, (0, rows.t[-1]), start, h=0.1, events=event)
+    assert ended.t[-1] == pytest.approx(section.t[0], rel=1e-14)
+    assert np.max(np.abs(ended.y[:, -1] - section.x[0])) < 1e-13
 
 
 def test_a_step_in_a_block_of_its_own_changes_nothing():
