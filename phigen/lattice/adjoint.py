@@ -23,14 +23,18 @@ _READ = ("site", "start", "gathered", "bonds")
 
 
 def transposed(
-    swept: Sequence[Sequence[Sweep]], solved: Equation | None, prepare: Kernel, coefficients: Coefficients
+    swept: Sequence[Sequence[Sweep]],
+    solved: Equation | None,
+    prepare: Kernel,
+    refresh: Kernel | None,
+    coefficients: Coefficients,
 ) -> Adjoint:
     """The transposes of all kernels of a step, each called as its kernel with `BACK`."""
     kernels: list[Kernel] = []
     for sweep in (sweep for part in swept for sweep in part):
         kernels += [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
     kernels += [solved.relax, solved.advance] if solved else []
-    return completed(coefficients, [_back(kernel, coefficients) for kernel in kernels], prepare, None)
+    return completed(coefficients, [_back(kernel, coefficients) for kernel in kernels], prepare, refresh)
 
 
 def _back(kernel: Kernel, coefficients: Coefficients) -> Kernel:

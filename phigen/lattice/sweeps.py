@@ -190,7 +190,7 @@ def build_sweeps(
         gathers = [*(sweep.gather for sweep in every if sweep.gather), *own]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
-    adjoint = transposed(swept, solved, prepare, coefficients) if extras.adjoint else None
+    adjoint = transposed(swept, solved, prepare, refresh, coefficients) if extras.adjoint else None
     settled = Sweeps(
         prepare,
         sites,
@@ -252,8 +252,8 @@ def _expect_transposed(cell: Cell, *, splits: bool) -> None:
     if not splits and cell.relation != GRID:
         message = "adjoint is not offered for the series on graphs and pairs"
         raise SpecError([Diagnostic(message, hint="scheme: splitting has it, where H splits")])
-    if cell.driven:
-        raise SpecError([Diagnostic("adjoint is not offered for lattices with a time, forces or noise")])
+    if cell.noise:
+        raise SpecError([Diagnostic("adjoint is not offered for lattices with noise")])
 
 
 def _named(cell: Cell, plan: SplittingPlan) -> Iterator[tuple[CellFlow, str]]:

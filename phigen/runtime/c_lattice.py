@@ -311,14 +311,21 @@ class CLattice:
         return CLatticeSession(self._c, self.interface, x0, parameters, t0, draws)
 
     def pullback(
-        self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
+        self,
+        x0: Floats,
+        h: float,
+        steps: int,
+        stride: int,
+        bars: Floats,
+        parameters: Mapping[str, Any],
+        t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
         """See `phigen.runtime.lattice.LatticeBackend`."""
         if not hasattr(self._c, "pullback"):
             raise MissingExtraError("pullback")
         zero = dict.fromkeys(self.interface.parameters, 0.0)
         struct, arrays = _packed(self.interface, zero, x0.shape[1:], len(parameters.get("bonds", ())))
-        rows, x0_bar = self.start(x0, parameters).pull_back(h, steps, stride, bars[1:], struct.ctypes.data)
+        rows, x0_bar = self.start(x0, parameters, t0).pull_back(h, steps, stride, bars[1:], struct.ctypes.data)
         found = {name: np.asarray(struct[name][0], dtype=np.float64) for name in zero if name not in arrays}
         for name, own in arrays.items():
             of_array = np.asarray(own, dtype=np.float64)

@@ -109,9 +109,16 @@ class LatticeBackend(Protocol):
         ...
 
     def pullback(
-        self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
+        self,
+        x0: Floats,
+        h: float,
+        steps: int,
+        stride: int,
+        bars: Floats,
+        parameters: Mapping[str, Any],
+        t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
-        """The rows of a run (rows, coordinates, *sizes), and the cotangents of x0 and, by name, of the parameters.
+        """The rows of a run from t0 on (rows, coordinates, *sizes), and cotangents of x0 and of parameters, by name.
 
         These have the shapes of what they belong to; ``bars`` are those of the rows. Raises `MissingExtraError` without
         the extra ``adjoint``.
@@ -381,13 +388,17 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         threads of their own. With noise, each has the random numbers of a member of its own, from ``member`` on. Raises
         `StepError` with the ``members`` that failed and the states as far as each came, NaN in the rows after that.
         """
-        begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
-        alone: Any = t0 if begin is None else 0.0
-        first = arguments.start_time(alone, self.interface, more)
-        times = np.asarray(first if begin is None else begin, dtype=np.float64)
+        times = self._times(t0, more)
         draws = arguments.draws(self.interface, more, {"seed": seed, "member": member, "step0": step0})
         given = arguments.together(parameters, more)
         return lattice_ensemble.ensemble(self, X0, h, steps, stride, threads, given, times, draws)
+
+    def _times(self, t0: ArrayLike | None, more: dict[str, Any]) -> Floats:
+        """The time of the start, or one of each member; see `arguments.start_time`."""
+        begin = t0 if np.ndim(t0 if t0 is not None else 0) and self.interface.time else None
+        alone: Any = t0 if begin is None else 0.0
+        first = arguments.start_time(alone, self.interface, more)
+        return np.asarray(first if begin is None else begin, dtype=np.float64)
 
     def pullback(
         self,
@@ -397,6 +408,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         cotangent: ArrayLike,
         stride: int | None = None,
         *,
+        t0: ArrayLike | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
     ) -> Pullback:
@@ -404,12 +416,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters, of the shapes of these.
 
         ``x0`` is (coordinates, *sizes), or has a first axis of members, as parameters may; x1 and the cotangent have
-        its shape. Of what members share the derivative is the sum over them. With a ``stride``, x1 are all frames of
-        `integrate`, with a first axis of rows, and so is the cotangent. All is exact to round-off. Raises `StepError`,
-        and `TypeError` if the solver was compiled without ``adjoint=True``.
+        its shape, and ``t0`` may be that of each. Of what members share the derivative is the sum over them. With a
+        ``stride``, x1 are all frames of `integrate`, with a first axis of rows, and so is the cotangent. All is exact
+        to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
+        times = self._times(t0, more)
         given = arguments.together(parameters, more)
-        return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, given)
+        return lattice_gradients.pullback(self, x0, h, steps, cotangent, stride, times, given)
 
     def session(
         self,

@@ -24,6 +24,7 @@ def pullback(
     steps: int,
     cotangent: ArrayLike,
     stride: int | None,
+    t0: Floats,
     given: Mapping[str, Any],
 ) -> Pullback:
     """See `LatticeSolver.pullback`."""
@@ -37,11 +38,12 @@ def pullback(
     bars = cotangents(cotangent, shape if stride is None else (rows, *shape)).reshape(-1, *start.shape)
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *start.shape)), bars])
+    times = np.broadcast_to(t0, len(start))
     made, x0_bar, found = np.empty((rows, *start.shape)), np.empty_like(start), list[dict[str, Floats]]()
     for m, x in enumerate(start):
         values = solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
         try:
-            made[:, m], x0_bar[m], by = solver.backend.pullback(x, h, steps, width, bars[:, m], values)
+            made[:, m], x0_bar[m], by = solver.backend.pullback(x, h, steps, width, bars[:, m], values, float(times[m]))
         except MissingExtraError:
             hint = "compile it with adjoint=True, or say adjoint: true in the spec"
             raise TypeError(f"{solver.interface.name} was compiled without pullback; {hint}") from None

@@ -166,14 +166,22 @@ class NumpyLattice:
         return NumpyLatticeSession(self._module, x0, parameters, t0, draws, timed=bool(self.interface.time))
 
     def pullback(
-        self, x0: Floats, h: float, steps: int, stride: int, bars: Floats, parameters: Mapping[str, Any]
+        self,
+        x0: Floats,
+        h: float,
+        steps: int,
+        stride: int,
+        bars: Floats,
+        parameters: Mapping[str, Any],
+        t0: float = 0.0,
     ) -> tuple[Floats, Floats, dict[str, Floats]]:
         """See `phigen.runtime.lattice.LatticeBackend`."""
         if not hasattr(self._module, "pullback"):
             raise MissingExtraError("pullback")
         try:
             found: tuple[Floats, Floats, dict[str, Floats]]
-            found = self._module.pullback(x0, h, steps, bars, stride, **parameters)
+            when = {"t0": t0} if self.interface.time else {}
+            found = self._module.pullback(x0, h, steps, bars, stride, **when, **parameters)
         except self._module.StepError as error:
             raise BackendError(error.status, error.step, error.states) from None
         except ValueError:

@@ -126,7 +126,7 @@ class Propagation:
     @property
     def _from(self) -> dict[str, Any]:
         """When runs begin."""
-        return {} if isinstance(self.solver, LatticeSolver) else {"t0": self.t0}
+        return {} if isinstance(self.solver, LatticeSolver) and not self.solver.interface.time else {"t0": self.t0}
 
 
 def _summed(values: Floats, shape: tuple[int, ...]) -> Floats:

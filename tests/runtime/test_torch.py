@@ -35,3 +35,24 @@ def test_values_and_gradients_are_those_of_the_solver(solver, stride):
         slope += found["I2"]
     assert i2.grad.item() == pytest.approx(slope, rel=1e-12)
     assert made(x.float()).dtype == torch.float32
+
+
+@pytest.mark.parametrize("stride", [None, 3])
+def test_lattices_have_gradients_along_disorder(stride):
+    """Members with fields of their own at the sites; J is shared."""
+    from phigen.torch import propagator
+
+    chain, random = phigen.compile("xxz_disorder", target="numpy", adjoint=True), np.random.default_rng(1)
+    many, fields = random.normal(size=(2, 3, 5)), random.normal(size=(2, 5))
+    x, field = torch.tensor(many, requires_grad=True), torch.tensor(fields, requires_grad=True)
+    j = torch.tensor(0.9, dtype=torch.float64, requires_grad=True)
+    (propagator(chain, h=H, steps=STEPS, stride=stride)(x, {"B": field, "J": j}) ** 3).sum().backward()
+    slope = 0.0
+    for m in range(2):
+        frames = chain.integrate(many[m], H, STEPS, stride or STEPS, B=fields[m], J=0.9).x
+        bar = 3 * (frames if stride else frames[-1]) ** 2
+        _, x0_bar, found = chain.pullback(many[m], H, STEPS, bar, stride, B=fields[m], J=0.9)
+        assert x.grad[m].numpy() == pytest.approx(x0_bar, rel=1e-12)
+        assert field.grad[m].numpy() == pytest.approx(found["B"], rel=1e-12)
+        slope += found["J"]
+    assert j.grad.item() == pytest.approx(slope, rel=1e-12)

@@ -78,7 +78,7 @@ def _body(program: Program) -> str:
         early = [
             program.step.prepare,
             program.step.refresh,
-            *([program.step.adjoint.prepare] if program.step.adjoint else []),
+            *([program.step.adjoint.prepare, program.step.adjoint.refresh] if program.step.adjoint else []),
         ]
         return lattice.body(
             program, program.step, "\n\n".join(_function(program, kernel) for kernel in early if kernel)

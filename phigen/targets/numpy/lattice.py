@@ -48,6 +48,8 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "schedule": repr(tuple(schedule.flows)),
         "time": program.time,
         "renewed": step.refresh is not None,
+        "row": step.row,
+        "prepared": step.prepared,
         "noise": program.noise is not None,
         "sources": _tuple(map(repr, program.noise.sources)) if program.noise else "",
         "noise_parts": program.noise.parts if program.noise else 0,
