@@ -188,7 +188,7 @@ def _write(
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
     """Verify what was written; systems that fall short get no certificate, and lose the one they had."""
     from phigen.cli import certificate
-    from phigen.cli.verify import fallen_short, verified, with_tangent
+    from phigen.cli.verify import fallen_short, verified, verified_lattice, with_tangent
     from phigen.compiler import compile_proved
     from phigen.writing import write
 
@@ -204,7 +204,8 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
             subject = compile_proved(
                 spec, order=options.order, scheme=options.scheme, extras=extras, profile=options.profile
             )
-            verification = verified(subject, None, False, console, options.targets_of(compilation))
+            judged = verified_lattice if spec.lattice else verified
+            verification = judged(subject, None, False, console, options.targets_of(compilation))
             if verification.failures:
                 raise fallen_short(verification)
             write(path, certificate.text_of(compilation, files_of(compilation, options), verification))

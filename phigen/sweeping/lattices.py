@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from phigen.errors import StepError
 from phigen.lattice.states import Start, start_of
 from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, LatticeInterface, row_steps
-from phigen.runtime.lattice import LatticeSolver, reduced
+from phigen.runtime.lattice import LatticeSession, LatticeSolver, reduced
 from phigen.spec.model import Run, Spec, Values
 from phigen.sweeping.plan import Plan
 from phigen.sweeping.store import Job
@@ -91,10 +90,9 @@ class _Member:
             self.session = solver.backend.start(start.state, values, t0, *draws)
             self.status, kept = 0, self._made(start.state, h)
             if "lyapunov" in plan.keep:
-                kept["lyapunov"] = exponent(solver, start.state, h, plan.steps, t0, given)
+                again = solver.backend.start(start.state, values, t0, *draws)
+                kept["lyapunov"] = exponent(again, h, plan.steps)
         except BackendError as error:
-            self.status = STATUSES.index(error.status)
-        except StepError as error:
             self.status = STATUSES.index(error.status)
         except ValueError:  # numbers that are refused
             self.status = _REFUSED
@@ -129,14 +127,15 @@ class _Member:
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
 
 
-def exponent(solver: LatticeSolver, x: Floats, h: float, steps: int, t0: float, parameters: Mapping[str, Any]) -> float:
-    """The largest Lyapunov exponent, by a vector that the derivatives of all steps carry along. Raises `StepError`."""
-    vector = np.random.default_rng(0).normal(size=(1, *x.shape))
-    vector, grown = vector / np.linalg.norm(vector), 0.0
+def exponent(session: LatticeSession, h: float, steps: int) -> float:
+    """The largest Lyapunov exponent, by a vector that the derivatives of all steps carry along.
+
+    ``session`` stands at the start. Raises `BackendError`.
+    """
+    vector, grown = np.random.default_rng(0).normal(size=(1, *session.state().shape)), 0.0
+    vector = vector / np.linalg.norm(vector)
     for done in range(0, steps, _CARRIED):
-        begin, ahead = t0 + done * h if solver.interface.time else None, min(_CARRIED, steps - done)
-        for state, carried in solver.tangents(x, h, ahead, vector, t0=begin, parameters=parameters):
-            x, vector = state, carried
+        vector = session.advance_tangent(h, vector, min(_CARRIED, steps - done))
         size = float(np.linalg.norm(vector))
         grown += float(np.log(size))
         vector = vector / size

@@ -43,6 +43,26 @@ def test_certificate_is_tied_to_spec_and_files(place):
     assert run("build", place / "t.yaml", "-o", place / "out", "--check").exit_code == 0
 
 
+CHAIN = """phigen: 1
+name: chain
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: "p**2/2 + (q[i+1] - q)**2/2 + q**4/4"
+targets: [numpy]
+runs: {a: {sizes: [8], initial: {q: i/8, p: 0}, step: 0.1, steps: 100}}
+"""
+
+
+def test_lattices_are_certified_with_their_poisson_identity(tmp_path):
+    (tmp_path / "chain.yaml").write_text(CHAIN, encoding="utf-8")
+    result = run("build", tmp_path / "chain.yaml", "-o", tmp_path, "--certify")
+    assert result.exit_code == 0, result.output
+    data = json.loads((tmp_path / "chain" / "chain.certificate.json").read_text(encoding="utf-8"))
+    checks = {c["name"]: c for c in data["verification"]["checks"]}
+    assert checks["Poisson identity on 3 sites"]["passed"]
+
+
 def test_what_falls_short_gets_none(place, monkeypatch):
     assert run("build", place / "t.yaml", "-o", place / "out", "--certify").exit_code == 0
     monkeypatch.setattr(verification, "DIFFERENCES", 0.0)

@@ -310,16 +310,20 @@ def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path
         specs.loads(CHAIN.replace("keep: [final", "keep: [crossings"))
 
 
-def test_exponents_of_lattices_are_the_growth_of_a_vector():
-    """Whatever length it gets on its way."""
+@pytest.mark.parametrize("noise", ["", "noise: {kick: {hamiltonian: x, amplitude: 0.3}}\n"], ids=["quiet", "noisy"])
+def test_exponents_of_lattices_are_the_growth_of_a_vector(noise):
+    """Whatever length it gets on its way, along the whole path of a noise."""
+    from phigen.runtime.interface import FIRST_DRAWS, Draws
     from phigen.sweeping.lattices import exponent
 
-    ring = CHAIN.partition("sweeps:")[0]
+    ring = CHAIN.partition("sweeps:")[0] + noise
     solver, rng = phigen.compile(specs.loads(ring + "tangent: true\n"), target="numpy"), np.random.default_rng(4)
     x, given = rng.normal(size=(3, 4)), {"B": rng.normal(size=4), "W": 1.0}
-    found = exponent(solver, x, 0.05, 130, 0.0, given)
+    draws = Draws(3) if noise else FIRST_DRAWS
+    session = solver.backend.start(x, solver.values(given, {}, (4,)), 0.0, draws)
+    found = exponent(session, 0.05, 130)
     vector, grown = np.random.default_rng(0).normal(size=(1, 3, 4)), 0.0
     start = np.linalg.norm(vector)
-    for _, carried in solver.tangents(x, 0.05, 130, vector, parameters=given):
+    for _, carried in solver.tangents(x, 0.05, 130, vector, parameters=given, **({"seed": 3} if noise else {})):
         grown = np.log(np.linalg.norm(carried) / start) / (130 * 0.05)
     assert found == pytest.approx(grown, rel=1e-12)
