@@ -30,18 +30,19 @@ from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
+from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
 from phigen.scheme.attitude import uniform
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
-from phigen.scheme.discretisation import discretise
+from phigen.scheme.discretisation import discretise, expect_affordable, is_large
 from phigen.scheme.gauge import Gauge, choose, given
 from phigen.scheme.logarithmic import composition_of, logarithmic_of
 from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
-from phigen.spec.model import Extras, Spec
+from phigen.spec.model import BirealisationChoice, Extras, Spec
 from phigen.splitting.forces import force_flows
 from phigen.splitting.parts import split
 
@@ -100,6 +101,10 @@ def examine(
         groups = clock.timed("proofs", lambda: statements.definedness(source, spec))
         if refuted(groups):
             return Examination(spec, groups, unexamined=f"the bracket, {UNEXAMINED}")
+        try:
+            realisation = _realised_early(spec, source, order, scheme, clock)
+        except LimitError as error:
+            return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.tensor(source))
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED)
@@ -109,7 +114,8 @@ def examine(
         if refuted(monitor):
             return Examination(spec, groups, unexamined="the method")
         try:
-            compilation = _compiled(spec, source, order, scheme, *spec.asked(extras, profile), clock)
+            asked = spec.asked(extras, profile)
+            compilation = _compiled(spec, source, order, scheme, *asked, clock, realisation)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.method(compilation))
@@ -181,21 +187,49 @@ def _examine_lattice(
     return Examination(spec, groups, compilation)
 
 
+def _realised_early(
+    spec: Spec, source: System, order: int | None, scheme: str | None, clock: _Clock
+) -> BiRealisation | None:
+    """The bi-realisation of a large system, of which nothing is proved yet. LimitError if it makes steps too large.
+
+    None where that cannot be known before the gauge is chosen, and where there is none: for which there may be reasons
+    that the proofs tell better.
+    """
+    as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
+    if (scheme or spec.scheme) == "splitting" or not as_it_is or not is_large(source):
+        return None
+    try:
+        realisation = clock.timed("bi-realisation", lambda: realise(source, _choice(spec, order)))
+    except SpecError:
+        return None
+    clock.timed("generating function", lambda: expect_affordable(source, realisation))
+    return realisation
+
+
+def _choice(spec: Spec, order: int | None) -> BirealisationChoice:
+    return replace(spec.birealisation, order=order) if order else spec.birealisation
+
+
 def _compiled(
-    spec: Spec, source: System, order: int | None, scheme: str | None, extras: Extras, profile: str, clock: _Clock
+    spec: Spec,
+    source: System,
+    order: int | None,
+    scheme: str | None,
+    extras: Extras,
+    profile: str,
+    clock: _Clock,
+    early: BiRealisation | None = None,
 ) -> Compilation:
-    """Compile a system, by the series or to a splitting."""
+    """Compile a system, by the series or to a splitting; ``early`` is what `_realised_early` has found."""
     described = _described(spec, extras, profile)
     if (scheme or spec.scheme) == "splitting":
         return _split(spec, source, order, described, clock)
-    choice = replace(spec.birealisation, order=order) if order else spec.birealisation
-    realisation = clock.timed("bi-realisation", lambda: realise(source, choice))
+    realisation = early or clock.timed("bi-realisation", lambda: realise(source, _choice(spec, order)))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
-    reached = clock.timed(
-        "generating function",
-        lambda: discretise(gauged.system, realisation, gauged.series, plan, spec.composition, gauged.gauge.monitor),
-    )
+    given_ = gauged.system, realisation, gauged.series, plan, spec.composition, gauged.gauge.monitor
+    affordable = early is not None and gauged.system is source
+    reached = clock.timed("generating function", lambda: discretise(*given_, affordable=affordable))
     group = group_of(source, spec.reconstruct, realisation.kind) if spec.reconstruct else None
     described |= {"solver": spec.solver, "group": group}
     program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))

@@ -12,9 +12,10 @@ import pytest
 from phigen import progress
 from phigen.compiler import compile_proved, compile_spec
 from phigen.errors import LimitError
+from phigen.proofs import statements
 from phigen.realisations import sampled
 from phigen.scheme import discretisation
-from phigen.scheme.estimate import OperationCount, TooManyError
+from phigen.scheme.estimate import OperationCount, TooManyError, path_operations
 from phigen.scheme.generating import collected_form, graph_form
 from phigen.scheme.lowering import cost
 from phigen.series.hamilton_jacobi import PolynomialSeries, polynomial_series
@@ -236,6 +237,30 @@ def test_a_step_whose_matrices_are_too_large_is_composed_or_refused_before_they_
     monkeypatch.setattr(discretisation, "generating_function", None)  # of this it is known before any S_i is computed
     with pytest.raises(LimitError, match="the matrices of a step"):
         compile_spec(loads(log_canonical(10).replace("hamiltonian: ", f"hamiltonian: {dense} + ")))
+
+
+def test_the_equations_of_a_path_are_counted_too(monkeypatch):
+    """They were made first, and then refused, where steps of order 2 would have done."""
+    text = spec(names(4), "lie_algebra: {name: gl(2)}", "+".join(f"{i}*x{i}**2" for i in range(1, 5)))
+    text, counted = loads(text + "birealisation: karasev\n"), []
+    monkeypatch.setattr(
+        discretisation, "path_operations", lambda *given: counted.append(path_operations(*given)) or counted[-1]
+    )
+    compilation = compile_spec(text)
+    true, direct = cost(compilation.program.step.generate.roots), compilation.scheme.generating
+    assert 0.3 * true < counted[-1] <= true
+    monkeypatch.setattr(discretisation, "MOST_OPERATIONS", counted[-1] - 1)
+    assert len(compile_spec(text).program.fractions) == 5
+    monkeypatch.setattr(discretisation, "generating_function", lambda *_: direct)  # which is not too large by itself
+    with pytest.raises(LimitError, match="the matrices of a step would take more"):
+        compile_spec(replace(text, composition="none"))
+
+
+def test_a_step_that_is_too_large_is_refused_before_anything_is_proved(monkeypatch):
+    monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 100)
+    monkeypatch.setattr(statements, "tensor", None)
+    with pytest.raises(LimitError, match="the matrices of a step would take more than 100 operations"):
+        compile_proved(loads(log_canonical(10)))
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -11,7 +11,7 @@ from phigen.geometry.system import System
 from phigen.realisations import karasev
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.composition import find, orders
-from phigen.scheme.estimate import newton_operations
+from phigen.scheme.estimate import SparseRow, may_have, newton_operations, path_operations
 from phigen.scheme.generating import GeneratingFunction, collected_form, forced_form, graph_form
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
@@ -114,17 +114,21 @@ def discretise(
     order: Order,
     composition: str,
     monitor: Expression | None = None,
+    *,
+    affordable: bool = False,
 ) -> Discretisation:
     """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
 
     ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
-    the stages of a composition, since its error constant is much smaller.
+    the stages of a composition, since its error constant is much smaller. ``affordable`` says that `expect_affordable`
+    has been asked.
     """
     if system.noise:
         expect_noise(system, realisation, order, composition)
     if system.forces:
         return _forced(system, realisation, series, order, composition, monitor)
-    _expect_affordable(system, realisation)
+    if not affordable:
+        expect_affordable(system, realisation)
     series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
@@ -205,13 +209,20 @@ def _composed(
     return Discretisation(_afforded(system, realisation, series, 1, monitor), 1, found.fractions, note)
 
 
-def _expect_affordable(system: System, realisation: BiRealisation) -> None:
+def is_large(system: System) -> bool:
+    """Whether `expect_affordable` may refuse it."""
+    return may_have(system.dimension, MOST_OPERATIONS)
+
+
+def expect_affordable(system: System, realisation: BiRealisation) -> None:
     """LimitError if already S_1 = H takes too much, before any other is computed."""
+    if not is_large(system):
+        return
     index = {c: i for i, c in enumerate(system.coordinates)}
     (slopes,) = sparse_derivatives([system.hamiltonian], system.coordinates)
     rows = dict(zip(slopes, sparse_derivatives(list(slopes.values()), system.coordinates), strict=True))
     hessian = [{index[d]: e for d, e in rows.get(c, {}).items()} for c in system.coordinates]
-    _expect(system, newton_operations(realisation, {c for c in index if c not in slopes}, hessian, MOST_OPERATIONS))
+    _expect_few(system, realisation, {c for c in index if c not in slopes}, hessian)
 
 
 def _afforded(
@@ -221,11 +232,17 @@ def _afforded(
     found = generating_function(system, series, terms, monitor)
     absent = {c for c, slope in zip(system.coordinates, found.slope, strict=True) if slope.is_zero}
     hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in found.hessian]
-    _expect(system, newton_operations(realisation, absent, hessian, MOST_OPERATIONS))
+    _expect_few(system, realisation, absent, hessian)
     return found
 
 
-def _expect(system: System, operations: int) -> None:
+def _expect_few(
+    system: System, realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow]
+) -> None:
+    if realisation.path:
+        operations = path_operations(system, hessian, MOST_OPERATIONS)
+    else:
+        operations = newton_operations(realisation, absent, hessian, MOST_OPERATIONS)
     if operations > MOST_OPERATIONS:
         raise too_large(system, f"the matrices of a step would take more than {MOST_OPERATIONS} operations")
 

@@ -9,10 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 
 from phigen import progress
+from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
 from phigen.symbolic.symbols import momentum
+
+#: Rows of a matrix that are looked at first.
+FIRST_ROWS = 8
 
 #: A row of a matrix, without zeros.
 SparseRow = Mapping[int, Expression]
@@ -28,21 +32,42 @@ def newton_operations(
     whose matrices cannot have so many, are not looked at.
     """
     names, momenta = realisation.coordinates, realisation.covector
-    if realisation.path or 4 * len(names) ** 3 <= most:
+    if realisation.path or not may_have(len(names), most):
         return 0
     both = [*realisation.displacement, *realisation.increment]
     if absent:
         both = substitute(both, {momentum(c): ZERO for c in absent})
-    rows = sparse_derivatives(both, momenta)
     index = {name: k for k, name in enumerate(momenta)}
-    left = [{index[p]: e for p, e in row.items()} for row in rows]
     state = {*names, *momenta}
     count = OperationCount(most, lambda name: name not in state)
+    left: list[SparseRow] = []
     try:
-        count.matrix(left, hessian)
+        while len(left) < len(both):  # more and more rows at once: of far too many, few are looked at
+            rows = sparse_derivatives(both[len(left) : 4 * len(left) + FIRST_ROWS], momenta)
+            new = [{index[p]: e for p, e in row.items()} for row in rows]
+            left += new
+            count.matrix(new, hessian)
+            own = cost([e for row in left for e in row.values()])
+            if count.operations + own > most:
+                return most + 1
     except TooManyError:
         return most + 1
-    return count.operations + cost([e for row in left for e in row.values()])
+    return count.operations + own
+
+
+def may_have(dimension: int, most: int) -> bool:
+    """Whether the matrices of a step may have more than so many operations, for all that the dimension says."""
+    return 4 * dimension**3 > most
+
+
+def path_operations(system: System, hessian: Sequence[SparseRow], most: int) -> int:
+    """Operations of Hess S_h · π, of which a step along paths has need; ``most`` + 1 if there are more."""
+    tensor = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in system.poisson]
+    count = OperationCount(most, lambda name: name not in system.coordinates)
+    try:
+        return count.matrix(hessian, tensor)
+    except TooManyError:
+        return most + 1
 
 
 class TooManyError(Exception):
@@ -96,8 +121,9 @@ class OperationCount:
         def visit(node: Expression, args: list[bool]) -> bool:
             return self._is_fixed(node.value) if node.op == "symbol" else all(args)
 
-        for e, fixed in zip(leaves, fold(leaves, visit), strict=True):
-            number = self._leaves.setdefault(id(e), -len(self._leaves) - 1)
+        new = list({id(e): e for e in leaves if id(e) not in self._leaves}.values())
+        for e, fixed in zip(new, fold(new, visit), strict=True):
+            number = self._leaves[id(e)] = -len(self._leaves) - 1
             if fixed:
                 self._fixed.add(number)
 

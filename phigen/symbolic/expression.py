@@ -353,17 +353,16 @@ def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list
     order: list[Expression] = []
     done: set[int] = set()
     for root in roots:
-        stack = [(root, False)]
+        stack = [root]
         while stack:
-            node, expanded = stack.pop()
+            node = stack[-1]
             if id(node) in done or (known and id(node) in known):
-                continue
-            if expanded:
-                done.add(id(node))
-                order.append(node)
+                stack.pop()
+            elif left := [a for a in node.args if id(a) not in done and not (known and id(a) in known)]:
+                stack += reversed(left)
             else:
-                stack.append((node, True))
-                stack.extend((a, False) for a in reversed(node.args) if id(a) not in done)
+                done.add(id(stack.pop()))
+                order.append(node)
     return order
 
 
@@ -483,8 +482,8 @@ def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> lis
         if any(slopes[id(a)] for a in node.args):
             for partial, a in zip(partials(node), node.args, strict=True):
                 for name, d in slopes[id(a)].items():
-                    term = partial * d
-                    found[name] = found[name] + term if name in found else term
+                    term = d if partial is ONE else mul(partial, d)  # as in sums, of which there are most
+                    found[name] = add(found[name], term) if name in found else term
         slopes[id(node)] = {name: d for name, d in found.items() if not d.is_zero}
     return [slopes[id(r)] for r in roots]
 
