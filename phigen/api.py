@@ -216,6 +216,7 @@ def interface_of(program: Program) -> Interface:
         first_open=sites.open[0],
         colour_period=sites.colours // math.gcd(sites.colours, sites.weights[0]),
         graph=bool(program.step.partners and program.step.partners.graph),
+        compensated=program.compensated,
         at_bonds=sites.at_bonds,
     )
 

@@ -22,10 +22,11 @@ from phigen import progress, registry
 from phigen.attitude.group import group_of
 from phigen.attitude.parts import by_angles
 from phigen.compilation import Compilation, NoSystem
-from phigen.errors import CheckError, LimitError, PhigenWarning, SpecError
+from phigen.errors import CheckError, Diagnostic, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
 from phigen.lattice.building import cell_from_spec, expect_coloured
 from phigen.lattice.cell import Cell
+from phigen.lattice.series import SeriesPlan
 from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
@@ -270,7 +271,11 @@ def _swept(
     asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
     asked |= {"order": order or spec.wanted_order, "extras": extras}
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec=spec, **asked))
-    described = _described(spec, extras, profile) | {"lanes": spec.solver.lanes}
+    compensated = spec.solver.compensated
+    if compensated and (isinstance(plan, SeriesPlan) or extras.adjoint):
+        message = "solver: compensated is for lattices whose H splits, without adjoint"
+        raise SpecError([Diagnostic(message, spec.locations.get(("solver",)))])
+    described = _described(spec, extras, profile) | {"lanes": spec.solver.lanes, "compensated": compensated}
     program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
     expect_coloured(spec, cell.axes, plan.colouring.periods(cell.boundary))
     nothing: Any = NoSystem(spec)

@@ -158,6 +158,7 @@ def build_sweeps(
     spec_sha256: str = "",
     profile: str = "fast",
     lanes: bool = True,
+    compensated: bool = False,
 ) -> Program:
     """The solver of a lattice as a program."""
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
@@ -222,6 +223,7 @@ def build_sweeps(
         fractions=plan.fractions if isinstance(plan, SeriesPlan) else (1.0,),
         extras=extras,
         lanes=lanes,
+        compensated=compensated,
         profile=profile,
     )
 

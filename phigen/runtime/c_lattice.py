@@ -107,6 +107,7 @@ class CLatticeSession:
         self._c, self._shape, self._before = functions, x0.shape, 0
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
+        self._kept = 2 if interface.compensated else 1
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
@@ -197,7 +198,8 @@ class CLatticeSession:
         """What `resume` goes on from with the same bits, beside the state."""
         if not hasattr(self._c, "saved"):
             return {}
-        x, far = np.empty(self._shape, self._real), np.zeros(1, dtype=np.uintp)
+        x = np.empty((self._kept * self._shape[0], *self._shape[1:]), self._real)
+        far = np.zeros(1, dtype=np.uintp)
         is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
         return {"before": x, "far": far} if is_open else {}
 

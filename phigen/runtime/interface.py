@@ -86,6 +86,7 @@ class LatticeInterface(Interface):
     first_open: bool = False  # whether the first axis has open ends
     colour_period: int = 1  # the first axis: after so many planes colours of sites are as before
     graph: bool = False
+    compensated: bool = False  # whether the C saves what rounding has left out of the fields
     at_bonds: tuple[str, ...] = ()
 
 

@@ -129,7 +129,7 @@ class Program:
     A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``time`` is the name of t,
     where H depends on it, ``pushed`` the Casimirs that forces change. ``extras`` are what was asked for beside it,
     ``lanes`` asks for C that does several steps or members at once, ``profile`` (``fast``, ``small``) says how much
-    it does for speed.
+    it does for speed. ``compensated`` asks for compensated sums over the steps of a lattice that splits.
     """
 
     name: str
@@ -152,6 +152,7 @@ class Program:
     extras: Extras = NO_EXTRAS
     lanes: bool = True
     profile: str = "fast"
+    compensated: bool = False
 
     @property
     def version(self) -> str:

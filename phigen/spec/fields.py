@@ -150,6 +150,7 @@ SOLVER = Record(
         Field("tolerance", Formula(), "auto, or the tolerance of the solve", default="auto"),
         Field("max_iterations", Integer(1, 1000), "iterations before a step fails", default=20),
         Field("lanes", Boolean(), "C: many steps, and ensembles, eight at a time; longer code", default=True),
+        Field("compensated", Boolean(), "C of lattices that split: less rounding, in more time", default=False),
     ),
 )
 LATTICE = Record(

@@ -148,12 +148,14 @@ class SolverOptions:
     """The inner solve: ``method`` auto or newton, ``tolerance`` None for auto.
 
     ``lanes``: whether C code takes steps, and members of ensembles, eight at a time. Without it is shorter, and slower.
+    ``compensated``: whether sums over the steps of lattices are compensated, in C.
     """
 
     method: str = "auto"
     tolerance: Fraction | None = None
     max_iterations: int = 20
     lanes: bool = True
+    compensated: bool = False
 
 
 @dataclass(frozen=True)

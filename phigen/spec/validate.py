@@ -343,5 +343,9 @@ def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:
         if tolerance is not None and not 0 < tolerance < 1:
             declared.reader.error(node, f"tolerance: {node.text} is not between 0 and 1")
     return SolverOptions(
-        given.get("method", "auto"), tolerance, given.get("max_iterations", 20), given.get("lanes", True)
+        given.get("method", "auto"),
+        tolerance,
+        given.get("max_iterations", 20),
+        given.get("lanes", True),
+        given.get("compensated", False),
     )

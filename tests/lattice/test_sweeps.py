@@ -388,6 +388,29 @@ def test_flows_that_are_made_at_once_make_the_steps_of_flow_after_flow(name: str
         assert np.array_equal(together, np.tile(alone, copies))
 
 
+def test_compensated_sums_keep_lengths_of_spins_and_the_bits_of_runs_in_pieces() -> None:
+    text = f"phigen: 1\nname: rounding\norder: 2\nsolver: {{compensated: true}}\n{TEXTS['xxz']}"
+    found, x = lattice_solver_of(compile_spec(specs.loads(text)), "c"), start("xxz", (64,))
+    whole = found.integrate(x, 0.05, 50_000, 25_000).x
+    worst = np.abs(np.linalg.norm(whole, axis=1) - np.linalg.norm(x, axis=0)).max()
+    plain = solver("xxz", 2, "c").integrate(x, 0.05, 50_000, 50_000).x[-1]
+    assert worst < 8e-15 < np.abs(np.linalg.norm(plain, axis=0) - np.linalg.norm(x, axis=0)).max()
+    session = found.session(x)
+    session.step(0.05, 25_000)
+    other = session.copy()
+    other.step(0.05, 25_000)
+    assert np.array_equal(session.x, whole[1])
+    assert np.array_equal(other.x, whole[2])
+    np.testing.assert_allclose(found.step(x, 0.05), solver("xxz", 2).step(x, 0.05), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("asked", ["scheme: series", "adjoint: true"])
+def test_sums_that_cannot_be_compensated_are_refused(asked: str) -> None:
+    text = f"phigen: 1\nname: rounding\n{asked}\nsolver: {{compensated: true}}\n{TEXTS['xxz']}"
+    with pytest.raises(SpecError, match=r"spec.yaml:4.*compensated is for lattices whose H splits, without adjoint"):
+        compile_spec(specs.loads(text, "spec.yaml"))
+
+
 def test_frames_go_to_files(tmp_path: Any) -> None:
     x, found = start("fput"), solver("fput", target="c")
     plain = found.integrate(x, 0.1, 10, 4)

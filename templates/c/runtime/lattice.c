@@ -82,6 +82,9 @@ enum {
         ) * PHI_DIM,
 #endif
     PHI_RESERVED = PHI_ARRAYS + PHI_DIM
+#if PHI_COMPENSATED
+        + 2 * PHI_DIM
+#endif
 #if PHI_GATHER
         + PHI_GATHERED
 #endif
@@ -257,6 +260,15 @@ static int phi_finite(const double *values, size_t count)
     return finite;
 }
 
+#if PHI_COMPENSATED
+/* Go on as if rounding had left out nothing. */
+static void phi_forget(phi_solver *s)
+{
+    for (size_t k = 0; k < PHI_DIM; ++k) memset(s->carry[k] - PHI_LEAD, 0, s->rows * (size_t)s->width * sizeof *s->carry[k]);
+    s->open = 0;
+}
+
+#endif
 #if PHI_GRAPH
 #if PHI_TIMED
 phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[PHI_AXES], const phi_bonds *bonds,
@@ -345,6 +357,10 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     phi_place_middle(s, aligned + (PHI_RESERVED - PHI_IMPLICIT) * block, block);
 #endif
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
+#if PHI_COMPENSATED
+    for (size_t k = 0; k < 2 * PHI_DIM; ++k) s->carry[k] = aligned + (PHI_RESERVED - 2 * PHI_DIM + k) * block;
+    phi_forget(s);
+#endif
 #if PHI_SITE_PARAMETERS
     phi_put_parameters(s, &own);
 #endif
@@ -414,6 +430,11 @@ static void phi_copy(double *const to[PHI_DIM], double *const from[PHI_DIM], con
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < PHI_DIM; ++k) memcpy(to[k] - PHI_LEAD, from[k] - PHI_LEAD, block);
+#if PHI_COMPENSATED
+    const size_t into = to == s->before ? PHI_DIM : 0; /* one of them is x, the other one before */
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        memcpy(s->carry[into + k] - PHI_LEAD, s->carry[PHI_DIM - into + k] - PHI_LEAD, block);
+#endif
 }
 
 #if PHI_TANGENT
@@ -459,7 +480,9 @@ static phi_status phi_move(phi_solver *s, const double *x, double kept)
             }
             phi_ends(row, s->length, 0, s->length);
         }
-#if !PHI_SERIES
+#if PHI_COMPENSATED
+    phi_forget(s);
+#elif !PHI_SERIES
     s->open = 0;
 #endif
     return PHI_OK;
@@ -482,6 +505,9 @@ phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, ch
 int phi_saved(const phi_solver *s, double *x, size_t *far)
 {
     if (s->open) phi_take(s, s->before, x);
+#if PHI_COMPENSATED
+    if (s->open) phi_take(s, s->carry + PHI_DIM, x + PHI_DIM * s->sites);
+#endif
     *far = s->far;
     return s->open;
 }
@@ -491,6 +517,9 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
     const phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || !phi_finite(x, PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->before[k], x + k * s->sites);
+#if PHI_COMPENSATED
+    for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->carry[PHI_DIM + k], x + (PHI_DIM + k) * s->sites);
+#endif
     s->open = 1;
     s->far = far;
     return PHI_OK;

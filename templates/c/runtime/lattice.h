@@ -37,6 +37,9 @@ typedef struct {
     double *before[PHI_DIM];  /* the fields before the steps that are being made */
 #else
     double *before[PHI_DIM];  /* the fields before the steps that are being made */
+#if PHI_COMPENSATED
+    double *carry[2 * PHI_DIM]; /* what rounding has left out of the fields, and of those before */
+#endif
     int open;                 /* whether these lack the last flow of a step, which between calls x has made */
     size_t far;               /* steps to be made by functions for large arguments, where there are others */
 #if PHI_BY_HAND && PHI_ONE_ROW
@@ -190,8 +193,13 @@ phi_status phi_kick(phi_solver *s, const double *change);
 #endif
 #if !PHI_SERIES
 
+#if PHI_COMPENSATED
+/* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after
+   phi_init at the state: all fields, then what rounding has left out of each. */
+#else
 /* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after
    phi_init at the state. */
+#endif
 int phi_saved(const phi_solver *s, double *x, size_t *far);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far);
 #endif

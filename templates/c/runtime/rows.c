@@ -23,6 +23,9 @@ typedef struct {
 #if PHI_GATHER
     double *const *gathered;      /* see phi_solver */
 #endif
+#if PHI_COMPENSATED
+    double *const *carry;         /* see phi_solver */
+#endif
 #if PHI_ADJOINT
     double *const *bar, *const *handed; /* see phi_transpose */
 #endif
@@ -116,6 +119,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 #if PHI_GATHER
     row->gathered = s->gathered;
+#endif
+#if PHI_COMPENSATED
+    row->carry = s->carry;
 #endif
 #if PHI_ADJOINT
     row->bar = row->handed = NULL;

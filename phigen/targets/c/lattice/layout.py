@@ -124,8 +124,9 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SERIES": step.equation is not None,
         "BANDED": banded,
         "KRYLOV": step.equation is not None and (not banded or program.extras.tangent),
-        "BY_HAND": step.is_by_hand and program.offers("by-hand"),
+        "BY_HAND": step.is_by_hand and program.offers("by-hand") and not program.compensated,
         "WAVES": waves(program, step),
+        "COMPENSATED": program.compensated,
         "SHARED": program.profile == "fast"
         or bool(step.equation or step.adjoint or program.extras.tangent or program.noise),
         "ONE_ROW": len(step.sites.axes) == 1,

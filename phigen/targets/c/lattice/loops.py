@@ -97,6 +97,12 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
         arrays = {f: f"row->varied[{program.coordinates.index(f)}]" for f in pointers}
         head += [f"    double *{pointer} = {arrays[f]} + row->at[0];" for f, pointer in pointers.items()]
         body += [f"{pointers[f]}[i] += {value};" for f, value in stores]
+    elif program.compensated:
+        for k, (f, value) in enumerate(stores):
+            carry, field = names.scope[Symbol("carry", f)], f"{names.pointer(f, 0)}[i]"
+            head.append(f"    double *{carry} = row->carry[{program.coordinates.index(f)}] + row->at[0];")
+            body += [f"const double add{k} = {carry}[i] + {value}, sum{k} = {field} + add{k};"]
+            body += [f"{carry}[i] = add{k} - (sum{k} - {field});", f"{field} = sum{k};"]
     else:
         body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
     colours = layout.step.sites.colours

@@ -35,7 +35,9 @@ class SiteNames:
     ) -> None:
         self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
-        self.scope = Scope(C_RESERVED | _OWN | called | {"change0", "change1", "change2"})
+        self.scope = Scope(
+            C_RESERVED | _OWN | called | {*(f"{word}{k}" for word in ("change", "add", "sum") for k in range(3))}
+        )
         self.show = printer(self.scope, calls)
         self._here = here
         self._pointers: dict[tuple[str, int], str] = {}
