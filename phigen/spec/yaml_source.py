@@ -29,20 +29,25 @@ class Node:
 class Scalar(Node):
     """Text as YAML delivers it; ``offset`` says how far its first character is from the location, if fixed.
 
-    ``offset`` is ``None`` when characters of the text do not correspond one to one to columns of a line
-    (block scalars, several lines, escapes).
+    ``offset`` is ``None`` when characters of the text do not correspond one to one to columns of a line. Of a text over
+    several lines ``places`` are the lines and columns of its characters but for blanks, and of what follows; they are
+    unknown where there are escapes.
     """
 
     text: str
     plain: bool
     offset: int | None
+    places: tuple[tuple[int, int], ...] = ()
 
     def at(self, index: int) -> Location:
         """The place of a character of the text, or of the scalar where that is unknown."""
-        if self.offset is None:
-            return self.location
         here = self.location
-        return Location(here.line, here.column + self.offset + index, here.file)
+        if self.offset is not None:
+            return Location(here.line, here.column + self.offset + index, here.file)
+        if not self.places:
+            return here
+        line, column = self.places[sum(not c.isspace() for c in self.text[:index])]
+        return Location(line, column, here.file)
 
     @property
     def is_null(self) -> bool:
@@ -242,7 +247,9 @@ class _Builder:
         if self.count > limits.YAML_NODES:
             raise self.problems.stop(f"more than {limits.YAML_NODES} YAML values", place, limit=True)
         if kind == "ScalarEvent":
-            self.attach(Scalar(place, event.value, event.style is None, self.offset(event)))
+            offset = self.offset(event)
+            places = self.places(event) if offset is None else ()
+            self.attach(Scalar(place, event.value, event.style is None, offset, places))
             return
         if len(self.stack) >= limits.YAML_DEPTH:
             raise self.problems.stop(f"YAML nested deeper than {limits.YAML_DEPTH} levels", place, limit=True)
@@ -255,6 +262,29 @@ class _Builder:
         if raw == event.value:
             return 0
         return 1 if raw[:1] in ("'", '"') and raw[1:-1] == event.value else None
+
+    def places(self, event: Any) -> tuple[tuple[int, int], ...]:
+        """Of a text over several lines the place of each character but for blanks, and that of its end.
+
+        Folding changes blanks only; where other characters differ, there are escapes, and nothing is known.
+        """
+        start, end = event.start_mark.index, event.end_mark.index
+        wanted = [c for c in event.value if not c.isspace()]
+        if event.style in ("|", ">"):  # what stands beside the sign is about the text
+            start = self.text.find("\n", start, end)
+        elif event.style:
+            start += 1
+        found: list[tuple[int, int]] = []
+        line, column = event.start_mark.line + 1, start - self.text.rfind("\n", 0, start)
+        for k in range(start, end):
+            if not self.text[k].isspace():
+                if len(found) == len(wanted) or self.text[k] != wanted[len(found)]:
+                    break
+                found.append((line, column))
+            line, column = (line + 1, 1) if self.text[k] == "\n" else (line, column + 1)
+        if not found or len(found) < len(wanted):
+            return ()
+        return (*found, (found[-1][0], found[-1][1] + 1))
 
     def attach(self, node: Node) -> None:
         """Put a node into the innermost open collection."""
