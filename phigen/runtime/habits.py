@@ -58,6 +58,12 @@ class OdeResult:
         return self.status >= 0
 
 
+#: Arguments of SciPy's that have no place here.
+_SCIPY = {"method": "it is that of the solver; order= changes its order", "jac": "the solver has its derivatives"}
+_SCIPY |= {"args": "parameters are keyword arguments", "vectorized": "there is no function to call"}
+_SCIPY |= dict.fromkeys(["max_step", "first_step", "min_step"], "steps have one size, h=")
+
+
 def solve_ivp(
     system: System | Solver | str | PathLike[str],
     t_span: Sequence[float],
@@ -82,6 +88,8 @@ def solve_ivp(
     step that fails, and tolerances that are not reached, as by chaotic motion over long times, are told by ``status``.
     """
     solver = system if isinstance(system, Solver) else _compiled(system, target, order)
+    for name in sorted(_SCIPY.keys() & more.keys() - {*solver.interface.parameters}):
+        raise TypeError(f"solve_ivp has no {name!r} here: {_SCIPY[name]}")
     begin, end = map(float, t_span)
     if not (math.isfinite(begin) and math.isfinite(end)) or begin == end:
         raise ValueError(f"t_span must be two different numbers, not {t_span!r}")
