@@ -338,6 +338,18 @@ def test_so4_has_the_attitude_of_the_whole_motion():
     assert np.abs(found.attitude[-1].ravel() - exact).max() < 1e-11
 
 
+def test_what_casimirs_turn_keeps_a_matrix_orthogonal_for_a_long_time():
+    """A uniform motion over all of it, by doubling a short one: so is what rounding takes from orthogonality."""
+
+    def excess(g):
+        return np.abs(g.reshape(-1, 4, 4) @ np.swapaxes(g.reshape(-1, 4, 4), 1, 2) - np.eye(4)).max()
+
+    x0 = np.random.default_rng(4).normal(size=(1, 6))
+    rate = np.append(x0, np.sum(x0**2))[None]
+    assert excess(solver("so(4)").backend.module._uniform(rate, 1e5)) < 5e-15
+    assert excess(solver("so(4)", "c").integrate(x0[0], 0.1, 50_000, 10_000).attitude) < 5e-15
+
+
 def momenta_in_space(found):
     return np.einsum("rij,rj->ri", rotation(found.attitude), found.x)
 

@@ -20,6 +20,24 @@ static void phi_matrix_product(const double a[PHI_ELEMENT], const double b[PHI_E
         }
 }
 
+#if PHI_NORMALISE
+/* Bring a matrix that is nearly orthogonal nearer to that: G (G^T G - 1)/2 is taken from it. */
+static void phi_normalise(const double g[PHI_ELEMENT], double carry[PHI_ELEMENT])
+{
+    enum { N = PHI_ROWS_OF_ATTITUDE };
+    double excess[PHI_ELEMENT];
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j) {
+            double sum = i == j ? -1.0 : 0.0;
+            for (int k = 0; k < N; ++k) sum += g[k * N + i] * g[k * N + j];
+            excess[i * N + j] = 0.5 * sum;
+        }
+    for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j)
+            for (int k = 0; k < N; ++k) carry[i * N + j] -= g[i * N + k] * excess[k * N + j];
+}
+
+#endif
 #if PHI_EXPONENTIAL
 enum { PHI_SIZE = PHI_COVECTOR - 1 }; /* where a covector tells a bound for the square of its size */
 
@@ -32,6 +50,9 @@ static int phi_doublings(double square)
 }
 
 /* exp(P) - 1: that of P/2^k, doubled k times. */
+#if PHI_NORMALISE
+/* Rounding doubles as well: what it takes from orthogonality is put back each time. */
+#endif
 static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[PHI_ELEMENT])
 {
     double small[PHI_COVECTOR], square[PHI_ELEMENT];
@@ -45,6 +66,11 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     for (; doublings > 0; --doublings) {
         phi_matrix_product(element, element, square);
         for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + square[i];
+#if PHI_NORMALISE
+        memcpy(square, element, sizeof square);
+        for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) square[i] += 1.0;
+        phi_normalise(square, element);
+#endif
     }
 }
 
@@ -64,24 +90,6 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     p[PHI_SIZE] = t * t * rate[PHI_SIZE];
     phi_matrix_exponential(p, element);
     for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) element[i] += 1.0;
-}
-
-#endif
-#if PHI_NORMALISE
-/* Bring a matrix that is nearly orthogonal nearer to that: G (G^T G - 1)/2 is taken from it. */
-static void phi_normalise(const double g[PHI_ELEMENT], double carry[PHI_ELEMENT])
-{
-    enum { N = PHI_ROWS_OF_ATTITUDE };
-    double excess[PHI_ELEMENT];
-    for (int i = 0; i < N; ++i)
-        for (int j = 0; j < N; ++j) {
-            double sum = i == j ? -1.0 : 0.0;
-            for (int k = 0; k < N; ++k) sum += g[k * N + i] * g[k * N + j];
-            excess[i * N + j] = 0.5 * sum;
-        }
-    for (int i = 0; i < N; ++i)
-        for (int j = 0; j < N; ++j)
-            for (int k = 0; k < N; ++k) carry[i * N + j] -= g[i * N + k] * excess[k * N + j];
 }
 
 #endif

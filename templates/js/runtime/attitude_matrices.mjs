@@ -30,6 +30,11 @@ export function fromCovector(covector, element) {
   for (; doublings > 0; doublings--) {
     matrixProduct(element, element, squared);
     for (let i = 0; i < ELEMENT; i++) element[i] = 2 * element[i] + squared[i];
+    // #if NORMALISE
+    squared.set(element); // rounding doubles as well: what it takes from orthogonality is put back
+    for (let i = 0; i < ELEMENT; i += ROWS + 1) squared[i] += 1;
+    normalise(squared, element);
+    // #endif
   }
 }
 
