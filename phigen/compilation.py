@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from phigen.geometry.system import System, system_of_lattice
-from phigen.lattice.cell import Cell
-from phigen.lattice.series import SeriesPlan
-from phigen.lattice.sweeps import LatticePlan
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
 from phigen.scheme.gauge import Gauge, Gauged
@@ -19,6 +16,10 @@ from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Spec
 from phigen.splitting.parts import Splitting
 from phigen.symbolic.expression import Expression
+
+if TYPE_CHECKING:
+    from phigen.lattice.cell import Cell
+    from phigen.lattice.sweeps import LatticePlan
 
 
 class NoSystem:
@@ -74,9 +75,13 @@ class Compilation:
         """The kind of the method, for every place that names it to the user."""
         if self.realisation:
             return self.realisation.label
+        if self.sweeps is None:
+            return "splitting"
+        from phigen.lattice.series import SeriesPlan
+
         if isinstance(self.sweeps, SeriesPlan):
             return f"{self.sweeps.realisation.kind}, on a lattice"
-        return "splitting of a lattice" if self.cell else "splitting"
+        return "splitting of a lattice"
 
     @property
     def exact(self) -> bool:

@@ -16,24 +16,17 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from phigen import progress, registry
-from phigen.attitude.group import group_of
-from phigen.attitude.parts import by_angles
 from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, Diagnostic, LimitError, PhigenWarning, SpecError
 from phigen.geometry.system import System, system_from_spec
-from phigen.lattice.building import cell_from_spec, expect_coloured
-from phigen.lattice.cell import Cell
-from phigen.lattice.series import SeriesPlan
-from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
 from phigen.realisations.catalogue import realise
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.assemble import build_program
-from phigen.scheme.attitude import uniform
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise, expect_affordable, is_large
@@ -47,7 +40,14 @@ from phigen.spec.model import BirealisationChoice, Extras, Spec
 from phigen.splitting.forces import force_flows
 from phigen.splitting.parts import split
 
+if TYPE_CHECKING:
+    from phigen.attitude.group import Group
+    from phigen.lattice.cell import Cell
+
 T = TypeVar("T")
+
+#: Lattices of so many sites are worth a warning where they are typed out.
+SITES = 8
 
 
 def compile_spec(
@@ -68,6 +68,8 @@ def compile_spec(
     """
     clock = _Clock()
     if spec.lattice:
+        from phigen.lattice.building import cell_from_spec
+
         with bounded(spec):
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
             return _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
@@ -155,11 +157,11 @@ def emit(program: Program, target: str, command: str, *, single_file: bool = Fal
 
 def _tell_of_lattice(spec: Spec) -> None:
     """A warning for a lattice that is typed out, before it takes the time that one of any size would not."""
-    from phigen.lattice.recognition import SITES, written_out
-
     if spec.dimension < SITES:
         return
-    found = written_out(spec)
+    from phigen.lattice.recognition import written_out
+
+    found = written_out(spec, least=SITES)
     if found is not None and found.lattice is not None:
         sites = spec.dimension // len(found.coordinates)
         message = f"{spec.name} is a lattice of {sites} like sites, written out"
@@ -172,19 +174,22 @@ def _examine_lattice(
     spec: Spec, order: int | None, scheme: str | None, extras: Extras | None, profile: str | None, clock: _Clock
 ) -> Examination:
     """Prove what can be proved about a lattice, for all sizes at once."""
+    from phigen.lattice.building import cell_from_spec
+    from phigen.proofs import lattices
+
     with bounded(spec), progress.stage(spec.name):
         try:
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
         except SpecError as error:
             raise located(error, spec) from None
-        groups = clock.timed("proofs", lambda: statements.lattice(cell))
+        groups = clock.timed("proofs", lambda: lattices.lattice(cell))
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED if len(groups) == 1 else "")
         try:
             compilation = _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
-        groups = groups | clock.timed("proofs", lambda: statements.sweeps(compilation))
+        groups = groups | clock.timed("proofs", lambda: lattices.sweeps(compilation))
     return Examination(spec, groups, compilation)
 
 
@@ -231,7 +236,7 @@ def _compiled(
     given_ = gauged.system, realisation, gauged.series, plan, spec.composition, gauged.gauge.monitor
     affordable = early is not None and gauged.system is source
     reached = clock.timed("generating function", lambda: discretise(*given_, affordable=affordable))
-    group = group_of(source, spec.reconstruct, realisation.kind) if spec.reconstruct else None
+    group = _group(spec, source, realisation.kind)
     described |= {"solver": spec.solver, "group": group}
     program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))
     return Compilation(
@@ -255,8 +260,11 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
             else plan_splitting(discretised, parts, wanted, spec.composition)
         ),
     )
-    group = group_of(source, spec.reconstruct, "exponential") if spec.reconstruct else None
+    group = _group(spec, source, "exponential")
     if group:
+        from phigen.attitude.parts import by_angles
+        from phigen.scheme.attitude import uniform
+
         flows = by_angles(discretised, group, choice.splitting.flows, put_back=uniform(source))
         choice = replace(choice, splitting=replace(choice.splitting, flows=flows))
     described = {**described, "lanes": spec.solver.lanes, "monitor": monitor, "group": group}
@@ -268,6 +276,10 @@ def _swept(
     spec: Spec, cell: Cell, order: int | None, scheme: str | None, extras: Extras, profile: str, clock: _Clock
 ) -> Compilation:
     """Compile a lattice, of any sizes, to sweeps over its sites."""
+    from phigen.lattice.building import expect_coloured
+    from phigen.lattice.series import SeriesPlan
+    from phigen.lattice.sweeps import build_sweeps, plan_sweeps
+
     asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
     asked |= {"order": order or spec.wanted_order, "extras": extras}
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec=spec, **asked))
@@ -280,6 +292,15 @@ def _swept(
     expect_coloured(spec, cell.axes, plan.colouring.periods(cell.boundary))
     nothing: Any = NoSystem(spec)
     return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
+
+
+def _group(spec: Spec, source: System, kind: str) -> Group | None:
+    """The group whose element steps are the action of, where the spec asks for it."""
+    if not spec.reconstruct:
+        return None
+    from phigen.attitude.group import group_of
+
+    return group_of(source, spec.reconstruct, kind)
 
 
 def _described(spec: Spec, extras: Extras, profile: str) -> dict[str, Any]:

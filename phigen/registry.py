@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from importlib import import_module
 from typing import TYPE_CHECKING, cast
 
@@ -80,6 +79,8 @@ def find(name: str) -> Target:
     """The target of that name. Raises `ValueError` with a hint if there is none."""
     if name not in TARGETS:
         listed = {word: t.name for t in _LISTED for word in (t.name, t.title.lower())}
+        from difflib import get_close_matches
+
         near = get_close_matches(name.lower(), listed, 1)
         hint = f"did you mean {listed[near[0]]!r}?" if near else f"there are {', '.join(TARGETS)}"
         raise ValueError(f"unknown target {name!r}; {hint}")

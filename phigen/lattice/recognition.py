@@ -30,8 +30,6 @@ from phigen.symbolic.neighbours import Neighbours
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import decide_zero
 
-#: Lattices of so many sites are worth a warning.
-SITES = 8
 #: Axes have at least so many sites: fewer may look alike by chance.
 LEAST = 4
 
@@ -55,7 +53,7 @@ class _Names:
     point: dict[str, float] = field(default_factory=dict)
 
 
-def written_out(spec: Spec, least: int = SITES) -> Spec | None:
+def written_out(spec: Spec, least: int) -> Spec | None:
     """The lattice that an ordinary spec is, if it is one of at least so many sites; None for matrices that fit not."""
     if not any(prod(_sizes(names)) >= least for names in _readings(spec.coordinates)):
         return None

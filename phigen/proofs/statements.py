@@ -11,11 +11,6 @@ from phigen.geometry.definedness import undefined_parts, undefined_starts
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.positivity import positivity
 from phigen.geometry.system import System
-from phigen.lattice import acting, flow_proofs, series_proofs
-from phigen.lattice import proofs as of_lattices
-from phigen.lattice.cell import Cell
-from phigen.lattice.series import SeriesPlan
-from phigen.proofs import attitude
 from phigen.realisations import axioms
 from phigen.scheme.noise import noise_flows
 from phigen.series.hamilton_jacobi import residual
@@ -74,35 +69,17 @@ def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
     return found | ({INVARIANTS: invariants} if invariants else {})
 
 
-def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
-    """What `tensor` and `integrals` say, of a lattice of any size."""
-    groups = {"Poisson tensor": of_lattices.tensor(cell)}
-    if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
-        return groups
-    found = {
-        CASIMIRS: tuple(of_lattices.casimirs(cell)),
-        FORCES: tuple(acting.force_statements(cell)),
-        NOISE: tuple(acting.noise_statements(cell)),
-        INVARIANTS: tuple(of_lattices.invariants(cell)),
-        "Hamiltonian": tuple(of_lattices.pair_symmetry(cell)),
-    }
-    return groups | {group: listed for group, listed in found.items() if listed}
-
-
-def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
-    """The parts of H of a lattice and their flows, or its bi-realisation and the equation of a stage."""
-    cell, plan = compilation.cell, compilation.sweeps
-    if cell is None or plan is None:
+def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
+    if compilation.program.attitude is None:
         return {}
-    if isinstance(plan, SeriesPlan):
-        return {f"{METHOD} ({plan.realisation.kind})": tuple(series_proofs.check(cell, plan))}
-    return {SPLITTING: tuple(flow_proofs.check(cell, plan))}
+    from phigen.proofs import attitude
+
+    return {ATTITUDE: tuple(attitude.check(compilation))}
 
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     """The flows of a splitting; or the axioms of the bi-realisation and the Hamilton–Jacobi equation."""
-    turned = tuple(attitude.check(compilation))
-    last = {ATTITUDE: turned} if turned else {}
+    last = _attitude(compilation)
     if compilation.splitting:
         flows = zip((s.name for s in compilation.system.noise), noise_flows(compilation.system), strict=True)
         return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting, list(flows)))} | last

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from phigen.attitude.group import Group
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.system import System
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.adjoint import adjoint_path, completed, explicit_adjoint, level_adjoint, newton_adjoint
-from phigen.scheme.attitude import expect_element, stage_attitude
 from phigen.scheme.discretisation import MOST_OPERATIONS, Discretisation, too_large
 from phigen.scheme.forces import acts, force_facts
 from phigen.scheme.gauge import Gauge, Gauged, free_gauge
@@ -41,6 +40,9 @@ from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
 from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
 from phigen.symbolic.symbols import STEP
 
+if TYPE_CHECKING:
+    from phigen.attitude.group import Group
+
 #: Largest dimension in which paths are followed in lanes. In five and six their derivatives cost what lanes save:
 #: measured, blocks take 0.6 to 1.9 times as long as single steps.
 MOST_IN_LANES = 4
@@ -66,6 +68,8 @@ def build_program(
     solver = solver or SolverOptions()
     gauge, attitude = gauged.gauge, None
     if group:
+        from phigen.scheme.attitude import expect_element, stage_attitude
+
         expect_element(system, realisation)
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
     lanes = solver.lanes and extras.offers("lanes", profile)

@@ -10,13 +10,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import accumulate, pairwise
+from typing import TYPE_CHECKING
 
 from phigen._version import __version__
-from phigen.attitude.group import Group
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.steps import Step
 from phigen.spec.model import NO_EXTRAS, Extras, Parameter
 from phigen.symbolic.symbols import LEVEL
+
+if TYPE_CHECKING:
+    from phigen.attitude.group import Group
 
 
 @dataclass(frozen=True)

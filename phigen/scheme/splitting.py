@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
-from phigen.attitude.group import Group
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, explicit_adjoint, level_adjoint
-from phigen.scheme.attitude import flow_attitude
 from phigen.scheme.choosing import Choice
 from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
 from phigen.scheme.forces import force_facts
@@ -28,6 +27,9 @@ from phigen.spec.model import NO_EXTRAS, Extras
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.symbols import LEVEL
+
+if TYPE_CHECKING:
+    from phigen.attitude.group import Group
 
 
 def build_splitting(
@@ -62,6 +64,8 @@ def build_splitting(
     )
     attitude, time_of = None, monitor.time if monitor else None
     if group:
+        from phigen.scheme.attitude import flow_attitude
+
         moved = [monitor.outputs(flow) if monitor else flow.increment for flow in every]
         attitude = flow_attitude(system, group, splitting.flows, moved, gauge, coefficients, time_of)
     inputs = {"t": system.times, "dw": system.increments[:1]}

@@ -22,7 +22,7 @@ from phigen.geometry.system import system_from_spec
 from phigen.lattice.expansion import Expansion, expand
 from phigen.lattice.observing import BALANCE, CHANGE, errors_of
 from phigen.lattice.states import Start
-from phigen.proofs import statements
+from phigen.proofs import lattices
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
@@ -149,7 +149,7 @@ def test_covectors_and_noise_keep_the_casimirs_of_every_site(name: str) -> None:
 def test_what_is_claimed_is_proved(name: str) -> None:
     made = compiled(name)
     assert made.cell is not None
-    groups = statements.lattice(made.cell) | statements.sweeps(made)
+    groups = lattices.lattice(made.cell) | lattices.sweeps(made)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
     titles = [s.name for s in groups.get("Noise", ())]
     stationary = [t for t in titles if t.startswith("the density exp(−H/θ) on the leaves is stationary, with θ = T")]

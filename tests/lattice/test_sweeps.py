@@ -20,7 +20,7 @@ from phigen.compiler import compile_spec, emit
 from phigen.errors import SpecError, StepError
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.expansion import Expansion, expand
-from phigen.proofs import statements
+from phigen.proofs import lattices, statements
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.modules import load_module
 from phigen.spec.model import BirealisationChoice
@@ -544,7 +544,7 @@ def test_disorder_by_a_formula_has_to_be_given() -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_methods_are_proved(name: str) -> None:
     compilation = compiled(name)
-    ((group, found),) = statements.sweeps(compilation).items()
+    ((group, found),) = lattices.sweeps(compilation).items()
     if name in SERIES:
         assert len(found) == 7
     else:
@@ -561,5 +561,5 @@ def test_a_wrong_flow_is_refuted() -> None:
     wrong = {f: -e if f == "y" else e for f, e in motion.solution.items()}
     flows = (replace(first, motions=(replace(motion, solution=wrong),)), *others)
     broken = replace(plan, choice=replace(plan.choice, splitting=replace(plan.choice.splitting, flows=flows)))
-    verdicts = [s.verdict for s in statements.sweeps(replace(compilation, sweeps=broken))[statements.SPLITTING]]
+    verdicts = [s.verdict for s in lattices.sweeps(replace(compilation, sweeps=broken))[statements.SPLITTING]]
     assert verdicts == [PROVED, REFUTED, PROVED, PROVED]

@@ -19,7 +19,7 @@ from phigen.lattice.balance import Power, integral
 from phigen.lattice.expansion import expand
 from phigen.lattice.observing import BALANCE, errors_of
 from phigen.lattice.states import Start
-from phigen.proofs import statements
+from phigen.proofs import lattices
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.spec.model import Extras, Spec
@@ -171,7 +171,7 @@ def test_integrals_along_steps_are_those_of_polynomials() -> None:
 def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
     made = compiled(name)
     assert made.cell is not None
-    groups = statements.lattice(made.cell) | statements.sweeps(made)
+    groups = lattices.lattice(made.cell) | lattices.sweeps(made)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
 
 

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
-from phigen.scheme.attitude import SIZE_OF_COVECTOR
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
@@ -24,10 +23,6 @@ from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import function, members, printer
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.lanes import remembered
-from phigen.targets.c.lattice import adjoint as lattice_adjoint
-from phigen.targets.c.lattice import layout as lattice_layout
-from phigen.targets.c.lattice import model as lattice_model
-from phigen.targets.c.lattice.parts import sweeps
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
@@ -82,6 +77,11 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
     has = switches(program, lanes)
     if not isinstance(program.step, Sweeps):
         return Amalgam(program.name, has, printed(program, lanes, has)), "solver.h", "runtime.c"
+    from phigen.targets.c.lattice import adjoint as lattice_adjoint
+    from phigen.targets.c.lattice import layout as lattice_layout
+    from phigen.targets.c.lattice import model as lattice_model
+    from phigen.targets.c.lattice.parts import sweeps
+
     assert isinstance(lanes, Rows)
     step = program.step
     has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {"NEAR": bool(lanes.near)}
@@ -188,6 +188,8 @@ def _of_noise(noise: Noise) -> Sizes:
 
 
 def _of_attitude(attitude: Attitude) -> Sizes:
+    from phigen.scheme.attitude import SIZE_OF_COVECTOR
+
     group, rate = attitude.group, attitude.rate
     rows = len(group.matrices[0]) if group.matrices else 0
     shown = f"numbers of an attitude, a matrix of {rows} rows" if rows else "numbers of an attitude, a quaternion"

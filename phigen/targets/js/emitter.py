@@ -14,7 +14,6 @@ from phigen.scheme.program import BOUND, Attitude, Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import special
 from phigen.targets.header import CHECKSUM, checksum, header_lines
-from phigen.targets.js import lattice
 from phigen.targets.js.functions import definitions
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
@@ -57,6 +56,8 @@ def expect_offered(program: Program) -> None:
 
 def _lattice(program: Program, step: Sweeps) -> str:
     """The body of the module of a lattice."""
+    from phigen.targets.js import lattice
+
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
     pieces = [lattice.tables(program, step), *early, *_functions(program)]
     model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))

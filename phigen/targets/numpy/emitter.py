@@ -31,7 +31,6 @@ from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
 from phigen.targets.names import Scope
-from phigen.targets.numpy import lattice
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.path import Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
@@ -75,6 +74,8 @@ def emit(program: Program, command: str) -> dict[str, str]:
 def _body(program: Program) -> str:
     """The module without its header."""
     if isinstance(program.step, Sweeps):
+        from phigen.targets.numpy import lattice
+
         early = [
             program.step.prepare,
             program.step.refresh,

@@ -1,0 +1,35 @@
+"""What is stated of a lattice of any size, and of the method that was compiled for it."""
+
+from __future__ import annotations
+
+from phigen.compilation import Compilation
+from phigen.lattice import acting, flow_proofs, proofs, series_proofs
+from phigen.lattice.cell import Cell
+from phigen.lattice.series import SeriesPlan
+from phigen.proofs.statements import CASIMIRS, FORCES, INVARIANTS, METHOD, NOISE, SPLITTING
+from phigen.symbolic.verdict import REFUTED, Statement
+
+
+def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
+    """What `tensor` and `integrals` say, of a lattice of any size."""
+    groups = {"Poisson tensor": proofs.tensor(cell)}
+    if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
+        return groups
+    found = {
+        CASIMIRS: tuple(proofs.casimirs(cell)),
+        FORCES: tuple(acting.force_statements(cell)),
+        NOISE: tuple(acting.noise_statements(cell)),
+        INVARIANTS: tuple(proofs.invariants(cell)),
+        "Hamiltonian": tuple(proofs.pair_symmetry(cell)),
+    }
+    return groups | {group: listed for group, listed in found.items() if listed}
+
+
+def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
+    """The parts of H of a lattice and their flows, or its bi-realisation and the equation of a stage."""
+    cell, plan = compilation.cell, compilation.sweeps
+    if cell is None or plan is None:
+        return {}
+    if isinstance(plan, SeriesPlan):
+        return {f"{METHOD} ({plan.realisation.kind})": tuple(series_proofs.check(cell, plan))}
+    return {SPLITTING: tuple(flow_proofs.check(cell, plan))}
