@@ -9,7 +9,7 @@ import click
 
 from phigen.cli.console import Console, heading, out, out_json, pass_console, verbosity
 from phigen.cli.failures import Collector
-from phigen.cli.sources import ORDER, load_all, many_specs, scheme_option
+from phigen.cli.sources import ORDER, load_all, many_specs, order_option, scheme_option
 from phigen.errors import CheckError, SpecError
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
 
 @click.command("check")
 @many_specs
-@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@order_option
 @scheme_option
 @click.option("--independent", is_flag=True, help="Derive the S_i, α and β a second time, by sympy, and compare.")
 @click.option("--terms", metavar="K", type=ORDER, help="With --independent: S_1 … S_K, instead of those of the method.")

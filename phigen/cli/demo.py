@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, loaded, prepared
-from phigen.registry import LOADABLE
+from phigen.cli.sources import target_option
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -27,7 +27,7 @@ _ROWS_AT = (0.1, 0.2, 0.24, 0.25, 0.254, 0.255)
 
 
 @click.command("demo")
-@click.option("-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True)
+@target_option
 @verbosity
 @pass_console
 def command(console: Console, target: str) -> None:

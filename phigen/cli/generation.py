@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from phigen import resources
-from phigen.cli.sources import CORRECTIONS, ORDER, scheme_option
+from phigen.cli.sources import CORRECTIONS, order_option, scheme_option
 from phigen.registry import TARGETS
 from phigen.spec.names import PARTS, PROFILES, REALS
 
@@ -104,7 +104,7 @@ def output_options(command: F) -> F:
         ),
         click.option("--single-file", is_flag=True, help="C in one file, NAME.c, without a header."),
         scheme_option,
-        click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's."),
+        order_option,
         click.option(
             "-t",
             "--target",

@@ -9,7 +9,7 @@ import click
 
 from phigen.cli.console import Console, out_document, pass_console, verbosity
 from phigen.cli.experiment import prepared
-from phigen.cli.sources import ORDER, expect_writable, load_one, one_spec, run_option, scheme_option
+from phigen.cli.sources import expect_writable, load_one, one_spec, order_option, run_option, scheme_option
 from phigen.errors import CheckError
 from phigen.writing import write
 
@@ -18,7 +18,7 @@ from phigen.writing import write
 @one_spec
 @click.option("-o", "--output", metavar="FILE", help="Where to write the page; - is stdout.  [default: NAME.html]")
 @run_option
-@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@order_option
 @scheme_option
 @click.option("--lyapunov", is_flag=True, help="Lyapunov exponents of the run as well.")
 @click.option("--quick", is_flag=True, help="Fewer steps, fewer repetitions.")

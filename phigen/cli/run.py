@@ -12,8 +12,18 @@ from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.lattice_run import changed, expect_no, run_lattice
 from phigen.cli.run_summary import described_run, finite, print_summary
-from phigen.cli.sources import FIGURES, FILMS, ORDER, file_ending, load_one, one_spec, run_option, scheme_option
-from phigen.registry import LOADABLE
+from phigen.cli.sources import (
+    FIGURES,
+    FILMS,
+    file_ending,
+    load_one,
+    one_spec,
+    order_option,
+    run_option,
+    scheme_option,
+    settings_option,
+    target_option,
+)
 
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
@@ -26,8 +36,8 @@ _TABLES = (".csv", ".npz")
 @click.command("run")
 @one_spec
 @run_option
-@click.option("-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True)
-@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@target_option
+@order_option
 @scheme_option
 @click.option("--step", metavar="H", type=float, help="Step size, instead of the run's.")
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
@@ -39,7 +49,7 @@ _TABLES = (".csv", ".npz")
 @click.option("--from", "source", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Start at the last state of another run: FILE.csv or FILE.npz.")  # fmt: skip
 @click.option("--extend", is_flag=True, help="Go on beyond the end of the finished run in the file of --output.")
-@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
+@settings_option
 @click.option(
     "-o", "--output", metavar="FILE", callback=file_ending(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."
 )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import heading, out, out_document, out_json, verbosity
-from phigen.cli.sources import CORRECTIONS, ORDER, load_one, one_spec, scheme_option
+from phigen.cli.sources import CORRECTIONS, load_one, one_spec, order_option, scheme_option
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @click.command("show")
 @one_spec
-@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@order_option
 @scheme_option
 @click.option("--full", is_flag=True, help="All terms of long formulas.")
 @click.option(

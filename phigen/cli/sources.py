@@ -13,6 +13,7 @@ from phigen import resources
 from phigen.cli.completion import runs, specs
 from phigen.cli.failures import Collector
 from phigen.errors import Diagnostic, SpecError
+from phigen.registry import LOADABLE
 from phigen.spec import limits
 from phigen.spec.names import SCHEMES
 
@@ -31,6 +32,17 @@ ORDER = click.IntRange(1, limits.ORDER)
 
 #: The type of ``--modified``.
 CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
+
+order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+
+#: What runs are made with.
+target_option = click.option(
+    "-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True
+)
+
+settings_option = click.option(
+    "--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate."
+)
 
 #: How the one-step map is made, instead of the spec's way.
 scheme_option = click.option(

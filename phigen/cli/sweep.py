@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.sources import FIGURES, ORDER, file_ending, load_one, one_spec, scheme_option
-from phigen.registry import LOADABLE
+from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, order_option, scheme_option, target_option
 
 if TYPE_CHECKING:
     from phigen.spec.model import Spec, Sweep
@@ -25,8 +24,8 @@ if TYPE_CHECKING:
 @click.option(
     "--workers", metavar="N", type=click.IntRange(min=1), help="So many processes.  [default: one on each core]"
 )
-@click.option("-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True)
-@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@target_option
+@order_option
 @scheme_option
 @click.option(
     "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the map: FILE.png, FILE.svg or FILE.pdf."

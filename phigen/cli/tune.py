@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import prepared, run_of
-from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option
+from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option, settings_option
 from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
 from phigen.errors import CheckError, SpecError
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     help="Error of the energy on the way, or distance from a reference solution.",
 )  # fmt: skip
 @click.option("--horizon", type=float, metavar="T", help="How long a run is.  [default: as in the spec]")
-@click.option("--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate.")
+@settings_option
 @click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to search.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw error against time: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip

@@ -13,7 +13,7 @@ import click
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, expect_system, prepared
 from phigen.cli.failures import Collector
-from phigen.cli.sources import FIGURES, ORDER, file_ending, load_all, many_specs, run_option, scheme_option
+from phigen.cli.sources import FIGURES, file_ending, load_all, many_specs, order_option, run_option, scheme_option
 from phigen.errors import CheckError, StepError
 from phigen.registry import loadable
 
@@ -29,7 +29,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @click.command("verify")
 @many_specs
 @run_option
-@click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+@order_option
 @scheme_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
