@@ -192,7 +192,7 @@ def test_what_lasts_counts_how_much_of_it_is_done(monkeypatch):
     assert counted >= {
         *(f"S_{i}" for i in (1, 2, 3)),
         *(f"Hessian of the {form}" for form in ("graph", "polynomial")),
-        *("Newton matrix", "operations of the Newton matrix", "derivatives of α and β", "expressions"),
+        *("Newton matrix", "operations of the Newton matrix", "derivatives of α and β", "expressions", "Casimirs"),
     }
     within = {outer.name for now in stages.values() for outer in now[:-1] if now[-1].total}
     assert within >= {"proofs", "bi-realisation", "generating function", "program"}

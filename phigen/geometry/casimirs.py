@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from fractions import Fraction
 
+from phigen import progress
 from phigen.geometry.field import Field, Scalar
 from phigen.geometry.forms import structure
 from phigen.geometry.linear import coprime_integers, kernel
@@ -47,16 +48,18 @@ def found_casimirs(
     found: list[Expression] = []
     notes: list[str] = []
     if missing > 0:
-        for candidate in _candidates(coordinates, poisson, shape, form, notes):
-            slope = gradient(candidate, coordinates)
-            ranks = generic_ranks([[*slopes, slope]])
-            if ranks is None or ranks[0] <= known:
-                continue
-            slopes, known = [*slopes, slope], ranks[0]
-            found.append(candidate)
-            if len(found) == missing:
-                notes = []
-                break
+        with progress.stage("Casimirs", missing) as running:
+            for candidate in _candidates(coordinates, poisson, shape, form, notes):
+                slope = gradient(candidate, coordinates)
+                ranks = generic_ranks([[*slopes, slope]])
+                if ranks is None or ranks[0] <= known:
+                    continue
+                slopes, known = [*slopes, slope], ranks[0]
+                found.append(candidate)
+                running.done = len(found)
+                if len(found) == missing:
+                    notes = []
+                    break
     names = (f"C{i}" for i in range(1, len(found) + len(taken) + 1) if f"C{i}" not in taken)
     return dict(zip(names, found, strict=False)), tuple(notes)
 

@@ -41,7 +41,7 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
             found.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         except DomainError:
             continue
-        if len(found) == POINTS:
+        if len(found) == POINTS or not names:  # numbers are the same at all points
             break
     return [max(ranks) for ranks in zip(*found, strict=True)] if found else None
 

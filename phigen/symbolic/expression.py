@@ -353,7 +353,7 @@ def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list
     order: list[Expression] = []
     done: set[int] = set()
     for root in roots:
-        stack = [root]
+        stack = [] if id(root) in done else [root]
         while stack:
             node = stack[-1]
             if id(node) in done or (known and id(node) in known):

@@ -2,7 +2,8 @@
 
 from fractions import Fraction
 
-from phigen.geometry.rank import PRIMES, generic_ranks
+from phigen.geometry import rank
+from phigen.geometry.rank import POINTS, PRIMES, generic_ranks
 from phigen.symbolic.expression import ONE, ZERO, call, number, sqrt, symbol
 from phigen.symbolic.verdict import sample_point
 
@@ -33,3 +34,13 @@ def test_neither_multiples_of_a_prime_nor_denominators_with_it_lower_the_rank():
     for prime in PRIMES:
         assert generic_ranks([[[number(prime), ZERO], [ZERO, x / prime]]]) == [2]
     assert generic_ranks([[[number(Fraction(1, PRIMES[0] * PRIMES[1]))]]]) is None
+
+
+def test_numbers_are_looked_at_once(monkeypatch):
+    """As the gradients of linear Casimirs are, of which large algebras have hundreds."""
+    points = []
+    monkeypatch.setattr(rank, "sample_point", lambda *given: points.append(1) or sample_point(*given))
+    for entry, times in ((ONE, 1), (x, POINTS)):
+        points.clear()
+        assert generic_ranks([[[entry]]]) == [1]
+        assert len(points) == times
