@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import json
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -12,7 +11,8 @@ from typing import Any
 import mpmath
 import numpy as np
 from many_digits import precisely
-from tools import run, tool, write
+from node import asked
+from tools import write
 
 from phigen.api import interface_of
 from phigen.compilation import Compilation
@@ -78,9 +78,8 @@ def javascript(compilation: Compilation, options: str, statements: str, value: s
     (text,) = files(compilation, "js").values()
     with tempfile.TemporaryDirectory() as folder:
         write(Path(folder), {"solver.mjs": text})
-        code = f"import {{ Solver }} from './solver.mjs'; const s = new Solver({{ {options} }}); {statements};"
-        code += f"console.log(JSON.stringify({value}))"
-        return json.loads(run([tool("node"), "--input-type=module", "-e", code], Path(folder)))
+        code = f"const s = new module.Solver({{ {options} }}); {statements}; return ({value})"
+        return asked(Path(folder) / "solver.mjs", code)
 
 
 class RawC:

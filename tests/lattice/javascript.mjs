@@ -1,6 +1,4 @@
-// What solvers of lattices say: reads jobs from the file named first, writes one answer for each to stdout, as JSON.
-
-import { readFileSync } from "node:fs";
+// What solvers of lattices say: one answer for each job, as JSON.
 
 function attempted(work) {
   try {
@@ -37,6 +35,9 @@ async function answer({ module, options, h, steps, vectors }) {
   };
 }
 
-const answers = [];
-for (const job of JSON.parse(readFileSync(process.argv[2], "utf8"))) answers.push(await answer(job));
-process.stdout.write(JSON.stringify(answers, (_, value) => (Number.isNaN(value) ? "NaN" : value)));
+/** The answers to jobs, as JSON in which NaN has its name. */
+export async function answers(jobs) {
+  const found = [];
+  for (const job of jobs) found.push(await answer(job));
+  return JSON.stringify(found, (_, value) => (Number.isNaN(value) ? "NaN" : value));
+}

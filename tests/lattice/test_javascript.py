@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -14,7 +12,7 @@ import numpy as np
 import pytest
 from lattice import test_acting, test_tangents, test_time
 from lattice.lattices import LATTICES
-from tools import tool
+from node import answers as answers_of
 
 from phigen import resources
 from phigen import spec as specs
@@ -116,13 +114,9 @@ def job(folder: Path, case: str, **more: Any) -> dict[str, Any]:
     return {"module": path.as_uri(), "options": {**options, **more}, "h": h, "steps": STEPS}
 
 
-def node(folder: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """The answers of one process."""
-    (folder / "jobs.json").write_text(json.dumps(jobs), encoding="utf-8")
-    command = [tool("node"), str(Path(__file__).with_name("javascript.mjs")), str(folder / "jobs.json")]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr
-    return list(json.loads(done.stdout))
+def node(jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The answers to jobs."""
+    return answers_of(Path(__file__).with_name("javascript.mjs"), jobs)
 
 
 @pytest.fixture(scope="module")
@@ -210,7 +204,7 @@ def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[st
         path.write_text(*emit(compilation.program, "js", "phigen").values(), encoding="utf-8")
         given = {"module": path.as_uri(), "options": options | draws, "h": h, "steps": 0}
         jobs.append({**given, "vectors": vectors.reshape(2, -1).tolist()})
-    answers = node(folder, jobs)
+    answers = node(jobs)
     return {case: (a, *e) for case, a, e in zip(CARRYING, answers, expected, strict=True)}
 
 

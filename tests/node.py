@@ -1,0 +1,61 @@
+"""JavaScript, run by Node: one process of it, started once, answers all tests of a worker."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from functools import cache
+from pathlib import Path
+from threading import Timer
+from typing import Any
+
+from tools import tool
+
+_SECONDS = 300.0
+
+#: Reads modules and what to do with them, a line each, and writes the answers.
+_SERVER = """
+import { createInterface } from 'node:readline'
+const Work = (async () => {}).constructor
+for await (const line of createInterface({ input: process.stdin })) {
+  const { module, body } = JSON.parse(line)
+  let answer
+  try {
+    answer = { value: await new Work('module', `'use strict'; ${body}`)(await import(module)) ?? null }
+  } catch (error) {
+    answer = { error: String(error.stack ?? error) }
+  }
+  console.log(JSON.stringify(answer))
+}
+"""
+
+
+def asked(module: Path, body: str) -> Any:
+    """What the body of a function returns that has ``module``; the test fails if it throws."""
+    process = _started(tool("node"))
+    late = Timer(_SECONDS, process.kill)
+    late.start()
+    try:
+        process.stdin.write(json.dumps({"module": module.as_uri(), "body": body}) + "\n")  # type: ignore[union-attr]
+        process.stdin.flush()  # type: ignore[union-attr]
+        line = process.stdout.readline()  # type: ignore[union-attr]
+    finally:
+        late.cancel()
+    if not line:
+        _started.cache_clear()
+        raise AssertionError(f"node ended, or had no answer after {_SECONDS:g} s: {body[:200]}")
+    answer = json.loads(line)
+    assert "error" not in answer, answer["error"]
+    return answer["value"]
+
+
+@cache
+def _started(program: str) -> subprocess.Popen[str]:
+    """Ends by itself, once nobody can ask it any more."""
+    command = [program, "--input-type=module", "-e", _SERVER]
+    return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+
+def answers(script: Path, jobs: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What the ``answers`` of a script say of jobs, NaN by its name."""
+    return list(json.loads(asked(script, f"return module.answers(JSON.parse({json.dumps(json.dumps(jobs))}))")))
