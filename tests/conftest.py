@@ -24,6 +24,7 @@ def pytest_configure(config):
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
     config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")
     config.addinivalue_line("markers", "corpus: of the systems of the corpus, those beside `systems.QUICK` are slow")
+    config.addinivalue_line("markers", "few(*cases, of): of the cases `of`, those beside the named ones are slow")
 
 
 def pytest_collection_modifyitems(config, items):
@@ -36,10 +37,10 @@ def pytest_collection_modifyitems(config, items):
 
 
 def _is_slow(item):
-    if item.get_closest_marker("corpus") and hasattr(item, "callspec"):
-        systems = {value for value in item.callspec.params.values() if isinstance(value, str) and value in NAMES}
-        return item.get_closest_marker("slow") or systems - {*QUICK}
-    return item.get_closest_marker("slow")
+    given = {v for v in item.callspec.params.values() if isinstance(v, str)} if hasattr(item, "callspec") else set()
+    thinned = [(QUICK, NAMES)] if item.get_closest_marker("corpus") else []
+    thinned += [(mark.args, mark.kwargs["of"]) for mark in item.iter_markers("few")]
+    return item.get_closest_marker("slow") or any(given & {*of} - {*few} for few, of in thinned)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -61,26 +62,28 @@ def pytest_xdist_make_scheduler(config, log):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def compiled_solvers(tmp_path_factory):
+def compiled_solvers(request, tmp_path_factory):
     """Compiled C is shared by all tests and workers of one session, and not left in the cache of the user.
 
-    Every solver that a test compiles must compile without a warning. Compilers take a quarter of the time with -Og;
-    tests of what -O3 makes of loops ask for it themselves, those of the corpus by `as_users_compile`.
+    Every solver that a test compiles must compile without a warning. Compilers take a sixth of the time with -O0 that
+    they take with -O3, a quarter with -Og, which warns of more; tests of what -O3 makes of loops ask for it themselves,
+    those of the corpus by `as_users_compile`.
     """
+    how = "-Og" if request.config.option.all else "-O0"
     base = tmp_path_factory.getbasetemp()
     shared = (base.parent if base.name.startswith("popen-") else base) / "solvers"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHIGEN_CACHE_DIR", str(shared))
-        patch.setattr(toolchain, "BASE_FLAGS", (*_optimised("-Og"), *WARNINGS))
+        patch.setattr(toolchain, "BASE_FLAGS", (*_optimised(how), *WARNINGS))
         yield shared
 
 
 @pytest.fixture(scope="module")
 def as_users_compile(request, compiled_solvers):
     """With --all, C is compiled with the flags users get: where the C of the whole corpus is what is tested."""
+    flags = _optimised("-O3") if request.config.option.all else (*_optimised("-Og"), *WARNINGS)
     with pytest.MonkeyPatch.context() as patch:
-        if request.config.option.all:
-            patch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
+        patch.setattr(toolchain, "BASE_FLAGS", flags)
         yield
 
 

@@ -274,9 +274,14 @@ def test_a_step_that_is_too_large_is_refused_before_anything_is_proved(monkeypat
             "compiled",
             200,
             id="an order that only a composition reaches",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
-            spec(*SPACE, f"({'+'.join(names(10))})**60"), "compiled", 200, id="a power that cannot be expanded"
+            spec(*SPACE, f"({'+'.join(names(10))})**60"),
+            "compiled",
+            200,
+            id="a power that cannot be expanded",
+            marks=pytest.mark.slow,
         ),
         pytest.param(
             spec(names(15), "lie_algebra: {name: so(6)}", "x1**2")
@@ -284,10 +289,19 @@ def test_a_step_that_is_too_large_is_refused_before_anything_is_proved(monkeypat
             "compiled",
             200,
             id="a Casimir that cannot be expanded",
+            marks=pytest.mark.slow,
         ),
-        pytest.param(spec(names(9), nambu(9), "x1**2 + x2*x3"), "compiled", 100, id="minors of large matrices"),
+        pytest.param(
+            spec(names(9), nambu(9), "x1**2 + x2*x3"),
+            "compiled",
+            100,
+            id="minors of large matrices",
+            marks=pytest.mark.slow,
+        ),
         pytest.param(algebra("so(8)", 28), "compiled", 200, id="an algebra whose adjoint traces mislead"),
-        pytest.param(fput(32) + "scheme: splitting\n", "compiled", 50, id="a lattice, by splitting"),
+        pytest.param(
+            fput(32) + "scheme: splitting\n", "compiled", 50, id="a lattice, by splitting", marks=pytest.mark.slow
+        ),
         pytest.param(algebra("so(7)", 21), "compiled", 50, id="Casimirs with very many terms"),
         pytest.param(triangular(10), "3: ", 100, id="an inverse with very many terms"),
     ],

@@ -65,6 +65,7 @@ def test_tables_are_those_of_the_measurement():
         assert click.unstyle("\n".join(lines_of([entry]))) in text, entry["figure"]
 
 
+@pytest.mark.slow
 def test_page_can_be_followed(tmp_path):
     assert follow(DOCS / "paper.md", tmp_path) == 5
 

@@ -54,6 +54,7 @@ def test_c_example_prints_what_the_readme_says(workshop):
     assert workshop("./main") == block("What `./main` prints")
 
 
+@pytest.mark.slow
 def test_python_example_prints_what_the_readme_says(workshop):
     assert workshop(sys.executable, "example.py") == block("What it prints")
 

@@ -13,6 +13,8 @@ from tools import tool
 
 import phigen
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parent.parent
 
 

@@ -10,6 +10,7 @@ pytest.importorskip("matplotlib")
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 
 
+@pytest.mark.slow
 def test_tutorial_can_be_followed(tmp_path):
     assert follow(DOCS / "tutorial.md", tmp_path) == 15
     committed, drawn = DOCS / "figures" / "tutorial.svg", tmp_path / "rattleback.svg"

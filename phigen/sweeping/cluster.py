@@ -18,6 +18,9 @@ TRIES = 4
 #: Chunks that are submitted at a time for each thread of the workers.
 _AHEAD = 4
 
+#: How long a scheduler has to answer.
+PATIENCE = "10s"
+
 #: Told how many members were made, and how many of these failed.
 Tell = Callable[[int, int], None]
 
@@ -34,7 +37,7 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[tuple[Any,
     distributed, dask = imported("distributed"), imported("dask")
     if scheduler is not None:
         try:
-            client = distributed.Client(scheduler, timeout="10s")
+            client = distributed.Client(scheduler, timeout=PATIENCE)
         except (OSError, ValueError, TimeoutError) as error:
             raise SweepError(f"no scheduler answers at {scheduler}: {error}") from None
         with contextlib.closing(client):

@@ -69,6 +69,18 @@ CASES = {
     "heisenberg(1)": algebra("heisenberg(1)", "plus", 3, "reconstruct: matrix", "scheme: series"),
     "su(2) along paths": algebra("su(2)", "minus", 3, "reconstruct: matrix", "birealisation: karasev"),
 }
+pytestmark = pytest.mark.few(
+    "body",
+    "body by Cayley",
+    "body along paths",
+    "body with a given gauge",
+    "body, split",
+    "momenta in space",
+    "top",
+    "so(4)",
+    "so(3) by matrices",
+    of=CASES,
+)
 
 
 @cache

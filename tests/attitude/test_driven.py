@@ -32,6 +32,7 @@ CASES = {
     "split and pushed": SPLIT + "forces: {vector: {z: 0.4 - 0.2*z, y: -0.1*y}}\n",
     "shaken": BODY + NOISE,
 }
+pytestmark = pytest.mark.few("pushed", "damped, along paths", "monitored by log", "shaken", "split in time", of=CASES)
 #: Those of which order 4 is measured too.
 HIGHER = ("pushed", "pushed and monitored", "monitored", "monitored by log", "split in time")
 START, SPAN = [0.5, 0.8, -0.4], 2.0

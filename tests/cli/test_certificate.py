@@ -63,6 +63,7 @@ def test_lattices_are_certified_with_their_poisson_identity(tmp_path):
     assert checks["Poisson identity on 3 sites"]["passed"]
 
 
+@pytest.mark.slow
 def test_what_falls_short_gets_none(place, monkeypatch):
     assert run("build", place / "t.yaml", "-o", place / "out", "--certify").exit_code == 0
     monkeypatch.setattr(verification, "DIFFERENCES", 0.0)

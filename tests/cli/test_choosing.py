@@ -68,6 +68,7 @@ def test_steps_for_one_accuracy(row):
     assert 0.3 < energy_error("rigid_body", kind, order, step, gauge) / 1e-8 < 3
 
 
+@pytest.mark.slow
 def test_commands_work(phigen, in_tmp):
     commands = re.findall(r"(?m)^phigen (tune tumbler.yaml .*)$", TEXT)
     assert len(commands) == 2

@@ -78,17 +78,17 @@ def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
 
 
 def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
-    run = ("run", *EVERYTHING, "--steps", 1500, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
+    run = ("run", *EVERYTHING, "--steps", 600, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
     whole = phigen(*run)
     assert json.loads(whole.stdout)["section"]["crossings"] > 1
     names = ("a.npz", "s.csv", "f.svg")
     expected = files(*names)
     for name in names:
         Path(name).unlink()
-    with interrupted(15, steps=77):
+    with interrupted(5, steps=77):
         assert phigen(*run).exit_code == 130
     with np.load("a.npz") as stored:  # what there is can be read
-        assert 10 < len(stored["t"]) < 140
+        assert 10 < len(stored["t"]) < 300
     assert len(Path("s.csv").read_text().splitlines()) > 1
     done = phigen(*run, "--resume")
     assert files(*names) == expected
@@ -109,7 +109,7 @@ main()
 KILLS = [(signal.SIGKILL, -9), (signal.SIGINT, 130)]
 
 
-@pytest.mark.parametrize(("number", "code"), slow_but(KILLS[:1], KILLS))
+@pytest.mark.parametrize(("number", "code"), slow_but([], KILLS))
 def test_a_killed_run_goes_on_to_the_same_bytes(phigen, in_tmp, number, code):
     run = ["run", SPECS / "pendulum_euler.yaml", "--steps", 60_000, "-t", "numpy", "-o", "a.csv"]
     command = [sys.executable, "-c", KILLED, *map(str, run)]
@@ -238,7 +238,7 @@ def test_folders_that_are_not_there_are_told_before_the_work(phigen, in_tmp, com
     assert "there is no folder 'lost'" in done.stderr
 
 
-@pytest.mark.parametrize("suffix", ["png", "svg", "pdf"])
+@pytest.mark.parametrize("suffix", slow_but(["svg"], ["png", "svg", "pdf"]))
 def test_the_same_run_is_drawn_with_the_same_bytes(phigen, write, suffix):
     path = write("a.yaml")
     for name in ("one", "two"):

@@ -54,6 +54,16 @@ KINDS = {
     "kicks, time": (DRIVEN + "scheme: splitting\norder: 4\n" + SHORT, Splitting),
     "splitting, monitor": (FALLING + "monitor: log\norder: 4\n" + SHORT, Splitting),
 }
+pytestmark = pytest.mark.few(
+    "newton",
+    "newton, gauge",
+    "newton, force",
+    "explicit, time",
+    "path",
+    "splitting, time",
+    "splitting, monitor",
+    of=KINDS,
+)
 H, STEPS = 0.11, 5
 
 

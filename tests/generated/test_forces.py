@@ -73,6 +73,7 @@ tangent: true
         [0.4, 0.5, 0.6],
     ),
 }
+pytestmark = pytest.mark.few("damped", "vector", "populations", "split", "path", of=SYSTEMS)
 
 
 @cache

@@ -53,7 +53,7 @@ def exercise(compilation, folder, optimisation, ulps, far):
 @pytest.mark.parametrize("name", FAR)
 def test_members_of_splittings_equal_single_trajectories_bit_for_bit(name, tmp_path):
     """Where arguments are small and products are not fused; else to round-off."""
-    exercise(compiled(name, 4, "splitting"), tmp_path, "-O1", 0, FAR[name])
+    exercise(compiled(name, 4, "splitting"), tmp_path, "-O0", 0, FAR[name])
 
 
 @pytest.mark.parametrize("name", slow_but(["kepler"], ["spin_chain5", "kepler"]))
@@ -66,10 +66,10 @@ def test_members_of_explicit_steps_equal_single_trajectories(kind, tmp_path):
     text, ulps = EXPLICIT[kind]
     compilation = compile_text(text + RUN)
     assert isinstance(compilation.program.step, Explicit)
-    exercise(compilation, tmp_path, "-O1", ulps, 1)
+    exercise(compilation, tmp_path, "-O0", ulps, 1)
 
 
-@pytest.mark.parametrize("name", ["kepler", "toda3_quadratic"])
+@pytest.mark.parametrize("name", slow_but(["toda3_quadratic"], ["kepler", "toda3_quadratic"]))
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 def test_packs_compile_without_a_warning_where_loops_cannot_be_vectorised(name, compiler, tmp_path):
     """Not even by -Wpass-failed of clang, which forgets where a loop was when OpenMP moves it into another function."""
@@ -148,7 +148,7 @@ def test_threads_change_no_bit(name, tmp_path):
     write(tmp_path, {"main.c": THREADS.format(name=name, state=state, h=at.h)})
     printed = []
     for flags in ([], ["-fopenmp"]):
-        run([tool("gcc"), "-std=c99", "-O2", *flags, "main.c", "-o", "main", "-lm"], tmp_path)
+        run([tool("gcc"), "-std=c99", "-O0", *flags, "main.c", "-o", "main", "-lm"], tmp_path)
         printed.append(run([tmp_path / "main"], tmp_path, OMP_NUM_THREADS="3"))
     assert printed[0] == printed[1]
     assert printed[0].splitlines()[0] == "4"
@@ -168,7 +168,7 @@ def test_what_lanes_cannot_compute_is_not_taken_for_infinite(scheme):
 VECTORS = list(product(["gcc", "clang"], ["henon_heiles", "spin_chain5", "volterra5"]))
 
 
-@pytest.mark.parametrize(("compiler", "name"), slow_but([v for v in VECTORS if v[1] != "spin_chain5"], VECTORS))
+@pytest.mark.parametrize(("compiler", "name"), slow_but([v for v in VECTORS if v[1] == "henon_heiles"], VECTORS))
 def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
     """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013."""
     write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))

@@ -2,12 +2,13 @@
 
 from dataclasses import replace
 from functools import cache
+from itertools import product
 
 import numpy as np
 import pytest
 import sympy
 from scipy.integrate import solve_ivp
-from support import COMMAND, RawC, compile_text, compiled, files, javascript, solver
+from support import COMMAND, RawC, compile_text, compiled, files, javascript, slow_but, small, solver
 
 import phigen
 from phigen import spec
@@ -72,6 +73,10 @@ tangent: true
 """
 DRIVEN = SPIN.replace("m1*cos(t) + m2*sin(t) + 0.4*m3*t", "m1**2*cos(t)/2 + m2**2*sin(t)/3 + m3**2*exp(-t)/4")
 
+#: Those whose code with lanes further tests use.
+QUICKLY = ("newton", "newton, non-linear π", "newton, log-canonical", "path", "newton, composed",
+           "splitting, time by itself")  # fmt: skip
+
 STARTS = {PENDULUM: [1.0, 0.0], BODY: [0.6, 0.5, 0.7], SEASONS: [0.6, 1.5]}
 STARTS |= dict.fromkeys([SPIN, DRIVEN], STARTS[BODY])
 
@@ -92,6 +97,17 @@ KINDS = {
     "splitting, time by itself": (SPIN, 4, "splitting", "auto"),
     "splitting in three, time by itself": (DRIVEN, 4, "splitting", "suzuki"),
 }
+pytestmark = pytest.mark.few(
+    "newton",
+    "newton, non-linear π",
+    "newton, log-canonical",
+    "newton, composed",
+    "explicit",
+    "path",
+    "splitting, time with T",
+    "splitting, time by itself",
+    of=KINDS,
+)
 
 
 @cache
@@ -177,22 +193,34 @@ def test_the_time_at_an_end_of_the_step_gives_order_one_only(shift):
     assert np.log2(coarse / fine) == pytest.approx(1, abs=0.1)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_targets_agree_to_roundoff(kind):
+#: Of code with lanes there is enough in the quick ones.
+IN_C = [*product(KINDS, ["small"]), *product(QUICKLY, ["fast"])]
+
+
+@pytest.mark.parametrize(("kind", "profile"), slow_but(IN_C, product(KINDS, ["small", "fast"])))
+def test_c_agrees_with_numpy_to_roundoff(kind, profile):
     compilation, x0 = compilation_of(kind), start_of(kind)
     expected = solver(compilation, "numpy").integrate(x0, H, STEPS, t0=T0)
-    c = solver(compilation, "c").integrate(x0, H, STEPS, t0=T0)
+    found = compilation if profile == "fast" else small(compilation)
+    c = solver(found, "c").integrate(x0, H, STEPS, t0=T0)
     assert c.x == pytest.approx(expected.x, abs=1e-13)
     assert c.t == pytest.approx(expected.t, abs=0)
     assert c.energy == pytest.approx(expected.energy, abs=1e-13)
-    small = replace(compilation, program=replace(compilation.program, profile="small"))
-    assert solver(small, "c").integrate(x0, H, STEPS, t0=T0).x == pytest.approx(expected.x, abs=1e-13)
+    field = solver(compilation, "numpy").vector_field(c.x[-1], c.t[-1])
+    assert solver(found, "c").vector_field(c.x[-1], c.t[-1]) == pytest.approx(field, abs=1e-13)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_javascript_agrees_with_numpy_to_roundoff(kind):
+    compilation, x0 = compilation_of(kind), start_of(kind)
+    expected = solver(compilation, "numpy").integrate(x0, H, STEPS, t0=T0)
     value = "[[...s.x], s.t, s.hamiltonian(), [...s.vectorField()]]"
     options = f"x0: {x0.tolist()}, t0: {T0}"
     x, t, energy, field = javascript(compilation, options, f"s.integrate({H}, {STEPS})", value)
     assert x == pytest.approx(expected.x[-1], abs=1e-13)
     assert (t, energy) == pytest.approx((expected.t[-1], expected.energy[-1]), abs=1e-13)
-    assert field == pytest.approx(solver(compilation, "c").vector_field(c.x[-1], c.t[-1]), abs=1e-13)
+    last = solver(compilation, "numpy").vector_field(expected.x[-1], expected.t[-1])
+    assert field == pytest.approx(last, abs=1e-13)
 
 
 def test_the_time_is_counted_not_added_up():

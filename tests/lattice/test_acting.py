@@ -77,6 +77,7 @@ HOT = (
 TEXTS = {**FORCED, **NOISY, "langevin": LANGEVIN, "hot": HOT}
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4]])
 SIZES = {"web": (5,), "warm": (5,), "bath": (3, 2), "hot": (3, 2)}
+pytestmark = pytest.mark.few("damped", "stretched", "web", "bath", "free", "langevin", of=TEXTS)
 
 
 @cache

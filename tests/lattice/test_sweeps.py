@@ -91,6 +91,11 @@ BEYOND = "phigen: 1\nname: beyond\norder: 2\nlattice: {axes: [i, j], boundary: p
 BEYOND += f'{CANONICAL}hamiltonian: "p**2/2 + q**2/2 - q*q[i+2]/3 - q*q[j+1]/4"\n'
 #: What is integrated by the series.
 SERIES = ("twisted", "dragged", "pond", "stretched", "tangle", "vortices")
+
+#: Open ends, a plane, pairs, graphs with and without brackets along bonds, colours, the series.
+pytestmark = pytest.mark.few(
+    "fput", "sheet", "charges", "magnet", "web", "volterra", "twisted", "dragged", "tangle", of=TEXTS
+)
 #: Of graphs: a triangle with two tails, a double bond, and a site of its own.
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4], [4, 5]])
 SIZES = {"sheet": (4, 5), "cube": (3, 4, 3), "volterra": (6,), "toda": (5,), "dragged": (4, 5), "stretched": (5,)}

@@ -48,6 +48,7 @@ TEXTS = {
 }  # fmt: skip
 BONDS = np.array([[0, 1], [1, 2], [2, 0], [2, 3], [4, 3], [3, 4]])
 SIZES = {"pushed": (3, 4), "coloured": (5,)}
+pytestmark = pytest.mark.few("driven", "melting", "coloured", of=TEXTS)
 T0 = 0.7
 
 

@@ -26,7 +26,7 @@ hamiltonian: {hamiltonian}
 """
 
 
-@pytest.mark.parametrize("target", TARGETS)
+@pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
 @pytest.mark.parametrize(("coordinates", "form", "hamiltonian", "start", "h"), LONG)
 def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, h, target):
     compilation = compile_paths(f"coordinates: {coordinates}\npoisson: {form}\nhamiltonian: {hamiltonian}\n", 2)

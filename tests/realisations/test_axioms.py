@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import pytest
 from geometry.building import family, system, texts, typed
+from support import slow_but
 
 from phigen.geometry.system import system_from_spec
 from phigen.realisations.axioms import check
@@ -45,8 +46,11 @@ def test_axioms_are_proved_for_the_corpus(path):
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(
     ("name", "size"),
-    [("so", 3), ("so", 4), ("so", 5), ("sl", 2), ("gl", 2), ("gl", 3), ("se", 2), ("se", 3), ("aff", 1), ("aff", 2),
-     ("heisenberg", 1), ("heisenberg", 2), ("su", 2), ("sp", 2), ("sp", 4)],
+    slow_but(
+        [("so", 3), ("sl", 2), ("gl", 2), ("se", 2), ("aff", 1), ("heisenberg", 1), ("su", 2), ("sp", 2)],
+        [("so", 3), ("so", 4), ("so", 5), ("sl", 2), ("gl", 2), ("gl", 3), ("se", 2), ("se", 3), ("aff", 1), ("aff", 2),
+         ("heisenberg", 1), ("heisenberg", 2), ("su", 2), ("sp", 2), ("sp", 4)],
+    ),
 )  # fmt: skip
 def test_cayley_axioms_are_proved_for_the_named_algebras(name, size, sign):
     s = family(name, size, sign)

@@ -150,6 +150,7 @@ def test_a_member_that_fails_costs_itself_and_says_why(spec, cluster, tmp_path):
         assert (failed == (data.status.values.ravel() != 0)).all()
 
 
+@pytest.mark.slow
 def test_killed_workers_cost_no_member(spec, cluster, tmp_path, small_chunks):
     """Workers are killed at random while they are at work; the result is that of one ensemble."""
     stop, killed, random = threading.Event(), [], np.random.default_rng(1)
@@ -198,6 +199,7 @@ def test_an_interrupted_sweep_goes_on_where_it_stopped_and_another_is_refused(sp
         phigen.sweep(spec, over=OVER, output=tmp_path)
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_chunks):
     """Files of workers cannot grow, after the second chunk."""
     given = {"over": OVER, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
@@ -220,7 +222,9 @@ def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_
     assert sum(rest) < 480
 
 
-def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks):
+@pytest.mark.slow
+def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkeypatch):
+    monkeypatch.setattr(clusters, "PATIENCE", "0.5s")
     patience = dask.config.set({"distributed.comm.timeouts.connect": "500ms", "distributed.scheduler.worker-ttl": None})
     local = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
     with patience, local as own:

@@ -127,6 +127,7 @@ def chunks(energy, size=60):
     return [" + ".join(terms[i : i + size]) for i in range(0, len(terms), size)]
 
 
+@pytest.mark.slow
 def test_awkward_names_can_be_coordinates_of_an_explicit_system(tmp_path):
     names = AWKWARD[len(AWKWARD) % 2 :]
     q, p = names[::2], names[1::2]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import NAMES, compiled, described, plain
+from support import NAMES, compiled, described, plain, slow_but
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec, emit
@@ -353,7 +353,9 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("name", "setting"), CASES, ids=[f"{n}-{s.described()}" for n, s in CASES])
+@pytest.mark.parametrize(
+    ("name", "setting"), slow_but(CASES[::2], CASES), ids=[f"{n}-{s.described()}" for n, s in CASES]
+)
 def test_lines_of_a_setting_compile_to_what_was_measured(name, setting):
     given = spec.load(SPECS / f"{name}.yaml")
     made = build(given, compiled(name).system, setting)
