@@ -135,6 +135,16 @@ def test_pullback_is_the_transpose_of_the_tangent_map(kind, target):
     assert np.max(np.abs(x0_bar - bar @ product)) <= 3e-15 * np.max(np.abs(x0_bar))
 
 
+def test_stages_whose_paths_are_long_are_gone_back_through_one_after_the_other():
+    """Each begins where the one after it has traced its path back to; what moves that to the mean must not do harm."""
+    made, x, bar, h, steps = solver(compilation("path, long"), "c"), start("path, long"), weights(3), 0.3, 50
+    product = np.eye(3)
+    for _, tangent in made.tangents(x, h, steps):
+        product = tangent @ product
+    x0_bar = made.pullback(x, h, steps, bar).x0_bar
+    assert np.max(np.abs(x0_bar - bar @ product)) <= 1e-8 * np.max(np.abs(x0_bar))
+
+
 @precisely
 def exact_gradient(kind, parameters, x, bar, steps):
     """Of the product of the last state with ``bar``, along state and parameters, by the scheme in many digits."""

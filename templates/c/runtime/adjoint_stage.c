@@ -112,20 +112,27 @@ static int phi_traced_back(const double *coef, const double end[PHI_DIM], const 
     return 0;
 }
 
-/* Move the end of a path, which is known nearly, to where the mean is y. 0 if it cannot be followed. */
+/* Move the end of a path, which is known nearly, to where the mean is y, as far as that brings it nearer: on long paths the
+   mean may follow the end by more than the end was moved. 0 if it cannot be followed. */
 static int phi_anchor(const double *coef, const double p[PHI_DIM], const double y[PHI_DIM], double end[PHI_DIM])
 {
-    double minus[PHI_DIM], change[PHI_DIM], mean[PHI_DIM];
+    double minus[PHI_DIM], change[PHI_DIM], mean[PHI_DIM], miss[PHI_DIM], moved[PHI_DIM], before = HUGE_VAL;
     int made = 0;
     for (int i = 0; i < PHI_DIM; ++i) minus[i] = -p[i];
+    memcpy(moved, end, sizeof moved);
     for (int round = 0; round < PHI_ANCHORED; ++round) {
         double size = 0.0, missed = 0.0;
-        if (!phi_path(coef, end, minus, change, mean, &made)) return 0;
+        if (!phi_path(coef, moved, minus, change, mean, &made)) return round > 0;
         for (int i = 0; i < PHI_DIM; ++i) {
-            const double miss = y[i] - (end[i] + mean[i]);
-            end[i] += miss;
+            miss[i] = y[i] - (moved[i] + mean[i]);
             size += fabs(y[i]);
-            missed += fabs(miss);
+            missed += fabs(miss[i]);
+        }
+        if (!(missed < before)) return 1;
+        before = missed;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            end[i] = moved[i];
+            moved[i] += miss[i];
         }
         if (missed <= PHI_ANCHORED_TO * size) return 1;
     }
