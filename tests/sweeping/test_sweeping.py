@@ -3,6 +3,7 @@
 import os
 import resource
 import signal
+import sys
 import threading
 import time
 from dataclasses import replace
@@ -209,6 +210,7 @@ def test_a_full_disk_is_told_and_nothing_is_lost(spec, cluster, tmp_path, small_
         def full(members, failed):
             made.append(members)
             if len(made) == 2:
+                client.run(setattr, sys, "dont_write_bytecode", True)  # as in full_disk.py
                 client.run(resource.setrlimit, resource.RLIMIT_FSIZE, (64, resource.RLIM_INFINITY))
 
         try:
