@@ -13,12 +13,13 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUNS := $(VENV)/.phigen-runs
 STAMP := $(VENV)/.phigen-installed
+SITE := $(VENV)/.phigen-docs
 WORKERS ?= auto
 
 # Tests start Python some hundred times; compiled modules halve what that takes.
 test test-all: export PYTHONDONTWRITEBYTECODE :=
 
-.PHONY: help demo test test-all lint format golden figures docs bench clean
+.PHONY: help demo test test-all lint rules format golden figures docs bench clean
 
 help:
 	@sed -n '/^#/!q; s/^# \{0,1\}//p' Makefile
@@ -26,17 +27,27 @@ help:
 demo: $(RUNS)
 	$(BIN)/phigen demo
 
-test: lint
-	$(BIN)/python -m pytest -n $(WORKERS)
+test: rules
+	$(call tested,)
 
 # With the long tests, and the C of the corpus compiled with the flags users get.
-test-all: lint
-	$(BIN)/python -m pytest -n $(WORKERS) --all
+test-all: rules
+	$(call tested,--all)
 
-lint: $(STAMP)
+lint: rules
+	$(BIN)/mypy
+
+rules: $(STAMP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+
+# Types are checked beside the tests: that is work for one core, and without its cache half a minute. What is said of
+# them comes last.
+define tested
+@$(BIN)/mypy >$(VENV)/.types 2>&1 & types=$$!; failed=0; \
+$(BIN)/python -m pytest -n $(WORKERS) $(1) || failed=$$?; \
+wait $$types || failed=1; cat $(VENV)/.types; exit $$failed
+endef
 
 format: $(STAMP)
 	$(BIN)/ruff check --fix-only .
@@ -53,8 +64,7 @@ figures: $(STAMP)
 
 # The site of the documentation, in build/site.
 docs: export NO_MKDOCS_2_WARNING := 1
-docs: $(RUNS)
-	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[docs]'
+docs: $(SITE)
 	$(BIN)/mkdocs build --quiet
 
 # Beside the methods that people would otherwise use; see docs/benchmarks.md. About ten minutes on a quiet machine.
@@ -89,4 +99,9 @@ $(RUNS): pyproject.toml
 # What tests need beside it.
 $(STAMP): $(RUNS)
 	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[dev,plot]'
+	@touch $@
+
+# And what makes the site of the documentation.
+$(SITE): $(RUNS)
+	$(BIN)/python -m pip install --quiet --no-compile --disable-pip-version-check --editable '.[docs]'
 	@touch $@

@@ -100,4 +100,4 @@ def test_aarch64_gives_what_this_machine_gives(tmp_path):
 @pytest.mark.slow
 def test_the_page_can_be_followed(tmp_path):
     tool("node")
-    assert follow(DOCS / "platforms.md", tmp_path) == 3
+    assert follow(DOCS / "platforms.md", tmp_path) == 4
