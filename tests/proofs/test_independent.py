@@ -42,12 +42,12 @@ TERMS = {
     "sir_epidemic": 7,
     "sir_final_size": 5,
     "sklyanin_gyrostat": 5,
-    "so4_manakov": 5,
+    "so4_manakov": 4,
     "spin_chain5": 3,
     "toda3": 7,
     "toda3_quadratic": 5,
     "volterra5": 7,
-    "vortices3": 3,
+    "vortices3": 2,
 }
 
 #: And so many a second or two more, for systems that are always examined.
