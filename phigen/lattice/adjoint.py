@@ -13,13 +13,13 @@ from dataclasses import replace
 from phigen.scheme.adjoint import completed, pulled_back
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.staging import TABLE, Coefficients
-from phigen.scheme.steps import Adjoint, Equation, Sweep
+from phigen.scheme.steps import Adjoint, Equation, Partners, Sweep
 
 #: What is called after a kernel that it is the transpose of.
 BACK = "_back"
 
 #: What kernels at sites read, of which cotangents are found.
-_READ = ("site", "start", "gathered", "bonds")
+_READ = ("site", "start", "gathered", "bonds", "params")
 
 
 def transposed(
@@ -28,23 +28,25 @@ def transposed(
     prepare: Kernel,
     refresh: Kernel | None,
     coefficients: Coefficients,
+    partners: Partners | None,
 ) -> Adjoint:
     """The transposes of all kernels of a step, each called as its kernel with `BACK`."""
     kernels: list[Kernel] = []
     for sweep in (sweep for part in swept for sweep in part):
         kernels += [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
     kernels += [solved.relax, solved.advance] if solved else []
+    kernels += partners.field.kernels if solved and partners else ()
     return completed(coefficients, [_back(kernel, coefficients) for kernel in kernels], prepare, refresh)
 
 
 def _back(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    full = replace(kernel, inputs={**kernel.inputs, TABLE: coefficients.table})
+    table = {} if "params" in kernel.inputs else {TABLE: coefficients.table}
     (output,) = kernel.outputs
     along = {array: kernel.inputs[array] for array in _READ if kernel.inputs.get(array)}
     return pulled_back(
-        full,
+        replace(kernel, inputs={**kernel.inputs, **table}),
         kernel.name + BACK,
         {f"{output.name}_bar": output.values},
-        {**along, TABLE: coefficients.table},
+        along | table,
         "cotangents of all that is read, from those of what is found",
     )

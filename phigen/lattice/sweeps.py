@@ -170,8 +170,8 @@ def build_sweeps(
             tuple(_sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent) for motion in flow.motions)
             for k, (flow, what) in enumerate(_named(cell, plan), 1)
         )
-    if extras.adjoint:
-        _expect_transposed(cell, splits=solved is None)
+    if extras.adjoint and cell.noise:
+        raise SpecError([Diagnostic("adjoint is not offered for lattices with noise")])
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
     refresh = coefficients.refresh(t=cell.times)
     prepare = Kernel(
@@ -191,7 +191,7 @@ def build_sweeps(
         gathers = [*(sweep.gather for sweep in every if sweep.gather), *own]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
-    adjoint = transposed(swept, solved, prepare, refresh, coefficients) if extras.adjoint else None
+    adjoint = transposed(swept, solved, prepare, refresh, coefficients, partners) if extras.adjoint else None
     settled = Sweeps(
         prepare,
         sites,
@@ -248,14 +248,6 @@ def _expect_offered(cell: Cell, extras: Extras, locations: Mapping[tuple[Any, ..
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:
         raise SpecError(problems)
-
-
-def _expect_transposed(cell: Cell, *, splits: bool) -> None:
-    if not splits and cell.relation != GRID:
-        message = "adjoint is not offered for the series on graphs and pairs"
-        raise SpecError([Diagnostic(message, hint="scheme: splitting has it, where H splits")])
-    if cell.noise:
-        raise SpecError([Diagnostic("adjoint is not offered for lattices with noise")])
 
 
 def _named(cell: Cell, plan: SplittingPlan) -> Iterator[tuple[CellFlow, str]]:

@@ -24,6 +24,8 @@ LATTICES = {
     "food_web": RING | {"A": 0.4 + np.arange(7) / 9, "k": 0.3 + np.arange(SITES) / 8},
     "chiral_magnet": RING | {"D": 0.6},
     "outer_planets": {"G": 1.0, "m": 0.1 + np.arange(SITES) / 20},
+    "spin_graph series": RING | {"J": 0.4 + np.arange(7) / 9, "D": 0.6},
+    "point_vortices": {"G": 0.9 - np.arange(SITES) / 4},
     "xxz_disorder series": {"B": 0.5 + np.arange(SITES) / 7},
 }
 
@@ -40,7 +42,7 @@ hamiltonian: p**2/2 + (1 + A*cos(w*t + phase))*(q[i+1] - q)**2/2 + A*q**4
 forces: {vector: {p: -damp*p}}
 """
 LATTICES["driven"] = LATTICES["driven series"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
-OWN = {"driven": DRIVEN, "far_open": SPECS["far_open"]}
+OWN = {"driven": DRIVEN, "far_open": SPECS["far_open"], "spin_graph": SPECS["spin_graph"]}
 
 
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
@@ -58,10 +60,10 @@ def made(name, target="numpy"):
 
 
 def beginning(solver, sizes=SITES):
-    """Sites that are all different; planets far from one another."""
+    """Sites that are all different; planets and vortices far from one another."""
     shape = np.empty((len(solver.interface.coordinates), *np.atleast_1d(sizes))).shape
     x = 0.3 + 0.5 * np.random.default_rng(3).random(shape)
-    if solver.interface.name == "outer_planets":
+    if solver.interface.name in ("outer_planets", "point_vortices"):
         x[0] += 3 * np.arange(SITES)
     return x
 
@@ -238,8 +240,6 @@ def test_what_cannot_be_pulled_back_is_told():
         solver.pullback(x, H, STEPS, x[0])
     with pytest.raises(TypeError, match="adjoint=True"):
         phigen.compile("fput", target="numpy").pullback(x, H, STEPS, x)
-    with pytest.raises(SpecError, match="adjoint is not offered for the series on graphs and pairs"):
-        made("point_vortices")
     with pytest.raises(SpecError, match="adjoint is not offered for lattices with noise"):
         made("thermal_heisenberg")
     with pytest.raises(SpecError, match="not offered in C"):
