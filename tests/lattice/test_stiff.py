@@ -36,15 +36,16 @@ TEXTS = {
 }
 #: Waves that do not interact: one correction solves a stage as well as it can, and a second one finds no more.
 LINEAR = f"order: 2\nlattice: {{axes: [i]}}\n{CANONICAL}hamiltonian: p**2/2 + 200*(q[i+1]-q)**2 + q*q[i+2] + p*p[i+1]/3"
+PLANE = f"order: 2\nlattice: {{axes: [i, j]}}\n{CANONICAL}hamiltonian: p**2/2 + 200*((q[i+1]-q)**2 + (q[j+1]-q)**2)"
 DRIVER = r"""
 #include <stdio.h>
 #include <stdlib.h>
 #include "linear.c"
 int main(void)
 {
-    const size_t sizes[1] = { 40 };
-    double x[80];
-    for (int k = 0; k < 80; ++k) x[k] = sin(k * k);
+    const size_t sizes[] = { SIZES };
+    double x[800];
+    for (int k = 0; k < 800; ++k) x[k] = sin(k * k);
     linear_solver s;
     if (linear_init(&s, NULL, sizes, x, malloc(linear_work_size(sizes))) != linear_OK) return 1;
     linear_set_step(&s, STEP);
@@ -118,12 +119,18 @@ def test_equations_without_a_solution_are_told(target: str, profile: str) -> Non
     assert np.array_equal(failure.value.trajectory.x[-1], x)
 
 
-@pytest.mark.parametrize(("profile", "h", "left"), [("fast", 0.2, 1e-13), ("small", 0.05, 1e-5)])
-def test_one_correction_solves_a_linear_stage(profile: str, h: float, left: float, tmp_path: Path) -> None:
-    """On a ring, by elimination, and by a Krylov space. A wrong matrix would solve stages too, by more corrections."""
-    program = compile_spec(specs.loads(f"phigen: 1\nname: linear\n{LINEAR}\n"), profile=profile).program
+@pytest.mark.parametrize(
+    ("profile", "axes", "h", "left"), [("fast", "i", 0.2, 1e-13), ("small", "i", 0.05, 1e-5), ("fast", "ij", 0.1, 1e-5)]
+)
+def test_one_correction_solves_a_linear_stage(profile: str, axes: str, h: float, left: float, tmp_path: Path) -> None:
+    """On a ring, by elimination, and by a Krylov space; in a plane by one of the matrix times inverses of its blocks.
+
+    A wrong matrix would solve stages too, by more corrections; and so would a space of the matrix itself in the plane.
+    """
+    text, sizes = (LINEAR, "40") if axes == "i" else (PLANE, "19,21")
+    program = compile_spec(specs.loads(f"phigen: 1\nname: linear\n{text}\n"), profile=profile).program
     write(tmp_path, {**emit(program, "c", "phigen"), "driver.c": DRIVER})
-    run(["cc", "-std=c99", f"-DSTEP={h}", "-o", "driver", "driver.c", "-lm"], tmp_path)
+    run(["cc", "-std=c99", f"-DSTEP={h}", f"-DSIZES={sizes}", "-o", "driver", "driver.c", "-lm"], tmp_path)
     first, second = map(float, run(["./driver"], tmp_path).split())
     assert first > 0.1
     assert second < left * first

@@ -78,6 +78,9 @@ enum {
 #endif
 #if PHI_KRYLOV
         + PHI_DIRECTIONS + 1
+#if PHI_SITE_BLOCKS
+        + PHI_DIM + 1
+#endif
 #endif
         ) * PHI_DIM,
 #endif
@@ -233,6 +236,10 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
 #endif
 #if PHI_BANDED
     for (int k = 0; k < PHI_DIM; ++k, memory += block) s->v[k] = memory;
+#endif
+#if PHI_SITE_BLOCKS
+    for (int k = 0; k < PHI_DIM * PHI_DIM; ++k, memory += block) s->block[k] = memory;
+    for (int k = 0; k < PHI_DIM; ++k, memory += block) s->solved[k] = memory;
 #endif
 #if PHI_KRYLOV
     for (int d = 0; d <= PHI_DIRECTIONS; ++d)

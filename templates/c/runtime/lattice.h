@@ -60,6 +60,9 @@ typedef struct {
     double *matrix;           /* see phi_factorise */
 #endif
 #if PHI_KRYLOV
+#if PHI_SITE_BLOCKS
+    double *block[PHI_DIM * PHI_DIM], *solved[PHI_DIM]; /* inverses of the matrix at the sites themselves; their products */
+#endif
     double *space[PHI_DIRECTIONS + 1][PHI_DIM], *sums; /* variations of y, sums over pieces: see phi_krylov */
 #endif
 #endif

@@ -90,6 +90,70 @@ static void phi_subtract(phi_solver *s, const double *coef, int now, double *con
     }
 }
 
+#if PHI_SITE_BLOCKS
+/* The inverse of a matrix in its place; 1 where there is none. */
+static void phi_invert_block(double b[PHI_DIM][PHI_DIM])
+{
+    double zero = 0.0;
+    for (int k = 0; k < PHI_DIM; ++k) {
+        const double pivot = 1.0 / b[k][k];
+        b[k][k] = 1.0;
+        for (int j = 0; j < PHI_DIM; ++j) b[k][j] *= pivot;
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double factor = b[i][k];
+            if (i == k) continue;
+            b[i][k] = 0.0;
+            for (int j = 0; j < PHI_DIM; ++j) b[i][j] -= factor * b[k][j];
+        }
+    }
+    for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) zero += 0.0 * b[k / PHI_DIM][k % PHI_DIM];
+    for (int k = 0; zero != 0.0 && k < PHI_DIM * PHI_DIM; ++k) b[k / PHI_DIM][k % PHI_DIM] = k % (PHI_DIM + 1) == 0;
+}
+
+/* Where fields at a site act on each other by much, as a momentum and its field do, a space of the matrix times the inverses of what
+   it does at the sites themselves takes half as many directions. These inverses at s->y[now]. */
+static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
+{
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(phi_units(s), &first);
+        phi_own_slope_rows(s, coef, 1, now, first, end);
+        for (size_t unit = first; unit < end; ++unit) {
+            const phi_piece at = phi_piece_of(s, unit);
+            for (ptrdiff_t i = at.from; i < at.to; ++i) {
+                double b[PHI_DIM][PHI_DIM];
+                for (int k = 0; k < PHI_DIM * PHI_DIM; ++k)
+                    b[k / PHI_DIM][k % PHI_DIM] = (k % (PHI_DIM + 1) == 0) - s->block[k][at.row.at[0] + i];
+                phi_invert_block(b);
+                for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) s->block[k][at.row.at[0] + i] = b[k / PHI_DIM][k % PHI_DIM];
+            }
+        }
+    }
+}
+
+/* to = from + these inverses times v; without from that alone. */
+static void phi_apply_blocks(const phi_solver *s, double *const *v, double *const *from, double *const *to)
+{
+    PHI_PARALLEL
+    {
+        size_t unit, end = phi_share(phi_units(s), &unit);
+        for (; unit < end; ++unit) {
+            const phi_piece at = phi_piece_of(s, unit);
+            for (int k = 0; k < PHI_DIM; ++k) {
+                double *sum = to[k] + at.row.at[0];
+                for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][at.row.at[0] + i];
+                for (int l = 0; l < PHI_DIM; ++l) {
+                    const double *one = v[l] + at.row.at[0], *by = s->block[k * PHI_DIM + l] + at.row.at[0];
+                    PHI_EACH_SITE
+                    for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by[i] * one[i];
+                }
+                phi_ends(sum, s->length, at.from, at.to);
+            }
+        }
+    }
+}
+
+#endif
 /* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES, after Y. Saad
    and M. H. Schultz, without a restart. The matrix is 1 - (what a sweep does to a variation of s->y[now]). s->y[1 - now]
    is used, and may be where it goes. The length of s->space[0]; not finite if this is of no use. */
@@ -103,7 +167,12 @@ static double phi_krylov(phi_solver *s, const double *coef, int now, double *con
     if (length > 0.0) phi_combine(s, s->space[0], 1.0 / length, s->space[0], 0, side);
     while (count < PHI_DIRECTIONS && fabs(side[count]) > PHI_SOLVED * length) {
         double *column = matrix[count], *const *next = s->space[count + 1], left;
+#if PHI_SITE_BLOCKS
+        phi_apply_blocks(s, s->space[count], NULL, s->solved);
+        phi_subtract(s, coef, now, s->solved, s->y[1 - now], next);
+#else
         phi_subtract(s, coef, now, s->space[count], s->y[1 - now], next);
+#endif
         phi_products(s, 0, count + 1, next, column);
         for (int k = 0; k <= count; ++k) again[k] = -column[k];
         phi_combine(s, next, 1.0, next, count + 1, again);
@@ -135,7 +204,12 @@ static double phi_krylov(phi_solver *s, const double *coef, int now, double *con
         side[k] /= matrix[k][k];
     }
     for (int k = 0; k < count; ++k) side[k] = -side[k];
+#if PHI_SITE_BLOCKS
+    phi_combine(s, s->space[count], 0.0, s->space[0], count, side);
+    phi_apply_blocks(s, s->space[count], from, to);
+#else
     phi_combine(s, to, 1.0, from, count, side);
+#endif
     return length;
 }
 #endif

@@ -42,6 +42,9 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
 #else
     if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
     phi_subtract(s, NULL, now, s->y[now], s->y[1 - now], s->space[0]);
+#if PHI_SITE_BLOCKS
+    phi_invert_blocks(s, coef, now);
+#endif
     if (!isfinite(phi_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
 #endif
     ++s->sweeps;
@@ -90,6 +93,9 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
         size_t first, end = phi_share(phi_units(s), &first);
         phi_side_rows(s, coef, 1, now, v, side, first, end);
     }
+#if PHI_SITE_BLOCKS
+    phi_invert_blocks(s, coef, now);
+#endif
     phi_combine(s, dy, 1.0, side, 0, NULL);
     phi_combine(s, s->space[0], 1.0, side, 0, NULL);
     phi_products(s, 0, 1, s->space[0], &size);

@@ -124,6 +124,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SERIES": step.equation is not None,
         "BANDED": banded,
         "KRYLOV": step.equation is not None and (not banded or program.extras.tangent),
+        "SITE_BLOCKS": site_blocks(program, step, layout),
         "BY_HAND": step.is_by_hand and program.offers("by-hand") and not program.compensated,
         "WAVES": waves(program, step),
         "COMPENSATED": program.compensated,
@@ -132,6 +133,11 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
+
+
+def site_blocks(program: Program, step: Sweeps, layout: Layout) -> bool:
+    """Whether Krylov spaces are those of the matrix times the inverses of its blocks at sites: for grids."""
+    return step.equation is not None and step.partners is None and not layout.band and program.profile == "fast"
 
 
 def waves(program: Program, step: Sweeps) -> bool:

@@ -9,7 +9,7 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep
 from phigen.symbolic import functions as elementary
-from phigen.symbolic.expression import ONE, substitute
+from phigen.symbolic.expression import ONE, ZERO, gradient, substitute
 from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
 from phigen.targets.c.kernels import lane_calls
@@ -18,6 +18,19 @@ from phigen.targets.c.lattice.names import SiteNames
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, lower
 from phigen.targets.header import plain
+
+#: The kernel of the derivatives of a sweep along the fields at the site itself.
+BLOCK = "own_slope"
+
+
+def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
+    """How a sweep follows y at the site itself: of each field the derivatives along all."""
+    places = layout.step.sites.places
+    own = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
+    slopes = [gradient(e, [own[f]])[0] if f in own else ZERO for e in relax.roots for f in program.coordinates]
+    return replace(
+        relax, name=BLOCK, purpose="how y at a site follows y there", outputs=(Output(BLOCK, tuple(slopes)),)
+    )
 
 
 @dataclass(frozen=True)
@@ -134,7 +147,13 @@ def middle_loop(
     """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
     code = lower(kernel)
     names = SiteNames(program, layout, kernel, code, set(), calls, layout.gathered(kernel).names)
-    pointers = [names.scope[Symbol("out", f)] for f in program.coordinates]
+    fields = program.coordinates
+    outputs = (
+        [Symbol("out", f, g) for f in fields for g in fields]
+        if kernel.name == BLOCK
+        else [Symbol("out", f) for f in fields]
+    )
+    pointers = [names.scope[s] for s in outputs]
     head = _unused(code)
     head += [f"    double *restrict {p} = row->out[{k}] + row->at[0];" for k, p in enumerate(pointers)]
     body = names.loaded()

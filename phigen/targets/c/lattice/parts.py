@@ -14,12 +14,14 @@ from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
 from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches
 from phigen.targets.c.lattice.loops import (
+    BLOCK,
     Loop,
     forms_of,
     has_ends,
     in_loops,
     middle_loop,
     seen_loop,
+    site_block,
     sweep_loop,
 )
 from phigen.targets.c.lattice.partners import gathering, partners
@@ -43,6 +45,10 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
         found += _of_equation(program, layout, kernel, _forms(program, rows, [kernel]))
+    if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
+        found += _of_equation(
+            program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
+        )
     for kernel in (step.equation.slope, *step.equation.tangents) if step.equation else ():
         found += _of_equation(program, layout, kernel, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
@@ -270,12 +276,13 @@ def _of_equation(
         ]
         yield from (loop.text(program) for loop in loops)
         lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in calls_over_sites(loops)]
-    out = "s->x" if moves else "to" if varied else "s->y[1 - now]"
+    out = "s->x" if moves else "to" if varied else "s->block" if kernel.name == BLOCK else "s->y[1 - now]"
     reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = v;"] * varied
     titles = {
         "relax": "A sweep, from s->y[now] to the other",
         "increment": "The end of a stage",
         "slope": "How a sweep follows s->y[now] along v",
+        BLOCK: "How a sweep follows s->y[now] at the site itself",
         "side": "How a sweep follows x along v",
         "follow": "How the end of a stage follows s->y[now] along v, added",
     }
