@@ -1,4 +1,4 @@
-"""Films of runs of lattices: chains as curves over the sites, planes as pictures, one after the other."""
+"""Films of runs of lattices: chains as curves over the sites, planes and graphs as pictures, one after the other."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from phigen.drawing.lattices import MOST_PANELS
+from phigen.drawing.lattices import MOST_PANELS, draw_sites, places_of
 from phigen.drawing.palette import SERIES, styled
 from phigen.errors import MissingPackageError
 from phigen.runtime.lattice import LatticeTrajectory
@@ -28,7 +28,10 @@ def film(run: LatticeTrajectory, title: str, path: Path) -> None:
     names = run.coordinates[:MOST_PANELS]
     figure = Figure(figsize=(3.0 * len(names), 3.0), layout="constrained")
     panels = np.atleast_1d(figure.subplots(1, len(names)))
-    shown = [_shown(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
+    if (places := places_of(run)) is not None:
+        shown = [_graph(axes, name, run, places) for axes, name in zip(panels, names, strict=True)]
+    else:
+        shown = [_shown(axes, name, run.column(name)) for axes, name in zip(panels, names, strict=True)]
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         with writer.saving(figure, str(part), DOTS):
@@ -53,6 +56,14 @@ def expect_writer(path: Path) -> None:
 def _flat(values: Floats) -> Floats:
     """A chain as it is, a plane, or the middle plane across the first axis."""
     return values if values.ndim < 3 else values[values.shape[0] // 2]
+
+
+def _graph(axes: Any, name: str, run: LatticeTrajectory, places: Floats) -> Any:
+    """A coordinate on a graph: the function that changes it."""
+    values = run.column(name)
+    picture = draw_sites(axes, run.parameters["bonds"], places, values[0], float(np.abs(values).max()) or 1.0)
+    axes.set_title(name)
+    return picture.set_array
 
 
 def _shown(axes: Any, name: str, values: Floats) -> Any:

@@ -1,4 +1,4 @@
-"""Runs of lattices: space–time diagrams of chains, snapshots of planes, and what was conserved."""
+"""Runs of lattices: space–time diagrams of chains, snapshots of planes and graphs, and what was conserved."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from phigen.drawing.exponents import draw_exponents
 from phigen.drawing.palette import SERIES, styled
+from phigen.lattice.placing import placed
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Most panels of coordinates, times in a diagram, and snapshots in a row.
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
+#: Sites of a graph that is drawn as one; more of them, some times over, make large files.
+MOST_DRAWN = 100
 #: Colours of diagrams, and of snapshots.
 LEVELS = 48
 
@@ -46,9 +49,12 @@ def lattice_figure(
         figure.suptitle(title, fontsize=10)
     heights = [2.2] * len(names) + below
     parts: Any = figure.subfigures(len(heights), 1, height_ratios=heights)
+    places = places_of(run)
     for part, name in zip(parts, names, strict=False):
         values = run.column(name)
-        if values.ndim == 2:
+        if places is not None:
+            _draw_graph(part, name, run, values, places)
+        elif values.ndim == 2:
             _draw_diagram(part, name, run, values, dots)
         else:
             _draw_snapshots(part, name, run, values)
@@ -67,8 +73,11 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
     figure = Figure(figsize=(8.2, 2.6 + 2.0 * bool(local)), layout="constrained")
     heights = [2.4, 2.0] if local else [2.4]
     parts: Any = figure.subfigures(len(heights), 1, squeeze=False, height_ratios=heights)[:, 0]
-    draw = _draw_diagram if energies.ndim == 2 else _draw_snapshots
-    draw(parts[0], "energy", run, energies)
+    if (places := places_of(run)) is not None:
+        _draw_graph(parts[0], "energy", run, energies, places)
+    else:
+        draw = _draw_diagram if energies.ndim == 2 else _draw_snapshots
+        draw(parts[0], "energy", run, energies)
     if local:
         axes = parts[1].add_subplot()
         for (name, values), colour in zip(local.items(), [*SERIES] * len(local), strict=False):
@@ -97,9 +106,47 @@ def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, 
     part.colorbar(shown, ax=axes, pad=0.02, label=name)
 
 
+def places_of(run: LatticeTrajectory) -> Floats | None:
+    """Where the sites of a graph are drawn (sites, 2); None of what is none, and of graphs of too many sites."""
+    if "bonds" not in run.parameters or run.x.shape[2] > MOST_DRAWN:
+        return None
+    return placed(run.parameters["bonds"], run.x.shape[2])
+
+
+def _draw_graph(part: Any, name: str, run: LatticeTrajectory, values: Floats, places: Floats) -> None:
+    """One coordinate of a graph at some times."""
+    frames, most = _snapshots(run), _largest(values)
+    panels = np.atleast_1d(part.subplots(1, len(frames)))
+    for axes, k in zip(panels, frames.tolist(), strict=True):
+        shown = draw_sites(axes, run.parameters["bonds"], places, values[k], most)
+        axes.set_title(f"t = {run.t[k]:.4g}")
+    part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
+
+
+def draw_sites(axes: Any, bonds: Any, places: Floats, values: Floats, most: float) -> Any:
+    """The sites of a graph with the bonds between them, coloured by values (sites,) from -most to most."""
+    from matplotlib.collections import LineCollection
+
+    lines = places[np.asarray(bonds).reshape(-1, 2)]
+    axes.add_collection(LineCollection(lines, colors="0.6", linewidths=0.5, zorder=1))
+    shown = axes.scatter(
+        *places.T, c=values, s=min(max(2500 / len(places), 5.0), 60.0), cmap=_colours(), vmin=-most, vmax=most,
+        edgecolors="0.3", linewidths=0.3, zorder=2,
+    )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.margins(0.08)
+    axes.set_axis_off()
+    return shown
+
+
+def _snapshots(run: LatticeTrajectory) -> Any:
+    """Numbers of some frames, from the first to the last."""
+    return np.unique(np.linspace(0, len(run) - 1, min(len(run), SNAPSHOTS)).astype(int))
+
+
 def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats) -> None:
     """One coordinate of a plane, or of the middle plane across the first axis, at some times."""
-    frames = np.unique(np.linspace(0, len(run) - 1, min(len(run), SNAPSHOTS)).astype(int))
+    frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
     most = _largest(planes)
     panels = np.atleast_1d(part.subplots(1, len(frames)))

@@ -9,7 +9,7 @@ import numpy as np
 from markupsafe import Markup
 
 from phigen.compilation import Compilation
-from phigen.drawing.lattices import lattice_figure, sites_figure
+from phigen.drawing.lattices import lattice_figure, places_of, sites_figure
 from phigen.lattice.cell import Cell
 from phigen.lattice.sweeps import SplittingPlan
 from phigen.notation import mathml
@@ -121,6 +121,8 @@ def _run(material: LatticeMaterial, made: LatticeTrajectory) -> Iterator[Markup]
 
     flat = made.x.ndim == 3
     caption = "The fields over space, upwards, and time" if flat else "The fields at some times"
+    if places_of(made) is not None:
+        caption = "The fields at some times; sites are as far apart as there are bonds between them, nearly"
     caption += ", and errors of what is conserved, on a logarithmic scale."
     worst = ", ".join(f"{name} {page.scientific(float(e.max()))}" for name, e in material.errors.items())
     title = "The fields over space and time"

@@ -13,6 +13,7 @@ from markupsafe import Markup
 
 from phigen.compilation import Compilation
 from phigen.lattice.cell import PAIRS
+from phigen.lattice.placing import MOST_PLACED, placed
 from phigen.lattice.states import Start
 from phigen.report import page
 from phigen.report.live import (
@@ -44,6 +45,7 @@ MOST_NUMBERS = 20_000
 HELP = {
     "diagram": "Sites go upwards, the time to the right; when the picture is full, every second moment goes.",
     "plane": "Each square is a site; of three axes the plane in the middle of the first is drawn.",
+    "graph": "Each point is a site; lines are bonds. Sites are as far apart as there are bonds between them, nearly.",
     "moving": "Each point is a site, with the way behind it.",
 }
 _DRAWN = " The random start is drawn in the page, from the seed of the spec."
@@ -80,7 +82,8 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
     run, start, cell = live.run, live.start, compilation.cell
     if not live.solvers or run is None or start is None or cell is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
-    spec, picture = compilation.spec, _picture(compilation)
+    spec, picture = compilation.spec, _picture(compilation, start)
+    places = placed(start.bonds, start.sizes[0]) if picture == "graph" else None
     sizes, shown = _sizes(compilation, run, start), _groups(compilation, picture)
     moved = [p for p in spec.parameters if isinstance(_values(spec, run, start, p.name), float)]
     given = {
@@ -95,6 +98,7 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
         "sizes": sizes,
         "site": sizes.index(list(start.sizes)),
         "bonds": start.bonds.reshape(-1).tolist(),
+        **({} if places is None else {"places": np.round(places, 4).reshape(-1).tolist()}),
         "parameters": [
             {"name": p.name, "value": _values(spec, run, start, p.name), "positive": p.positive} for p in moved
         ],
@@ -122,9 +126,11 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
     )
 
 
-def _picture(compilation: Compilation) -> str:
+def _picture(compilation: Compilation, start: Start) -> str:
     """How a lattice is drawn: see fields.js."""
     cell = compilation.cell
+    if start.graph and start.sizes[0] <= MOST_PLACED:
+        return "graph"
     if cell and cell.relation == PAIRS and len(cell.fields) > 1:
         return "moving"
     return "plane" if cell and len(cell.axes) > 1 else "diagram"

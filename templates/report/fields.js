@@ -1,4 +1,4 @@
-// What the live panel draws of a lattice: fields over space and time, in a plane, or sites that move.
+// What the live panel draws of a lattice: fields over space and time, in a plane or on a graph, or sites that move.
 
 // Numbers from 0 to 1 in an order that a seed fixes.
 function randomNumbers(seed) {
@@ -330,7 +330,35 @@ function makeView(panel) {
     named(space, group().fields.map((f) => ({ name: data.coordinates[f], ...ends })), x0, top, side, side);
   }
 
-  const draws = { diagram: drawDiagram, plane: drawPlane, moving: drawMoving };
+  // Sites with the bonds between them, each as large as there is room.
+  function drawGraph(space, runner) {
+    const { canvas, pen, left, top, width, height } = space, all = colours(canvas), values = runner.kept.list.at(-1);
+    const count = data.places.length / 2, direction = group().kind === "direction", pixels = new Float64Array(4 * count);
+    paint(pixels, values, (site) => site, all, direction);
+    const radius = Math.max(1.5, Math.min(9, (0.3 * Math.min(width, height)) / Math.sqrt(count)));
+    const unit = Math.min(width, height) - 2 * radius, x0 = left + (width - unit) / 2, y0 = top + height - radius;
+    const place = (site) => [x0 + unit * data.places[2 * site], y0 - unit * data.places[2 * site + 1]];
+    pen.strokeStyle = ink();
+    pen.globalAlpha = 0.3;
+    pen.lineWidth = 0.7;
+    pen.beginPath();
+    for (let k = 0; k < data.bonds.length; k += 2) {
+      pen.moveTo(...place(data.bonds[k]));
+      pen.lineTo(...place(data.bonds[k + 1]));
+    }
+    pen.stroke();
+    pen.globalAlpha = 1;
+    for (let site = 0; site < count; site++) {
+      pen.fillStyle = `rgb(${[0, 1, 2].map((c) => Math.round(pixels[4 * site + c])).join()})`;
+      pen.beginPath();
+      pen.arc(...place(site), radius, 0, 7);
+      pen.fill();
+      pen.stroke();
+    }
+    scaleOf(space, all);
+  }
+
+  const draws = { diagram: drawDiagram, plane: drawPlane, graph: drawGraph, moving: drawMoving };
 
   function drawSide(k) {
     const space = frame(k), runner = panel.race?.[sides[k]];
