@@ -13,6 +13,19 @@ def test_importing_phigen_loads_neither_numpy_nor_sympy():
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 
+def test_a_build_of_an_ordinary_system_imports_nothing_of_lattices_or_attitudes():
+    code = """
+import sys
+from phigen import resources, spec
+from phigen.compiler import compile_proved, emit
+program = compile_proved(spec.load(resources.bundled_specs() / "pendulum_euler.yaml")).program
+assert all(emit(program, target, "phigen") for target in ("c", "numpy", "js"))
+print(*(m for m in sys.modules if m.startswith(("phigen.lattice", "phigen.attitude", "phigen.targets.c.lattice"))))
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
+
+
 def test_public_names_are_found():
     from phigen.errors import StepError
 

@@ -165,7 +165,6 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         "sha256": program.about.spec_sha256,
         "coordinates": ", ".join(program.coordinates),
         "casimirs": ", ".join(program.casimirs) or "none",
-        "gauges": "",
         "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
