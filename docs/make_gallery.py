@@ -56,7 +56,7 @@ This page is made by `python docs/make_gallery.py`.
 """
 LATTICES = """
 
-# Lattices
+## Lattices
 
 Systems of many like sites, of any size ([lattices.md](lattices.md)): one run of each, its fields over space and time,
 or at some times, and what it conserved. Errors of energy are relative to the magnitudes of the energies of all sites,

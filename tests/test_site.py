@@ -44,9 +44,12 @@ def test_every_public_name_is_documented(site):
 
 
 def test_the_gallery_offers_a_panel_of_each_system_that_has_one(site):
-    offered = re.findall(r'<details data-live="?live/(\w+).html', (site / "gallery.html").read_text(encoding="utf-8"))
+    page = (site / "gallery.html").read_text(encoding="utf-8")
+    offered = re.findall(r'<details data-live="?live/(\w+).html', page)
     assert offered == ["pendulum_euler", "toda"]  # with noise there is none
     assert sorted(path.stem for path in site.glob("live/*.html")) == offered
+    listed = re.findall(r'<a href="#(\w+)" class="md-nav__link"', page)
+    assert {"vortices3", "lattices", "toda"} <= {*listed}
 
 
 def test_nothing_is_loaded_from_elsewhere(site):
