@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -104,12 +104,7 @@ def prepared(
     """The run of that name, the first by default, with changes of the command line; not of a lattice."""
     expect_system(spec)
     run = run_of(spec, name)
-    if step is not None:
-        if step == 0 or not math.isfinite(step):
-            raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
-        run = replace(run, step=Fraction(step))
-    if steps is not None:
-        run = replace(run, steps=steps, stride=min(run.stride, steps), until=None)
+    run = with_steps(run, step, steps)
     if until is not None:
         if not math.isfinite(until) or (until - run.start) / run.step <= 0:
             raise click.BadParameter(
@@ -120,13 +115,29 @@ def prepared(
     parameters = spec.parameters_of(run)
     for setting in settings:
         _set(setting, initial, parameters)
-    for p in spec.parameters:
-        if p.positive and parameters[p.name] <= 0:
-            raise click.BadParameter(f"parameter {p.name} must be positive", param_hint="--set")
+    expect_positive(spec, parameters)
     return Experiment(run, tuple(initial.values()), parameters)
 
 
-def _set(setting: str, initial: dict[str, float], parameters: dict[str, float]) -> None:
+def with_steps(run: Run, step: float | None, steps: int | None) -> Run:
+    """The run with the step and the number of steps that the command line says."""
+    if step is not None:
+        if step == 0 or not math.isfinite(step):
+            raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
+        run = replace(run, step=Fraction(step))
+    return run if steps is None else replace(run, steps=steps, stride=min(run.stride, steps), until=None)
+
+
+def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
+    """Refuse numbers for parameters that the spec says are positive; arrays are looked at elsewhere."""
+    for p in spec.parameters:
+        value = parameters.get(p.name)
+        if p.positive and isinstance(value, float | Fraction) and value <= 0:
+            raise click.BadParameter(f"parameter {p.name} must be positive", param_hint="--set")
+
+
+def setting_of(setting: str) -> tuple[str, float]:
+    """The name and the number of NAME=VALUE."""
     name, equals, text = (part.strip() for part in setting.partition("="))
     try:
         value = float(Fraction(text)) if "/" in text else float(text)
@@ -134,6 +145,11 @@ def _set(setting: str, initial: dict[str, float], parameters: dict[str, float]) 
         value = math.nan
     if not equals or not math.isfinite(value):
         raise click.BadParameter(f"{setting!r} is not NAME=VALUE with a number", param_hint="--set")
+    return name, value
+
+
+def _set(setting: str, initial: dict[str, float], parameters: dict[str, float]) -> None:
+    name, value = setting_of(setting)
     home = parameters if name in parameters else initial
     if name not in home:
         known = ", ".join([*parameters, *initial])

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from phigen.cli.console import Console, heading, out, out_json, table
+from phigen.cli.experiment import expect_positive, setting_of
 from phigen.cli.run_summary import described_spectrum, finite
 from phigen.cli.sources import FILMS
 from phigen.errors import StepError
@@ -58,7 +58,7 @@ def run_lattice(
     compilation = compilation_of(spec, order, extras, scheme=scheme)
     assert compilation.cell is not None
     start = start_of(spec, run)
-    parameters = parameters_of(start, settings)
+    parameters = parameters_of(spec, start, settings)
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
     kept = output.with_name(output.name + ".checkpoint") if output else None
     if kept and not resume:
@@ -118,13 +118,6 @@ def exponents_of(
         )
 
 
-def changed(run: Run, step: float | None, steps: int | None) -> Run:
-    """The run with what the command line says."""
-    if step is not None:
-        run = replace(run, step=Fraction(step))
-    return replace(run, steps=steps, stride=min(run.stride, steps)) if steps is not None else run
-
-
 def expect_no(**options: object) -> None:
     """Refuse options that lattices do not have."""
     for name, value in options.items():
@@ -132,18 +125,16 @@ def expect_no(**options: object) -> None:
             raise click.BadParameter(_ABSENT.format(option=f"--{name}"), param_hint=f"--{name}")
 
 
-def parameters_of(start: Start, settings: Iterable[str]) -> dict[str, Any]:
+def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str, Any]:
     """The parameters of a run, with those of the command line put in."""
     parameters: dict[str, Any] = dict(start.parameters)
     for setting in settings:
-        name, _, text = (part.strip() for part in setting.partition("="))
+        name, value = setting_of(setting)
         if name not in parameters:
             known = ", ".join(parameters) or "none"
             raise click.BadParameter(f"{name!r} is no parameter ({known})", param_hint="--set")
-        try:
-            parameters[name] = float(Fraction(text)) if "/" in text else float(text)
-        except (ValueError, ZeroDivisionError):
-            raise click.BadParameter(f"{setting!r} is not NAME=VALUE with a number", param_hint="--set") from None
+        parameters[name] = value
+    expect_positive(spec, parameters)
     return parameters
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import loaded, prepared, run_of
+from phigen.cli.experiment import loaded, prepared, run_of, with_steps
 from phigen.cli.interruption import InterruptedRunError
-from phigen.cli.lattice_run import changed, expect_no, run_lattice
+from phigen.cli.lattice_run import expect_no, run_lattice
 from phigen.cli.run_summary import described_run, finite, print_summary
 from phigen.cli.sources import (
     FIGURES,
@@ -110,7 +110,7 @@ def command(
     if spec.lattice:
         expect_no(section=section, until=until, every=every, at=at, extend=extend)
         expect_no(**{"from": source})
-        chosen = changed(run_of(spec, name), step, steps)
+        chosen = with_steps(run_of(spec, name), step, steps)
         given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
         run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json, lyapunov=lyapunov)
         return

@@ -128,7 +128,7 @@ def _of_lattice(
     from phigen.tuning.lattices import MOST_COMPARED, lattice_problem
 
     changed = {s.partition("=")[0].strip() for s in settings}
-    values = parameters_of(start_of(compilation.spec, run), settings)
+    values = parameters_of(compilation.spec, start_of(compilation.spec, run), settings)
     chosen = {name: value for name, value in values.items() if name in changed}
     found = lattice_problem(compilation, run, chosen, *_times(run, horizon))
     if found.sizes != found.whole:

@@ -114,6 +114,14 @@ def test_what_lattices_do_not_have_is_refused(phigen, chain, command):
     assert "lattice" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("option", "said"), [("--step=0", "not 0"), ("--set=a=nan", "with a number"), ("--set=m=-1", "m must be positive")]
+)
+def test_numbers_that_no_run_can_have_are_errors_of_the_command_line(phigen, chain, option, said):
+    done = phigen("run", chain, option, "-t", "numpy")
+    assert (done.exit_code, said in done.stderr) == (2, True)
+
+
 def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_path, monkeypatch):
     from matplotlib.animation import FFMpegWriter
     from PIL import Image
