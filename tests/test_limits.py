@@ -17,6 +17,7 @@ from phigen.realisations import sampled
 from phigen.scheme import discretisation
 from phigen.scheme.estimate import OperationCount, TooManyError, path_operations
 from phigen.scheme.generating import collected_form, graph_form
+from phigen.scheme.kernels import newton_solvers
 from phigen.scheme.lowering import cost
 from phigen.series.hamilton_jacobi import PolynomialSeries, polynomial_series
 from phigen.spec import limits, loads
@@ -254,6 +255,15 @@ def test_the_equations_of_a_path_are_counted_too(monkeypatch):
     monkeypatch.setattr(discretisation, "generating_function", lambda *_: direct)  # which is not too large by itself
     with pytest.raises(LimitError, match="the matrices of a step would take more"):
         compile_spec(replace(text, composition="none"))
+
+
+def test_an_elimination_that_is_too_long_for_a_function_is_a_loop(monkeypatch):
+    """Its operations were compared with n³ only, which are millions where n is 200."""
+    direct = compile_spec(loads(fput(8)), order=2).program.step
+    assert direct.eliminate is not None
+    monkeypatch.setattr(limits, "OPERATIONS", cost(direct.eliminate.roots) // 2)
+    kernels = newton_solvers(direct.linearise)
+    assert (kernels.eliminate, kernels.factors) == (None, None)
 
 
 def test_a_step_that_is_too_large_is_refused_before_anything_is_proved(monkeypatch):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from phigen import progress
 from phigen.scheme.lowering import COST
 from phigen.symbolic.expression import ZERO, Expression, symbol, total
 from phigen.symbolic.symbols import Symbol
@@ -88,15 +89,16 @@ def factorise(pattern: Pattern) -> Factors:
     upper: dict[tuple[int, int], Expression] = {}
     reciprocals: list[Expression] = [ZERO] * n
     order = pivot_order(pattern)
-    for position, k in enumerate(order):
-        later = order[position + 1 :]
-        reciprocals[k] = 1 / a[k][k]
-        filled = [j for j in later if not a[k][j].is_zero]
-        upper |= {(k, j): a[k][j] for j in filled}
-        for i in (i for i in later if not a[i][k].is_zero):
-            factor = lower[i, k] = a[i][k] * reciprocals[k]
-            for j in filled:
-                a[i][j] = a[i][j] - factor * a[k][j]
+    with progress.stage("elimination", n) as running:
+        for running.done, k in enumerate(order, 1):
+            later = order[running.done :]
+            reciprocals[k] = 1 / a[k][k]
+            filled = [j for j in later if not a[k][j].is_zero]
+            upper |= {(k, j): a[k][j] for j in filled}
+            for i in (i for i in later if not a[i][k].is_zero):
+                factor = lower[i, k] = a[i][k] * reciprocals[k]
+                for j in filled:
+                    a[i][j] = a[i][j] - factor * a[k][j]
     return Factors(tuple(order), lower, upper, tuple(reciprocals))
 
 

@@ -16,11 +16,12 @@ from phigen.scheme.program import Observables
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
 from phigen.scheme.steps import Factorisation
+from phigen.spec import limits
 from phigen.symbolic.expression import ONE, ZERO, Expression, number, symbol, total
 from phigen.symbolic.symbols import STEP, Symbol, momentum
 
 #: Largest dimension whose elimination is unrolled in any case; beyond, where zeros leave no more than such a part of n³
-#: operations (a full matrix takes 0.7).
+#: operations (a full matrix takes 0.7), and that is no more than one function may have.
 UNROLLED, SPARSE = 4, 0.6
 
 
@@ -98,7 +99,7 @@ def newton_solvers(linearised: Kernel) -> Solvers:
     n = len(jacobian)
     if n <= UNROLLED:
         return Solvers(_elimination_kernel(jacobian), inverse(n))
-    if operations(jacobian) > SPARSE * n**3:
+    if operations(jacobian) > min(SPARSE * n**3, limits.OPERATIONS):
         return Solvers()
     return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factorise(jacobian), slope))
 
