@@ -62,6 +62,7 @@ def built(tmp_path, environment=None, cwd=None, python=(), specs=None):
     return {str(p.relative_to(output)): p.read_bytes() for p in sorted(output.rglob("*")) if p.is_file()}
 
 
+@pytest.mark.slow
 def test_output_depends_neither_on_hash_seed_nor_locale_nor_folder(tmp_path):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()

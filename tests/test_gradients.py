@@ -21,6 +21,7 @@ def task(name):
     return module
 
 
+@pytest.mark.slow
 def test_moments_of_inertia_are_found_to_their_errors():
     module = task("moments_of_inertia")
     unknown, errors = module.main()

@@ -59,6 +59,7 @@ def test_python_example_prints_what_the_readme_says(workshop):
     assert workshop(sys.executable, "example.py") == block("What it prints")
 
 
+@pytest.mark.slow
 def test_commands_of_the_text_work(tmp_path):
     (tmp_path / "tumbler.yaml").write_text(block("`tumbler.yaml`"), encoding="utf-8")
     commands = re.findall(r"`(phigen (?:run|show) [^`]*)`", README.replace("\n", " "))

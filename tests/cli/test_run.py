@@ -78,17 +78,17 @@ def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
 
 
 def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
-    run = ("run", *EVERYTHING, "--steps", 600, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
+    run = ("run", *EVERYTHING, "--steps", 1500, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
     whole = phigen(*run)
     assert json.loads(whole.stdout)["section"]["crossings"] > 1
     names = ("a.npz", "s.csv", "f.svg")
     expected = files(*names)
     for name in names:
         Path(name).unlink()
-    with interrupted(5, steps=77):
+    with interrupted(15, steps=77):
         assert phigen(*run).exit_code == 130
     with np.load("a.npz") as stored:  # what there is can be read
-        assert 10 < len(stored["t"]) < 300
+        assert 10 < len(stored["t"]) < 140
     assert len(Path("s.csv").read_text().splitlines()) > 1
     done = phigen(*run, "--resume")
     assert files(*names) == expected

@@ -70,6 +70,7 @@ def test_names_and_ticks_in_space_do_not_meet_and_are_in_the_figure(dimension, s
     assert ("speed5 / 10⁻³" in [name for name, _ in texts]) == (dimension == 6)
 
 
+@pytest.mark.slow
 def test_a_run_is_drawn_on_one_page():
     sections = {"x3 = 0": spiral().x}
     figure = run_figure({"a": spiral(), "b": spiral(broken=20)}, CASIMIR, sections, "title")
@@ -87,6 +88,7 @@ def test_svg_is_a_function_of_what_it_shows():
     assert PALETTE["series-2"] in first
 
 
+@pytest.mark.slow
 def test_drawing_leaves_the_settings_of_matplotlib_alone(tmp_path):
     code = (
         "import sys, matplotlib as m; m.rcParams['font.size'] = 31\n"

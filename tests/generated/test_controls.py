@@ -101,6 +101,7 @@ order: 1
 FIELDS = [(("x", "y", "z"), False), (("x", "y", "-2*z"), True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("field", "poisson"), slow_but(FIELDS[:1], FIELDS))
 def test_magnetic_field_with_sources_gives_no_poisson_bracket(field, poisson):
     """div B ≠ 0: the Jacobi identity is refuted, and not even the exact flow preserves the bracket."""

@@ -40,6 +40,7 @@ def test_steps_that_are_too_large_lead_nowhere_else(stride):
     assert np.max(energy) < 2 * energy[0]
 
 
+@pytest.mark.slow
 def test_steps_in_numpy_that_lead_elsewhere_are_tried_again():
     """Without, the energy is 700 times as large from some step on, and no step fails."""
     energy = solver_of(compile_text(RATTLEBACK), "numpy").integrate([0.01, 0.5, -1], h=0.45, steps=120).energy

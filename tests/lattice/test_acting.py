@@ -297,6 +297,7 @@ def test_the_weak_order_is_reached_on_lattices(scheme: str, order: int) -> None:
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.slow
 def test_an_open_chain_of_spins_has_its_energy_at_every_temperature() -> None:
     text = TEXTS["bath"].replace("axes: [i, j], boundary: [periodic, open]", "axes: [i], boundary: open")
     text = text.replace(" + x*x[j+1] + y*y[j+1] + z*z[j+1]", "")

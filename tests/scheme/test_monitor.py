@@ -129,6 +129,7 @@ def test_the_time_of_s_1_alone_has_order_2(kepler):
     assert 3 < errors[0] / errors[1] < 5
 
 
+@pytest.mark.slow
 def test_states_at_times_are_on_the_orbit_and_until_ends_there():
     made = solver_of(compiled_text(BODY, 8), "c")
     found = made.integrate(BODY_START, 0.02, 300, stride=25)

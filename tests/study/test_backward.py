@@ -78,6 +78,7 @@ order: 6
 """
 
 
+@pytest.mark.slow
 def test_numbers_for_the_parameters_make_a_formula_that_would_be_too_large():
     compilation = compile_spec(spec.loads(GYROSTAT))
     with pytest.raises(LimitError):

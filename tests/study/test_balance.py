@@ -60,6 +60,7 @@ def test_the_balance_is_kept_to_the_order_of_the_method_and_has_no_drift():
     assert rows.energy[200] - rows.energy[0] == pytest.approx(work, abs=2e-3)
 
 
+@pytest.mark.slow
 def test_all_checks_hold_from_any_time_on():
     compilation = compile_text(DUFFING)
     solvers = {target: solver(compilation, target) for target in ("c", "numpy")}
@@ -90,6 +91,7 @@ def test_a_run_begins_at_its_time(tmp_path):
     assert "t = 0.7 … 6.7" in shown.output
 
 
+@pytest.mark.slow
 def test_figures_and_reports_show_the_balance(tmp_path):
     path = tmp_path / "duffing.yaml"
     text = DUFFING.replace(

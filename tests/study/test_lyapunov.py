@@ -60,6 +60,7 @@ def test_a_chaotic_orbit_has_a_positive_exponent_and_its_mirror_image():
     assert regular.largest < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_directions_across_the_leaves_add_zeros(target):
     """Two Casimirs of the top: their differentials are carried along unchanged, so two exponents vanish like 1/t."""

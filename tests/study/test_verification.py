@@ -186,6 +186,7 @@ def test_differences_are_good_to_ten_digits():
     assert np.max(np.abs(by_differences(method, START, 0.2) - method.tangent(START, 0.2))) < 1e-10
 
 
+@pytest.mark.slow
 def test_a_gauge_is_held_fixed():
     compilation = compilation_of(TEXT.replace("gauge: none", "gauge: auto"))
     assert compilation.program.gauge
@@ -211,6 +212,7 @@ def test_command_prints_a_table(file):
     assert "FAILED" not in result.output
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("steps", [1, 4])
 def test_a_run_of_few_steps_is_verified(file, steps):
     file.write_text(TEXT.replace("steps: 2000", f"steps: {steps}"), encoding="utf-8")
@@ -244,6 +246,7 @@ def test_every_row_has_a_meaning_which_the_documentation_gives(name):
         assert meaning.failure or not check.limit, check.name
 
 
+@pytest.mark.slow
 def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
     (tmp_path / "a.yaml").write_text(TEXT, encoding="utf-8")
     (tmp_path / "b.yaml").write_text(TEXT.replace("name: t", "name: b"), encoding="utf-8")
