@@ -197,7 +197,6 @@ NOISY = "noise: {kicks: {hamiltonian: x, amplitude: 0.3}, turns: {hamiltonian: z
 @pytest.mark.parametrize(
     ("kind", "text", "short"),
     [
-        (LatticeSolver, RING, []),
         (LatticeSolver, RING + NOISY, []),
         (Midpoint, RING, ["Poisson identity"]),
         (Backwards, RING, ["Poisson identity", "tangent map"]),
