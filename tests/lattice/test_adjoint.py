@@ -48,12 +48,13 @@ OWN = {"driven": DRIVEN, "far_open": SPECS["far_open"], "spin_graph": SPECS["spi
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
 #: colours and parameters at bonds, pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
+IN_C["heisenberg_plane small"] = (4, 6)
 
 
 @cache
 def made(name, target="numpy"):
-    lattice, *series = name.split()
-    more = {"scheme": "series", "order": 2} if series else {}
+    lattice, *how = name.split()
+    more = {"series": {"scheme": "series", "order": 2}, "small": {"profile": "small"}}.get(" ".join(how), {})
     more |= {"tangent": target == "c"}
     spec = phigen.spec.loads(OWN[lattice]) if lattice in OWN else lattice
     return phigen.compile(spec, target=target, adjoint=True, **more)

@@ -9,6 +9,7 @@
 #include "rows.c"
 
 /* ---- The transpose of steps ---- */
+#if PHI_SHARES
 #if PHI_GATHER
 enum { PHI_ADDED = 2 * PHI_PIECE }; /* sites whose shares in a sum are kept apart before they are added */
 #else
@@ -27,6 +28,7 @@ static inline double phi_added(const double *values, ptrdiff_t count)
     return sum;
 }
 
+#endif
 #if !PHI_ONE_ROW
 /* The rows from which a row is handed what is its own; beyond open ends a row of zeros after all others. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])

@@ -252,9 +252,8 @@ def _handing(program: Program, layout: Layout, part: int, handed: Sequence[Hande
 def _givers(program: Program) -> list[str]:
     name = program.name
     return [
-        f"ptrdiff_t givers[{name}_LINES];",
-        f"{name}_find_givers(s, unit, givers);",
-        "at.row.at = givers;",
+        f"{name}_find_givers(s, unit, at.givers);",
+        "at.row.at = at.givers;",
     ]
 
 

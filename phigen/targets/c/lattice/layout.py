@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
+from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import VARIED, Gather, Partners, Sweeps
 from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 
@@ -120,6 +121,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
         "HANDS": any(hands(step)),
+        "SHARES": shares(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "BANDED": banded,
@@ -155,6 +157,16 @@ def hands(step: Sweeps) -> list[bool]:
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
         found.append(beside or any(sweep.gather for sweep in part))
     return found
+
+
+def shares(step: Sweeps) -> bool:
+    """Whether sites have shares in the cotangents of coefficients."""
+    swept = [sweep for part in step.parts for sweep in part]
+    names = {sweep.kernel.name + BACK for sweep in swept}
+    if step.partners and not step.partners.graph:
+        names |= {kernel.name + BACK for sweep in swept if sweep.gather for kernel in sweep.gather.kernels}
+    kernels = [kernel for kernel in step.adjoint.steps if kernel.name in names] if step.adjoint else []
+    return any(not e.is_zero for kernel in kernels for _, e in kernel.along(TABLE))
 
 
 def bounds(weight: str) -> list[tuple[int, int]]:
