@@ -115,7 +115,8 @@ def _compared(
 
 def _collect(examination: Examination, collector: Collector, console: Console) -> None:
     counts = Counter(s.verdict for s in examination.statements)
-    console.note(f"{examination.spec.file}: " + ", ".join(f"{n} {verdict}" for verdict, n in counts.items()))
+    told = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+    console.note(f"{examination.spec.file}: {told or 'nothing was proved'}")
     mistakes = [s.name for _, s in examination.mistakes]
     if mistakes:
         collector.errors.append(CheckError(f"{examination.spec.file}: refuted: {'; '.join(mistakes)}"))

@@ -11,6 +11,7 @@ from cli_specs import NOT_POISSON
 from systems import slow_but
 
 from phigen import resources, spec
+from phigen.scheme import discretisation
 
 SPECS = resources.bundled_specs()
 
@@ -26,6 +27,15 @@ def test_check_groups_statements_and_never_says_just_ok(phigen):
     assert "proved               {α_i, α_j} = π_ij∘α" in done.stdout
     assert "S_2, S_4, S_6 = 0" in done.stdout
     assert "3 generic points" in done.stdout
+
+
+def test_check_says_that_nothing_was_proved_of_what_is_too_large(phigen, monkeypatch):
+    monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 50)
+    done = phigen("check", SPECS / "rigid_body.yaml")
+    assert done.exit_code == 3
+    assert "rigid_body.yaml: nothing was proved\n" in done.stderr
+    assert "error: the matrices of a step would take more than 50 operations" in done.stderr
+    assert "hint: ask for a lower order" in done.stderr
 
 
 def test_check_refutes_with_residual_and_goes_on(phigen, write):
