@@ -12,6 +12,8 @@ from support import compiled, solver, values
 
 from phigen import resources
 
+pytestmark = pytest.mark.corpus
+
 REFERENCES = json.loads(Path(__file__).with_name("references.json").read_text(encoding="utf-8"))["references"]
 BUNDLED = {path.stem for path in resources.bundled_specs().glob("*.yaml")}
 

@@ -16,6 +16,8 @@ from phigen.runtime.modules import load_module
 from phigen.spec.model import Extras
 from phigen.symbolic.numeric import evaluate
 
+pytestmark = pytest.mark.corpus
+
 
 @cache
 def gauged(name, profile="fast"):

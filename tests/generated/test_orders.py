@@ -59,8 +59,7 @@ def test_symmetric_methods_have_even_orders(name, order):
 
 
 ONE_SIDED = {"separable": ROD, "not separable": BEAD}
-QUICK_ONE_SIDED = [("separable", "q", k) for k in (1, 3)] + [("separable", "p", k) for k in (2, 4)]
-QUICK_ONE_SIDED += [("not separable", "q", k) for k in (2, 4)] + [("not separable", "p", k) for k in (1, 3)]
+QUICK_ONE_SIDED = [("separable", "q", 1), ("separable", "p", 2), ("not separable", "q", 4), ("not separable", "p", 3)]
 
 
 @pytest.mark.parametrize(("kind", "side", "order"), slow_but(QUICK_ONE_SIDED, product(ONE_SIDED, "qp", [1, 2, 3, 4])))

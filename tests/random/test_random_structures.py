@@ -18,6 +18,8 @@ from phigen import spec
 from phigen.compiler import examine
 from phigen.symbolic.verdict import CHECKED, PROVED
 
+pytestmark = pytest.mark.slow
+
 EPS = np.finfo(float).eps
 SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "2"))
 DRAWS = slow_but(product(KINDS, [0]), product(KINDS, range(SEEDS)))

@@ -11,6 +11,8 @@ from phigen import solve_ivp
 from phigen.errors import StepError
 from phigen.runtime.crossings import CrossingFinder, root
 
+pytestmark = pytest.mark.corpus
+
 ULP = np.finfo(float).eps
 
 

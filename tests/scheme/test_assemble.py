@@ -15,6 +15,8 @@ from phigen.scheme.steps import Explicit, Newton
 from phigen.series.hamilton_jacobi import graph_series
 from phigen.symbolic.symbols import coefficient
 
+pytestmark = pytest.mark.corpus
+
 
 @pytest.mark.parametrize(
     ("order", "terms", "symmetric", "expected"),
