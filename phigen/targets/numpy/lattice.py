@@ -81,7 +81,9 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     parts = ["lattice", "lattice_sites", *graphs, *drawing, *(_SERIES if step.equation else ("lattice_splitting",))]
     parts += ["lattice_steps", *(["lattice_tangent"] if program.extras.tangent else [])]
     pieces = [render("numpy", f"{part}.py", values) for part in parts]
-    pieces += [render("numpy", "lattice_adjoint.py", values)] if step.adjoint else []
+    if step.adjoint:
+        kind = "series" if step.equation else "splitting"
+        pieces += [render("numpy", f"lattice_adjoint{part}.py", values) for part in (f"_{kind}", "")]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [

@@ -260,8 +260,14 @@ def _givers(program: Program) -> list[str]:
 def _added(program: Program, step: Sweeps, layout: Layout) -> str:
     """How the derivatives along parameters are added to those of the caller."""
     member = members(program)
-    plain = [member[p.name] for p in program.parameters if p.at == "all"]
-    sites: Mapping[str, int] = {member[p]: layout.bar(p) for p in step.sites.parameters}
-    bonds = {member[p]: layout.bar(p) for p in step.sites.at_bonds}
-    values = {"NAME": program.name, "numbers": plain, "sites": list(sites.items()), "bonds": list(bonds.items())}
+    numbers = [(member[p.name], place) for place, p in enumerate(p for p in program.parameters if p.at == "all")]
+    sites = [(member[p], layout.bar(p)) for p in step.sites.parameters]
+    bonds = [(member[p], layout.bar(p)) for p in step.sites.at_bonds]
+    values = {
+        "NAME": program.name,
+        "numbers": numbers,
+        "sites": sites,
+        "bonds": bonds,
+        "numbers_only": not (sites or bonds),
+    }
     return render("c", "lattice_bars.c", values)
