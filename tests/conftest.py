@@ -1,5 +1,6 @@
 import gc
 import re
+import signal
 
 import pytest
 from systems import NAMES, QUICK
@@ -20,6 +21,9 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     # What is compiled is kept for the tests that follow: there is much to go through, and little of it is garbage.
     gc.set_threshold(200_000, 20, 100)
+    # In the background of a shell interrupts are ignored, and children would ignore them as well.
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     if not toolchain.available():
         raise pytest.UsageError("the tests need a C compiler; on Debian: apt-get install gcc libc6-dev")
     config.addinivalue_line("markers", "slow: long; left out unless --all or -m is given, or the test is named by `::`")

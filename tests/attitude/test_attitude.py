@@ -9,7 +9,6 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj
 from support import javascript
-from systems import slow_but
 
 import phigen
 from phigen import spec as specs
@@ -240,7 +239,8 @@ def test_the_attitude_has_the_order_of_the_method(order, gauge):
     assert abs(np.log(few / many) / np.log(counts[1] / counts[0]) - order) < 0.25 + 0.06 * order
 
 
-@pytest.mark.parametrize("case", slow_but(["body"], ["body", "body with a given gauge"]))
+@pytest.mark.parametrize("case", ["body", "body with a given gauge"])
+@pytest.mark.slow
 def test_the_attitude_is_that_of_the_closed_form_to_round_off(case):
     assert errors(case, 12, [60])[0] < 1e-13
 

@@ -55,7 +55,7 @@ def test_nothing_is_left_of_a_file_that_does_not_fit(phigen, write, command):
     assert tree("out") == {}
 
 
-@pytest.mark.parametrize("file", ["a.csv", "a.npz"])
+@pytest.mark.parametrize("file", ["a.csv", pytest.param("a.npz", marks=pytest.mark.slow)])
 def test_a_run_that_fills_the_disk_goes_on_where_there_is_room(phigen, write, file, monkeypatch):
     monkeypatch.setattr("phigen.cli.recording.CHECKPOINT_SECONDS", 0.0)
     write("a.yaml")

@@ -42,8 +42,9 @@ def files(*names):
 
 @pytest.mark.parametrize(
     ("name", "target", "suffix"),
-    [("rigid_body", "c", "csv"), ("rigid_body", "numpy", "npz"), ("pendulum_euler", "numpy", "csv"),
-     ("charged_particle", "c", "npz"), pytest.param("guiding_centre", "c", "npz", marks=pytest.mark.slow)],
+    [("rigid_body", "c", "csv"), ("pendulum_euler", "numpy", "csv"),
+     ("charged_particle", "c", "npz"), pytest.param("rigid_body", "numpy", "npz", marks=pytest.mark.slow),
+     pytest.param("guiding_centre", "c", "npz", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_an_interrupted_run_goes_on_to_the_same_bytes(phigen, in_tmp, name, target, suffix):
     run = ("run", SPECS / f"{name}.yaml", "-t", target, "--steps", 60, "-o", f"a.{suffix}", "--json")
@@ -77,6 +78,7 @@ def test_a_run_interrupted_before_its_first_step_starts_once(phigen, in_tmp):
     assert len(times) == len(set(times)) == 7  # every second state, and the last
 
 
+@pytest.mark.slow
 def test_sections_and_exponents_go_on_as_well(phigen, in_tmp):
     run = ("run", *EVERYTHING, "--steps", 1500, "--section", "s.csv", "-o", "a.npz", "--plot", "f.svg", "--json")
     whole = phigen(*run)
@@ -143,6 +145,7 @@ def test_an_integration_that_fails_keeps_its_rows(phigen, in_tmp):
     assert sorted(p.name for p in in_tmp.iterdir()) == ["a.npz", "a.png"]
 
 
+@pytest.mark.slow
 def test_resuming_another_run_is_refused_and_says_why(phigen, in_tmp):
     run = ("run", SPECS / "rigid_body.yaml", "-o", "a.csv")
     with interrupted(3):

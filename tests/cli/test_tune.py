@@ -20,6 +20,7 @@ def paste(source, found):
     return head + "\n".join(found["lines"]) + "\n"
 
 
+@pytest.mark.slow
 def test_pasted_lines_reach_the_accuracy_at_the_proposed_step(phigen, in_tmp):
     path = SPECS / "henon_heiles.yaml"
     done = phigen("tune", path, "--accuracy", "1e-6", "--horizon", "500", "--budget", "3", "--json", "--plot", "w.svg")
@@ -49,6 +50,7 @@ def test_table_names_the_proposal_and_the_lines(phigen):
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 def test_accuracy_beyond_rounding_is_not_reached_and_that_is_explained(phigen):
     done = phigen(
         "tune", SPECS / "henon_heiles.yaml", "--accuracy", "1e-15", "--horizon", "1e6", "--budget", "2", "--json"
@@ -59,6 +61,7 @@ def test_accuracy_beyond_rounding_is_not_reached_and_that_is_explained(phigen):
     assert "rounding" in done.stderr
 
 
+@pytest.mark.slow
 def test_chaotic_orbits_have_no_reference_over_long_times(phigen):
     done = phigen("tune", SPECS / "henon_heiles.yaml", "--run", "chaotic", "--measure", "orbit", "--budget", "3")
     assert done.exit_code == 5
@@ -80,6 +83,7 @@ def test_wrong_usage(phigen, wrong):
     assert phigen("tune", SPECS / "henon_heiles.yaml", *wrong.split()).exit_code == 2
 
 
+@pytest.mark.slow
 def test_without_compiler_numpy_is_timed(phigen, without_compiler):
     done = phigen("tune", SPECS / "harmonic_oscillator.yaml", "--horizon", "3", "--budget", "3", "--json")
     assert done.exit_code == 0, done.stderr

@@ -22,7 +22,6 @@ from lattice.test_sweeps import (
     poisson_at,
     start,
 )
-from systems import slow_but
 
 from phigen import spec as specs
 from phigen.api import lattice_solver_of, solver_of
@@ -56,7 +55,7 @@ def derivative(name: str, target: str, x: np.ndarray, parameters: dict[str, Any]
 
 #: Where C is looked at: open ends, colours, a graph of colours, pairs, the series on all of these.
 IN_C = ("xxz_open", "sheet", "charges", "magnet", "volterra", "dragged", "tangle", "vortices")
-pytestmark = pytest.mark.few("fput", "sheet", "charges", "magnet", "dragged", "tangle", of=TEXTS)
+pytestmark = pytest.mark.few("fput", "sheet", "charges", "magnet", "tangle", of=TEXTS)
 
 
 @pytest.mark.parametrize("name", [*IN_C, "fput", "ablowitz_ladik", "toda", "web", "network", "pond"])
@@ -91,7 +90,8 @@ def test_the_derivative_is_that_of_the_ordinary_system(name: str) -> None:
     np.testing.assert_allclose(carried.reshape(x.size, x.size).T, matrix, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("name", slow_but(["sheet"], ["sheet", "dragged"]))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["sheet", "dragged"])
 def test_steps_with_tangent_vectors_are_those_without_on_any_number_of_threads(name: str) -> None:
     x, found = start(name, (70, 90)), solver(name, "c")
     vectors = np.random.default_rng(4).normal(size=(2, *x.shape))

@@ -95,6 +95,7 @@ def test_missing_file_is_an_error_of_the_spec(phigen):
     assert "there is no file" in done.stderr
 
 
+@pytest.mark.slow
 def test_without_compiler_times_are_those_of_python(phigen, without_compiler):
     text = GOOD.format(name="a", order=2).replace("steps: 50", "steps: 4")
     done = phigen(write(text), "--quick")

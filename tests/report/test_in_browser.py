@@ -15,6 +15,9 @@ from phigen.lattice.states import start_of
 from phigen.report.panel import panel_page
 from phigen.study.classical import rk4
 
+#: A browser takes seconds to start; what the page is made of has tests of its own.
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def browser(made, tmp_path_factory):
@@ -34,7 +37,6 @@ def test_nothing_complains_and_nothing_is_loaded(browser, made):
     assert browser.value("window.broken") is None
 
 
-@pytest.mark.slow
 def test_policy_stops_what_should_get_past_the_escaping(browser):
     script = "const s = document.createElement('script'); s.textContent = 'window.broken = 1'; document.body.append(s)"
     browser.value(f"{{{script}}}")
@@ -67,7 +69,6 @@ def inked(browser):
     )
 
 
-@pytest.mark.slow
 def test_viewer_turns_by_mouse_and_keys(browser):
     assert inked(browser) > 500
     canvas = "document.getElementById('viewer-canvas')"
@@ -86,7 +87,6 @@ def test_viewer_turns_by_mouse_and_keys(browser):
     assert view(browser) == [yaw, pitch, zoom]
 
 
-@pytest.mark.slow
 def test_slider_moves_along_the_trajectory(browser):
     state = "document.getElementById('viewer-state').textContent"
     assert "x1 = 0.3000, x2 = 1.0000" in browser.value(state)
@@ -134,7 +134,6 @@ def test_panel_makes_the_steps_of_the_solver_and_of_rk4(browser, made):
     assert shown == f"{mantissa}·10⁻{'⁰¹²³⁴⁵⁶⁷⁸⁹'[int(power)]}"
 
 
-@pytest.mark.slow
 def test_link_of_the_panel_holds_its_settings(browser, made):
     settled(browser, made)
     sliders = "document.querySelectorAll('#live-panel input[type=range]')"
@@ -147,7 +146,6 @@ def test_link_of_the_panel_holds_its_settings(browser, made):
     assert told(browser, "settings") == chosen
 
 
-@pytest.mark.slow
 def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, made):
     waited = "new Promise(done => setTimeout(() => done(document.getElementById('live-steps').textContent), 400))"
     settled(browser, made)
@@ -165,7 +163,6 @@ def test_panel_moves_by_itself_unless_less_motion_is_asked_for(browser, made):
     assert "After" in browser.value("document.getElementById('live-told').textContent")
 
 
-@pytest.mark.slow
 def test_panel_is_used_by_keys(browser, made):
     settled(browser, made)
     before = told(browser, "settings")["h"]
@@ -181,7 +178,6 @@ def test_panel_is_used_by_keys(browser, made):
     assert browser.value(turned) != picture
 
 
-@pytest.mark.slow
 def test_panel_fits_a_telephone(browser, made):
     browser.size(375, 800)
     settled(browser, made)
@@ -226,7 +222,6 @@ def panels(tmp_path_factory):
     return made
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("name", LATTICE_PANELS)
 def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name):
     settled(browser, panels[name], "#live&h=0.05")
@@ -265,7 +260,6 @@ def test_fields_move_by_the_steps_of_the_solver_and_of_rk4(browser, panels, name
     assert browser.complaints == []
 
 
-@pytest.mark.slow
 def test_settings_of_a_lattice_are_in_its_link_and_make_it_larger(browser, panels):
     settled(browser, panels["fput"])
     assert len(told(browser, "ours")["x"]) == 10
@@ -285,7 +279,6 @@ def test_settings_of_a_lattice_are_in_its_link_and_make_it_larger(browser, panel
     assert browser.complaints == []
 
 
-@pytest.mark.slow
 def test_lattices_fit_a_telephone(browser, made, panels):
     browser.size(375, 800)
     settled(browser, panels["spins_2"])
@@ -299,7 +292,6 @@ def test_lattices_fit_a_telephone(browser, made, panels):
 # -- the page as a whole
 
 
-@pytest.mark.slow
 def test_turning_by_itself_respects_reduced_motion(browser):
     def yaw_after_a_click():
         browser.key("0")
@@ -326,7 +318,6 @@ def colours(browser):
     )
 
 
-@pytest.mark.slow
 def test_dark_and_light(browser):
     browser.media(prefers_color_scheme="light")
     light = colours(browser)
@@ -342,7 +333,6 @@ def test_dark_and_light(browser):
     browser.media()
 
 
-@pytest.mark.slow
 def test_prints_on_paper(browser):
     browser.media("print", prefers_color_scheme="dark")
     assert colours(browser)[0] == "rgb(255, 255, 255)"
@@ -351,7 +341,6 @@ def test_prints_on_paper(browser):
     assert browser.pdf().startswith(b"%PDF")
 
 
-@pytest.mark.slow
 def test_paper_shows_what_is_folded(browser):
     folded = "document.querySelectorAll('details:not([open])').length"
     before = browser.value(folded)
@@ -362,7 +351,6 @@ def test_paper_shows_what_is_folded(browser):
     assert browser.value(folded) == before
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("width", [360, 1100])
 def test_nothing_sticks_out_sideways(browser, width):
     browser.size(width, 800)

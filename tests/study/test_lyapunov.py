@@ -50,6 +50,7 @@ def test_exponents_of_an_integrable_system_fall_like_log_t_over_t():
     assert found.uncertainty < 0.05
 
 
+@pytest.mark.slow
 def test_a_chaotic_orbit_has_a_positive_exponent_and_its_mirror_image():
     henon_heiles = solver(compiled("henon_heiles").spec)
     chaotic = spectrum(henon_heiles, [0, -0.15, 0.4747806515732606, 0], 0.1, 20_000)

@@ -107,6 +107,7 @@ def test_draws_do_not_depend_on_chunks(members):
     assert abs(np.corrcoef(whole["a"], np.log(whole["b"]))[0, 1]) < 0.2
 
 
+@pytest.mark.slow
 def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path, small_chunks):
     """The state, the largest errors, how often the section was crossed, the exponent, frames; and by the shell."""
     (tmp_path / "s.yaml").write_text(BODY + "sweeps: {one: {over: {I2: [1.5, 2.5], x1: [0.1, 0.2, 0.3]}, frames: 25, "
