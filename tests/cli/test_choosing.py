@@ -48,9 +48,8 @@ def name_of(row):
     return "-".join(row[:2])
 
 
-@pytest.mark.parametrize(
-    "row", [pytest.param(r, id=name_of(r), marks=pytest.mark.slow if "1e-12" in r else ()) for r in ROWS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("row", ROWS, ids=name_of)
 def test_proposed_settings_reach_their_accuracy_and_hardly_more(row):
     name, accuracy, kind, order, step, *_ = row
     assert 0.2 < energy_error(name, kind, order, step) / float(accuracy) <= 1

@@ -223,6 +223,7 @@ def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[st
     return {case: (a, *e) for case, a, e in zip(CARRYING, answers, expected, strict=True)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CARRYING)
 def test_tangent_vectors_are_those_of_numpy_to_roundoff(case: str, carried: dict[str, Any]) -> None:
     found, after, vectors = carried[case]

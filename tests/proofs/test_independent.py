@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import pytest
 import sympy
-from support import QUICK, compile_anew, compile_text, compiled, slow_but
+from support import compile_anew, compile_text, compiled, slow_but
 
 from phigen.errors import LimitError
 from phigen.proofs.independent import OutOfTimeError, compare, decide, time_limit
@@ -68,7 +68,9 @@ def expect_equal(compilation, terms):
     assert bool(others & {"α", "axioms"}) != compilation.chart.path
 
 
-@pytest.mark.parametrize("name", slow_but(QUICK))
+@pytest.mark.parametrize(
+    "name", slow_but(["lotka_volterra", "nambu_pendulum", "pendulum", "pendulum_euler", "rigid_body"])
+)
 def test_the_corpus_is_what_sympy_derives(name):
     expect_equal(compiled(name), TERMS.get(name, 3))
 
@@ -246,6 +248,7 @@ def test_the_time_is_kept_and_what_was_compared_is_said():
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.slow
 def test_the_time_is_kept_where_python_drops_exceptions():
     """Callbacks of weak references, of which caches of expressions have many, do as destructors do."""
 

@@ -65,6 +65,7 @@ def test_only_a_motion_that_is_fast_at_times_asks_for_one(states):
     assert not monitors.is_uneven(lambda x: x, np.ones((10, 2)))
 
 
+@pytest.mark.slow
 def test_monitors_take_fewer_steps_for_the_same_error_and_say_how_they_are_written(states):
     spec = specs.loads(KEPLER)
     compilation = compile_spec(spec)
