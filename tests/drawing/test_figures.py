@@ -54,7 +54,10 @@ def lettered(axes):
     return [(text.get_text(), text.get_window_extent()) for text in texts]
 
 
-@pytest.mark.parametrize(("dimension", "size"), [(3, [1, 1, 1]), (6, [1e-2, 1e-2, 1e-4]), (9, [0.3, 1, 0.05])])
+@pytest.mark.parametrize(
+    ("dimension", "size"),
+    [(3, [1, 1, 1]), (6, [1e-2, 1e-2, 1e-4]), pytest.param(9, [0.3, 1, 0.05], marks=pytest.mark.slow)],
+)
 def test_names_and_ticks_in_space_do_not_meet_and_are_in_the_figure(dimension, size):
     curve = spiral(names=[f"speed{i}" for i in range(1, dimension + 1)])
     curve = replace(curve, x=np.tile(size, dimension // 3) * curve.x + [3.0, *[0.0] * (dimension - 1)])

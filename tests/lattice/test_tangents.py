@@ -55,7 +55,7 @@ def derivative(name: str, target: str, x: np.ndarray, parameters: dict[str, Any]
 
 #: Where C is looked at: open ends, colours, a graph of colours, pairs, the series on all of these.
 IN_C = ("xxz_open", "sheet", "charges", "magnet", "volterra", "dragged", "tangle", "vortices")
-pytestmark = pytest.mark.few("fput", "sheet", "charges", "magnet", "tangle", of=TEXTS)
+pytestmark = pytest.mark.few("fput", "sheet", "charges", "magnet", of=TEXTS)
 
 
 @pytest.mark.parametrize("name", [*IN_C, "fput", "ablowitz_ladik", "toda", "web", "network", "pond"])
