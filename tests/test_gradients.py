@@ -38,6 +38,7 @@ def test_orbit_closes_and_its_multipliers_are_those_of_a_symplectic_map():
     assert np.sort(np.abs(multipliers - 1))[:2].max() < 1e-4  # double, so to half the digits
 
 
+@pytest.mark.slow
 def test_hamiltonian_is_learned_to_the_noise():
     module = task("learned_hamiltonian")
     coefficients, losses = module.main()

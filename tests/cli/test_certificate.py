@@ -22,6 +22,7 @@ def place(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_certificate_is_tied_to_spec_and_files(place):
     result = run("build", place / "t.yaml", "-o", place / "out", "--certify")
     assert result.exit_code == 0, result.output

@@ -60,6 +60,7 @@ def test_what_a_lattice_promises_is_measured(phigen, chain):
     assert checks["reversibility"] < 1e-14
 
 
+@pytest.mark.slow
 def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_path):
     pytest.importorskip("matplotlib")
     text = CHAIN.replace("runs:", "targets: [numpy]\ncasimirs: {}\nruns:").replace(

@@ -45,7 +45,7 @@ def sources(name, tmp_path):
 
 
 @pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
 def test_c_compiles_without_a_warning(name, compiler, sources):
     """All warnings of clang come before it optimises; those of gcc that do not have been asked for by `library`."""
     command = [tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}.c"]

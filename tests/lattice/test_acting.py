@@ -314,6 +314,7 @@ def test_an_open_chain_of_spins_has_its_energy_at_every_temperature() -> None:
         assert np.abs(run.casimirs["C"] - 1).max() < 1e-13
 
 
+@pytest.mark.slow
 def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> None:
     x, values = given("damped")
     cell = compiled("damped", 4).cell

@@ -176,6 +176,7 @@ def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
 
 
+@pytest.mark.slow
 def test_verification_judges_the_balance_of_energy() -> None:
     x, values = given("pushed")
     made = compile_spec(compiled("pushed").spec, order=4, extras=Extras(tangent=True))

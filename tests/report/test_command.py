@@ -25,6 +25,7 @@ def write(text=GOOD):
     return "a.yaml"
 
 
+@pytest.mark.slow
 def test_page_is_written_beside_and_messages_go_to_stderr(phigen):
     done = phigen(write(), "--quick")
     assert done.exit_code == 0

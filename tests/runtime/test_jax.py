@@ -91,6 +91,7 @@ def test_members_share_a_parameter_in_any_way(solver):
     assert close(both[0], expected)
 
 
+@pytest.mark.slow
 def test_derivatives_both_ways_agree(solver):
     back, forth = (propagator(solver, stride=3, forward=forward) for forward in (False, True))
     at, along = (X, 2.2), (jnp.array(0.1 * X[::-1]), 0.7)

@@ -78,6 +78,7 @@ casimirs: {casimirs}
     assert wrong == ["Casimir L: largest error"]
 
 
+@pytest.mark.slow
 def test_modified_hamiltonian_is_constant_to_higher_order_for_each_correction():
     compilation = compilation_of()
     found = verified(compilation, {"c": solver_of(compilation, "c")})
@@ -170,6 +171,7 @@ def test_energy_drift_of_dissipative_methods_is_judged():
     assert growth[0] < 1.5 < verification.GROWTH < growth[1]
 
 
+@pytest.mark.slow
 def test_approximate_realisations_are_labelled_and_held_to_their_order():
     text = TEXT.replace("order: 4", "order: 4\nbirealisation: {kind: spray}")
     compilation = compilation_of(text)
@@ -220,6 +222,7 @@ def test_a_run_of_few_steps_is_verified(file, steps):
     assert result.exit_code == 0, result.output
 
 
+@pytest.mark.slow
 def test_command_for_machines_and_exit_code(file, monkeypatch):
     monkeypatch.setattr(verification, "ONE_STEP", 0.0)
     result = CliRunner().invoke(group, ["verify", "--quick", "--json", str(file)])
