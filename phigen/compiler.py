@@ -233,9 +233,13 @@ def _compiled(
     realisation = early or clock.timed("bi-realisation", lambda: realise(source, _choice(spec, order)))
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
-    given_ = gauged.system, realisation, gauged.series, plan, spec.composition, gauged.gauge.monitor
-    affordable = early is not None and gauged.system is source
-    reached = clock.timed("generating function", lambda: discretise(*given_, affordable=affordable))
+    monitor, affordable = gauged.gauge.monitor, early is not None and gauged.system is source
+    reached = clock.timed(
+        "generating function",
+        lambda: discretise(
+            gauged.system, realisation, gauged.series, plan, spec.composition, monitor, affordable=affordable
+        ),
+    )
     group = _group(spec, source, realisation.kind)
     described |= {"solver": spec.solver, "group": group}
     program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +19,7 @@ from phigen.runtime.given import Given
 from phigen.runtime.gradients import Jacobian, Pullback
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
-from phigen.runtime.members import one_by_one
+from phigen.runtime.members import Members, one_by_one
 from phigen.runtime.named import Named
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Followed, Session, rows_along
@@ -314,15 +314,9 @@ class Solver(Named[Backend, Interface]):
         `StepError` if any member fails: its ``members`` are those that did, its ``trajectory`` the array of states as
         far as each came, with NaN in the rows after that.
         """
-        own: dict[str, Any] = dict(more)
-        draws = arguments.draws(self.interface, own, {"seed": seed, "member": member, "step0": step0})
-        asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
-        threads = threads if threads is None else arguments.count(threads, "threads", 1)
-        try:
-            return self.backend.ensemble(asked, threads)
-        except BackendError as error:
-            h, values, _ = asked.numbers(error.members[0] if error.members else 0)
-            raise self.failure(error, h, error.states, values) from error
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
+        return self._together(asked, threads, self.backend.ensemble)
 
     def attitudes(
         self,
@@ -348,18 +342,12 @@ class Solver(Named[Backend, Interface]):
         with the identity and at the origin. Each is integrated by itself, as by `integrate`. Raises the same as
         `ensemble`, and `TypeError` where the spec does not say ``reconstruct``.
         """
-        own: dict[str, Any] = dict(more)
-        draws = arguments.draws(self.interface, own, {"seed": seed, "member": member, "step0": step0})
-        asked = arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
-        threads = threads if threads is None else arguments.count(threads, "threads", 1)
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
         rows = len(row_steps(asked.steps, asked.stride or max(asked.steps, 1)))
         turned = np.full((rows, len(asked), self.interface.element), np.nan)
         turned[0] = arguments.firsts(attitude0, position0, self.interface, len(asked))
-        try:
-            x = one_by_one(self.backend, asked, threads, turned)
-        except BackendError as error:
-            h, values, _ = asked.numbers(error.members[0])
-            raise self.failure(error, h, error.states, values) from error
+        x = self._together(asked, threads, lambda given, most: one_by_one(self.backend, given, most, turned))
         attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
         assert attitude is not None
         return Turned(x, attitude, position)
@@ -513,6 +501,31 @@ class Solver(Named[Backend, Interface]):
         start = arguments.state(x, what, self.interface)
         size = math.nan if h is None else arguments.step_size(h)
         return Beginning(start, size, values, begin, draws, arguments.first(*first, self.interface))
+
+    def _members(
+        self,
+        X0: ArrayLike,
+        h: ArrayLike,
+        steps: int,
+        stride: int | None,
+        t0: ArrayLike | None,
+        drawn: Mapping[str, int | None],
+        parameters: Mapping[str, ArrayLike] | None,
+        more: Mapping[str, ArrayLike],
+    ) -> Members:
+        """What the user gave for an ensemble, checked."""
+        own: dict[str, Any] = dict(more)
+        draws = arguments.draws(self.interface, own, drawn)
+        return arguments.ensemble(X0, h, steps, stride, t0, parameters, own, self.interface, draws)
+
+    def _together(self, asked: Members, threads: int | None, make: Callable[[Members, int | None], Floats]) -> Floats:
+        """States of members that ``make`` integrates; raises `StepError` for those that fail."""
+        most = threads if threads is None else arguments.count(threads, "threads", 1)
+        try:
+            return make(asked, most)
+        except BackendError as error:
+            h, values, _ = asked.numbers(error.members[0] if error.members else 0)
+            raise self.failure(error, h, error.states, values) from error
 
     def _started(self, at: Beginning) -> Session:
         try:
