@@ -511,15 +511,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def values(self, given: Mapping[str, Any] | None, more: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Any]:
         """All parameters: numbers, and arrays over the sites or the bonds; of a graph the bonds too."""
         about = self.interface
-        everything = {**(given or {}), **more}
+        everything = arguments.together(given, more)
         bonds = {"bonds": checked_bonds(everything.pop("bonds", None), sizes[0])} if about.graph else {}
         shapes = dict.fromkeys(about.at_sites, tuple(sizes))
         shapes |= dict.fromkeys(about.at_bonds, (len(bonds["bonds"]),) if bonds else ())
         arrays = {n: v for n, v in everything.items() if n in shapes}
-        numbers = [
-            {n: v for n, v in part.items() if n in everything and n not in shapes} for part in (given or {}, more)
-        ]
-        values: dict[str, Any] = dict(arguments.parameters(about, *numbers))
+        numbers = {n: v for n, v in everything.items() if n not in shapes}
+        values: dict[str, Any] = dict(arguments.parameters(about, numbers, {}))
         missing = sorted(about.required - set(arrays))
         if missing:
             raise TypeError(f"parameter {missing[0]!r} has no default for all sizes; give an array, or one number")

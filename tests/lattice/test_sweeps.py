@@ -544,6 +544,8 @@ def test_disorder_by_a_formula_has_to_be_given() -> None:
     found = lattice_solver_of(compile_spec(specs.loads(f"phigen: 1\nname: disordered\n{text}\n")), "numpy")
     with pytest.raises(TypeError, match="'e' has no default for all sizes"):
         found.integrate(start("dnls"), 0.1, 1)
+    with pytest.raises(TypeError, match="'e' is given twice"):
+        found.integrate(start("dnls"), 0.1, 1, e=0.2, parameters={"e": 0.1})
 
 
 @pytest.mark.parametrize("name", TEXTS)
