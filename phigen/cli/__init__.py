@@ -86,6 +86,7 @@ class Commands(click.Group):
             interrupts.working = False
             code = failures.report(error, console)
         if standalone_mode:
+            failures.drop_unprinted()
             sys.exit(code)
         return code
 

@@ -63,9 +63,7 @@ def report(error: BaseException, console: Console) -> int:
                 error.show()
             return error.exit_code if isinstance(error, click.UsageError) else USAGE
         case BrokenPipeError():
-            # Whoever read our output has gone. Python would complain again when it flushes stdout at the end.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return BROKEN_PIPE
+            return BROKEN_PIPE  # whoever read our output has gone
         case SeveralError():
             for part in error.errors:
                 report(part, console)
@@ -80,6 +78,17 @@ def report(error: BaseException, console: Console) -> int:
             console.error(f"error: {place + ': ' if place else ''}{error.strerror}")
             return USAGE
     return _internal(error, console)
+
+
+def drop_unprinted() -> None:
+    """Forget what stdout and stderr did not take, which was told: else Python tells it again and exits with 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            if stream is not None:
+                stream.flush()
+        except (OSError, ValueError):
+            with suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _place(error: OSError) -> str:

@@ -1,6 +1,7 @@
 """A full disk, a stdout that takes nothing or not every letter, a working directory that has gone."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -101,9 +102,9 @@ def test_messages_that_cannot_be_printed_do_not_change_the_exit_code(command, co
 def shell(line):
     """A command line of phigen, with redirections."""
     program = "import sys; from phigen.cli import main; main()"
-    return subprocess.run(
-        ["sh", "-c", f'"$0" -c "$1" {line}', sys.executable, program], capture_output=True, text=True, check=False
-    )
+    words = ["sh", "-c", f'"$0" -c "$1" {line}', sys.executable, program]
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    return subprocess.run(words, capture_output=True, text=True, check=False, env=buffered)
 
 
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1"])
