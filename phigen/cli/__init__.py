@@ -95,8 +95,9 @@ class Commands(click.Group):
         try:
             with console.heeding(), console.watching():
                 return super().invoke(ctx)
-        except BrokenPipeError as error:
-            # Not left to click, which would exit with 1, the code of a wrong spec.
+        except (BrokenPipeError, EOFError) as error:
+            # Not left to click, which would exit with 1, the code of a wrong spec, or take it for ^D at a prompt; of
+            # that its prompts make an Abort themselves.
             return failures.report(error, console)
 
 

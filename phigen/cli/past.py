@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -52,19 +54,20 @@ def columns_of(names: Interface) -> list[Column]:
 def past_of(path: Path, names: Interface, option: str) -> Past:
     """What is in a file that a run has written."""
     try:
-        if path.suffix.lower() == ".npz":
-            return _of_npz(path, names)
-        with path.open(encoding="utf-8") as file:
-            header = tuple(file.readline().strip().split(","))
-            rows = np.loadtxt(file, delimiter=",", ndmin=2)
-        past = Past(header, rows)
-        past.last([n for c in columns_of(names)[: 2 + names.monitored] for n in c.names])
-        if len(rows):
+        past = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
+        if len(past.rows):
+            past.last([n for c in columns_of(names)[: 2 + names.monitored] for n in c.names])
             return past
-    except (OSError, ValueError, KeyError, IndexError) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         why = f"it has no column {error}" if isinstance(error, KeyError) else str(error)
         raise click.BadParameter(f"{path} is no file of a run of {names.name}: {why}", param_hint=option) from None
     raise click.BadParameter(f"{path} has no rows", param_hint=option)
+
+
+def _of_csv(path: Path) -> Past:
+    with path.open(encoding="utf-8") as file:
+        header = tuple(file.readline().strip().split(","))
+        return Past(header, np.loadtxt(file, delimiter=",", ndmin=2))
 
 
 def _of_npz(path: Path, names: Interface) -> Past:

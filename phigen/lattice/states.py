@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -127,9 +128,9 @@ class _Reader:
         path = self.folder / file
         try:
             loaded = np.load(path, allow_pickle=False) if file.endswith(".npy") else _table(path)[0]
-        except (OSError, ValueError) as error:
+            return np.asarray(loaded, dtype=np.float64)
+        except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
             raise self._error("initial", f"{name}: cannot read {file!r}: {_reason(error)}") from None
-        return np.asarray(loaded, dtype=np.float64)
 
     def _bonds(self, given: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
         if not isinstance(given.bonds, str):

@@ -158,6 +158,9 @@ def test_what_does_not_fit_is_told(phigen, write):
     swing, body = write("swing.yaml", SWING), write("body.yaml", BODY)
     ran(phigen, swing, "-o", "a.csv")
     Path("words.csv").write_text("some,words\n1,2\n")
+    Path("empty.npz").touch()
+    Path("half.npz").write_bytes(b"PK\x03\x04 the rest is missing")
+    np.savez("other.npz", x=np.ones((2, 2)))
     for args, said in (
         ((swing, "--until", 3, "--steps", 5), "--until and --steps do not go together"),
         ((swing, "--every", 1, "--lyapunov"), "--every and --lyapunov"),
@@ -169,6 +172,9 @@ def test_what_does_not_fit_is_told(phigen, write):
         ((swing, "--extend", "-o", "a.csv", "--set", "q=2"), "of another run"),
         ((swing, "--extend", "-o", "a.csv", "--until", 5), "never reached from 6.0"),
         ((swing, "--from", "words.csv"), "no file of a run of swing: it has no column 't'"),
+        ((swing, "--from", "empty.npz"), "no file of a run of swing: No data left in file"),
+        ((swing, "--from", "half.npz"), "no file of a run of swing: File is not a zip file"),
+        ((swing, "--from", "other.npz"), "no file of a run of swing: it has no column 't'"),
         ((body, "--every", 0.5, "--steps", 10), "say where the run ends in time"),
     ):
         done = phigen("run", *args, "-t", "numpy")

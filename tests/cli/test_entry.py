@@ -9,6 +9,7 @@ import sys
 import time
 from pathlib import Path
 
+import click
 import pytest
 from click.shell_completion import BashComplete
 
@@ -92,9 +93,12 @@ def test_exceeded_limit_is_3(phigen, write):
     assert phigen("check", path).exit_code == 3
 
 
-def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch):
+@pytest.mark.parametrize("kind", [IndexError, EOFError])
+def test_internal_error_is_4_and_asks_for_a_report(phigen, write, monkeypatch, kind):
+    """Also one that click takes for ^D at a prompt."""
+
     def broken(*args, **kwargs):
-        raise IndexError("nobody expected this")
+        raise kind("nobody expected this")
 
     monkeypatch.setattr("phigen.compiler.examine", broken)
     done = phigen("check", write("a.yaml"))
@@ -291,6 +295,11 @@ def test_interrupt_inside_an_import_is_no_internal_error(phigen, write, monkeypa
             raise ImportError("half a module")  # noqa: B904
 
     monkeypatch.setattr("phigen.compiler.examine", broken)
+    assert phigen("check", write("a.yaml")).exit_code == 130
+
+
+def test_the_end_of_input_at_a_prompt_is_an_interrupt(phigen, write, monkeypatch):
+    monkeypatch.setattr("phigen.compiler.examine", lambda *args, **kwargs: click.prompt("really"))
     assert phigen("check", write("a.yaml")).exit_code == 130
 
 
