@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9dcf557ceb7ba4d60d39c7117e52688d5ce6b7659dcc05bc5810c8f5ae5cbb06
+ * body-sha256: e9ae7cdabb97f6238bce9bcb9b0fa707386991acec918002cd7a2f793d92a76f
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -133,35 +133,6 @@ static inline ablowitz_ladik_piece ablowitz_ladik_piece_of(const ablowitz_ladik_
     return piece;
 }
 
-/* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where
-   u is not positive, or not normal. */
-static inline double ablowitz_ladik_log_lane(double u)
-{
-    uint64_t bits, exponent, digits;
-    double m, k, sum = 0.043478260869565216, other = 0.047619047619047616;
-    memcpy(&bits, &u, sizeof bits);
-    exponent = (bits - 0x3fe6a09e667f3bcdU + 0x3ff0000000000000U) >> 52; /* k + 1023 */
-    digits = bits - ((exponent - 1023) << 52);
-    memcpy(&m, &digits, sizeof m);
-    exponent |= 0x4330000000000000U; /* 2^52 + k + 1023, as a double */
-    memcpy(&k, &exponent, sizeof k);
-    k -= 4503599627371519.0;
-    const double f = (m - 1.0) / (m + 1.0), q = f * f, qq = q * q;
-    sum = sum * qq + 0.05263157894736842;
-    other = other * qq + 0.058823529411764705;
-    sum = sum * qq + 0.06666666666666667;
-    other = other * qq + 0.07692307692307693;
-    sum = sum * qq + 0.09090909090909091;
-    other = other * qq + 0.1111111111111111;
-    sum = sum * qq + 0.14285714285714285;
-    other = other * qq + 0.2;
-    sum = (sum * q + other) * q + 0.3333333333333333;
-    /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
-    const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
-    const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
-    return rest + (u >= DBL_MIN && u <= DBL_MAX ? 0.0 : (double)NAN);
-}
-
 /* cos(sqrt(s)), cosh(sqrt(-s)) for negative s: a polynomial where s is small. */
 static inline double ablowitz_ladik_cosroot(double s)
 {
@@ -198,8 +169,8 @@ static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladi
     ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
+    const double *restrict x_row = row->x[0];
+    double *y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
@@ -218,8 +189,7 @@ static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladi
     ptrdiff_t to)
 {
     const double c2 = coef[2], c3 = coef[3];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
+    double *x_row = row->x[0], *y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
@@ -235,8 +205,8 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
     ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1];
-    double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    double *x_row = row->x[0];
+    const double *restrict y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
@@ -256,20 +226,20 @@ static void ablowitz_ladik_sweep_rows(const ablowitz_ladik_solver *s, int part, 
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+        const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
-            ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
             break;
         case 2: /* H_2 */
             ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
-            ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            ablowitz_ladik_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
+            ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_3 */
             ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
-            ablowitz_ladik_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
             break;
         }
     }
@@ -280,25 +250,12 @@ static void ablowitz_ladik_energy_row(const ablowitz_ladik_params *params, const
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
-        out[i - from] = x * x_row[i + 1] + y * y_row[i + 1] - ablowitz_ladik_log_lane(y * y + (1.0 + x * x));
+        out[i - from] = x * x_row[i + 1] + y * y_row[i + 1] - log(y * y + (1.0 + x * x));
     }
-}
-
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void ablowitz_ladik_casimirs_row(const ablowitz_ladik_params *params, const ablowitz_ladik_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
 }
 
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
@@ -306,8 +263,7 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_params *params,
     const ablowitz_ladik_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
@@ -334,10 +290,6 @@ static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrd
     for (int a = 0; a < ablowitz_ladik_AXES; ++a) {
         if (sizes[a] < ablowitz_ladik_least[a] || sizes[a] % ablowitz_ladik_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < ablowitz_ladik_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = ablowitz_ladik_LEAD + ((sizes[ablowitz_ladik_AXES - 1] + 7) / 8 * 8 + ablowitz_ladik_HALO
         + 7) / 8 * 8;
@@ -589,10 +541,8 @@ void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)
 {
     ablowitz_ladik_fill(s, ablowitz_ladik_energy_row, out);
 }
-void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out)
-{
-    ablowitz_ladik_fill(s, ablowitz_ladik_casimirs_row, out);
-}
+/* there are none */
+void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out) { (void)s, (void)out; }
 void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out)
 {
     ablowitz_ladik_fill(s, ablowitz_ladik_vector_field_row, out);

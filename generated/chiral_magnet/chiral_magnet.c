@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4c5d5ec3973e4ba89902c4c9d316b3fbd85d842e5f578779971fbc3595489227
+ * body-sha256: 95d5783a637f4b6d3c1ea13e3130199b3f6f48a59d52c6501f3d68ba5c734309
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -99,13 +99,6 @@ typedef struct {
 #define chiral_magnet_EACH_SITE
 #endif
 
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
-   open ends, where terms that read them have weight 0. */
-static inline void chiral_magnet_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
-{
-    (void)row, (void)length, (void)from, (void)to;
-}
-
 /* What kernels are told of a row. */
 static inline void chiral_magnet_locate(const chiral_magnet_solver *s, size_t index, chiral_magnet_row *row)
 {
@@ -182,7 +175,7 @@ static inline void chiral_magnet_gather1_0_a(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->middle[i]; ++k) {
@@ -208,8 +201,7 @@ static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magn
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
+    double *x_row = row->x[0], *y_row = row->x[1];
     chiral_magnet_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
@@ -228,7 +220,7 @@ static inline void chiral_magnet_gather1_1_b(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
@@ -248,7 +240,7 @@ static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet
     ptrdiff_t to)
 {
     const double c2 = coef[2];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
@@ -265,9 +257,8 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
     ptrdiff_t to)
 {
     const double c0 = coef[0], c3 = coef[3], c4 = coef[4];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    double *x_row = row->x[0], *y_row = row->x[1];
+    const double *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -286,7 +277,7 @@ static inline void chiral_magnet_gather5_0_a(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->middle[i]; ++k) {
@@ -303,7 +294,7 @@ static inline void chiral_magnet_gather5_1_b(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict y_row = row->x[1];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
@@ -321,7 +312,7 @@ static inline void chiral_magnet_gather6_0_a(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict y_row = row->x[1];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->middle[i]; ++k) {
@@ -338,7 +329,7 @@ static inline void chiral_magnet_gather6_1_b(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
@@ -356,7 +347,7 @@ static inline void chiral_magnet_gather7_0_a(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->middle[i]; ++k) {
@@ -373,7 +364,7 @@ static inline void chiral_magnet_gather7_1_b(const double *coef, const chiral_ma
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
@@ -460,9 +451,7 @@ static inline void chiral_magnet_bond_forces_a(const chiral_magnet_params *param
     const chiral_magnet_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double J = params->J, D = params->D;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->middle[i]; ++k) {
@@ -486,9 +475,7 @@ static inline void chiral_magnet_bond_forces_b(const chiral_magnet_params *param
     const chiral_magnet_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double J = params->J, D = params->D;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
@@ -512,9 +499,7 @@ static inline void chiral_magnet_bond_energy_a(const chiral_magnet_params *param
     const chiral_magnet_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double J = params->J, D = params->D;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
         double sum0 = 0.0;
@@ -535,9 +520,7 @@ static inline void chiral_magnet_bond_energy_b(const chiral_magnet_params *param
     const chiral_magnet_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double J = params->J, D = params->D;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
         double sum0 = 0.0;
@@ -561,13 +544,12 @@ static void chiral_magnet_energy_row(const chiral_magnet_params *params, const c
     chiral_magnet_bond_energy_a(params, row, from, to);
     chiral_magnet_bond_energy_b(params, row, from, to);
     const double K = params->K, B = params->B;
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double z = z_row[i];
-        out[i - from] = -(B * z + K * (z * z));
+        out[i - from] = -(B * z + K * (z * z)) + 0.5 * row->gathered[0][i];
     }
-    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];
 }
 
 /* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
@@ -575,9 +557,7 @@ static void chiral_magnet_casimirs_row(const chiral_magnet_params *params, const
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -592,9 +572,7 @@ static void chiral_magnet_vector_field_row(const chiral_magnet_params *params, c
     chiral_magnet_bond_forces_a(params, row, from, to);
     chiral_magnet_bond_forces_b(params, row, from, to);
     const double K = params->K, B = params->B;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -720,10 +698,6 @@ static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdif
     for (int a = 0; a < chiral_magnet_AXES; ++a) {
         if (sizes[a] < chiral_magnet_least[a] || sizes[a] % chiral_magnet_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < chiral_magnet_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = chiral_magnet_LEAD + ((sizes[chiral_magnet_AXES - 1] + 7) / 8 * 8 + chiral_magnet_HALO + 7)
         / 8 * 8;
@@ -752,7 +726,6 @@ static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const
         double *row = rows + (ptrdiff_t)r * s->width;
         memset(row - chiral_magnet_LEAD, 0, (size_t)s->width * sizeof *row);
         memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        chiral_magnet_ends(row, s->length, 0, s->length);
     }
 }
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: cb48144f4f8367239af853b748724cdf4b4cf982e82abf72f0f8753b73193e6f
+ * body-sha256: 48412adaf47f5a2bfcf1bec1cd9ba6a401211f0275b6a89f11fadee30f426ab8
  */
 #include "dnls.h"
 #include <float.h>
@@ -165,8 +165,8 @@ static inline double dnls_sin_lane(double u) { return dnls_turned_sin(u, 0.0); }
 static inline void dnls_sweep1(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1];
+    double *q_row = row->x[0];
     dnls_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         q_row[i] += -(c0 * (p_row[i + 1] + p_row[i - 1]));
@@ -177,8 +177,8 @@ static inline void dnls_sweep1(const double *coef, const dnls_row *row, ptrdiff_
 static inline void dnls_sweep2(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
-    double *p_row = row->x[1] + row->at[0];
+    const double *restrict q_row = row->x[0];
+    double *p_row = row->x[1];
     dnls_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         p_row[i] += c0 * (q_row[i + 1] + q_row[i - 1]);
@@ -189,8 +189,7 @@ static inline void dnls_sweep2(const double *coef, const dnls_row *row, ptrdiff_
 static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c1 = coef[1];
-    double *p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    double *p_row = row->x[1], *q_row = row->x[0];
     dnls_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -210,20 +209,20 @@ static void dnls_sweep_rows(const dnls_solver *s, int part, const double *coef, 
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        dnls_piece at = dnls_piece_of(s, unit);
+        const dnls_piece at = dnls_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             dnls_sweep1(coef, &at.row, at.from, at.to);
-            dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            dnls_ends(s->x[0], s->length, at.from, at.to);
             break;
         case 2: /* H_2 */
             dnls_sweep2(coef, &at.row, at.from, at.to);
-            dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            dnls_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_3 */
             dnls_sweep3(coef, &at.row, at.from, at.to);
-            dnls_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            dnls_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            dnls_ends(s->x[0], s->length, at.from, at.to);
+            dnls_ends(s->x[1], s->length, at.from, at.to);
             break;
         }
     }
@@ -235,8 +234,7 @@ static void dnls_energy_row(const dnls_params *params, const dnls_row *row, ptrd
 {
     (void)apart;
     const double beta = params->beta;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -245,25 +243,12 @@ static void dnls_energy_row(const dnls_params *params, const dnls_row *row, ptrd
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void dnls_casimirs_row(const dnls_params *params, const dnls_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
-}
-
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
 static void dnls_vector_field_row(const dnls_params *params, const dnls_row *row, ptrdiff_t from,
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double beta = params->beta;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -288,10 +273,6 @@ static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
     size_t rows = 1;
     for (int a = 0; a < dnls_AXES; ++a) {
         if (sizes[a] < dnls_least[a] || sizes[a] % dnls_periods[a] != 0 || sizes[a] > most / 2) return 0;
-        if (a < dnls_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = dnls_LEAD + ((sizes[dnls_AXES - 1] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -525,7 +506,7 @@ static void dnls_fill(const dnls_solver *s, dnls_kernel *kernel, double *out)
 }
 
 void dnls_density(const dnls_solver *s, double *out) { dnls_fill(s, dnls_energy_row, out); }
-void dnls_casimirs(const dnls_solver *s, double *out) { dnls_fill(s, dnls_casimirs_row, out); }
+void dnls_casimirs(const dnls_solver *s, double *out) { (void)s, (void)out; } /* there are none */
 void dnls_vector_field(const dnls_solver *s, double *out) { dnls_fill(s, dnls_vector_field_row, out); }
 
 const char *dnls_status_string(dnls_status status)

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f27701140b4c848d3d97120d886c3f84755b8dc3f61db20c54d6b0e9e7320b82
+ * body-sha256: 9f1ac39a8472f0b498ff80b3aa12a6851d33c77184d05a34f155274110c2e169
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -34,16 +34,10 @@ enum { dnls_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_disorder_FLOWS = 25 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { dnls_disorder_JOINED = 25 };
-enum { dnls_disorder_WEIGHTS = 2 }; /* kinds of terms that open ends take away */
 
 /* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t dnls_disorder_least[dnls_disorder_AXES] = { 2 };
 static const size_t dnls_disorder_periods[dnls_disorder_AXES] = { 1 };
-
-/* The terms of H that open ends take away: the least and the largest offsets that they reach along each
-   axis. */
-static const int dnls_disorder_weights[dnls_disorder_WEIGHTS][dnls_disorder_AXES][2] = { { { 0, 1 } },
-    { { -1, 0 } } };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */
@@ -83,8 +77,6 @@ typedef struct {
     double *const *x;    /* see dnls_disorder_solver */
     const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;    /* sites of a row */
-    /* 1 for terms of H that are there as far as the other axes say, else 0 */
-    double present[dnls_disorder_WEIGHTS];
 } dnls_disorder_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -109,32 +101,12 @@ static inline void dnls_disorder_ends(double *row, ptrdiff_t length, ptrdiff_t f
     }
 }
 
-/* The position of a row along all axes but the last. */
-static inline void dnls_disorder_place(const dnls_disorder_solver *s, size_t index,
-    ptrdiff_t place[dnls_disorder_AXES])
-{
-    place[dnls_disorder_AXES - 1] = 0;
-    for (int a = dnls_disorder_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
-}
-
 /* What kernels are told of a row. */
 static inline void dnls_disorder_locate(const dnls_disorder_solver *s, size_t index, dnls_disorder_row *row)
 {
     row->x = s->x;
     row->at = s->lines + index * dnls_disorder_LINES;
     row->length = s->length;
-    ptrdiff_t place[dnls_disorder_AXES];
-    dnls_disorder_place(s, index, place);
-    for (int k = 0; k < dnls_disorder_WEIGHTS; ++k) {
-        int there = 1;
-        for (int a = 0; a < dnls_disorder_AXES - 1; ++a)
-            there = there && place[a] + dnls_disorder_weights[k][a][0] >= 0 &&
-                place[a] + dnls_disorder_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
-        row->present[k] = there ? 1.0 : 0.0;
-    }
 }
 
 enum { dnls_disorder_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -198,12 +170,12 @@ static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1];
+    double *q_row = row->x[0];
     dnls_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         q_row[i] += -(c0 * (p_row[i - 1] * w1 + p_row[i + 1] * w0));
     }
 }
@@ -213,12 +185,12 @@ static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
-    double *p_row = row->x[1] + row->at[0];
+    const double *restrict q_row = row->x[0];
+    double *p_row = row->x[1];
     dnls_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         p_row[i] += c0 * (w0 * q_row[i + 1] + w1 * q_row[i - 1]);
     }
 }
@@ -228,9 +200,8 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
     ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1];
-    const double *restrict e_row = row->x[2] + row->at[0];
-    double *p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    const double *restrict e_row = row->x[2];
+    double *p_row = row->x[1], *q_row = row->x[0];
     dnls_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double e = e_row[i], p = p_row[i], q = q_row[i];
@@ -250,20 +221,20 @@ static void dnls_disorder_sweep_rows(const dnls_disorder_solver *s, int part, co
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+        const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
-            dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            dnls_disorder_ends(s->x[0], s->length, at.from, at.to);
             break;
         case 2: /* H_2 */
             dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
-            dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            dnls_disorder_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_3 */
             dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
-            dnls_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            dnls_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            dnls_disorder_ends(s->x[0], s->length, at.from, at.to);
+            dnls_disorder_ends(s->x[1], s->length, at.from, at.to);
             break;
         }
     }
@@ -275,29 +246,15 @@ static void dnls_disorder_energy_row(const dnls_disorder_params *params, const d
 {
     (void)apart;
     const double beta = params->beta;
-    const double *restrict e_row = row->x[2] + row->at[0];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict e_row = row->x[2], *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double e = e_row[i], p = p_row[i], q = q_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
         const double t1 = p * p + q * q;
         out[i - from] = 0.5 * (e * t1) + 0.125 * (beta * (t1 * t1)) - (w0 * (p * p_row[i + 1])
             + w0 * (q * q_row[i + 1]));
     }
-}
-
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void dnls_disorder_casimirs_row(const dnls_disorder_params *params, const dnls_disorder_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
 }
 
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
@@ -305,14 +262,12 @@ static void dnls_disorder_vector_field_row(const dnls_disorder_params *params, c
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double beta = params->beta;
-    const double *restrict e_row = row->x[2] + row->at[0];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict e_row = row->x[2], *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double e = e_row[i], p = p_row[i], q = q_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = beta * (p * p + q * q);
         out[i - from] = e * p + 0.5 * (p * t1) - (p_row[i - 1] * w1 + p_row[i + 1] * w0);
         out[(ptrdiff_t)apart + i - from] = w0 * q_row[i + 1] + w1 * q_row[i - 1] - (e * q + 0.5 * (q * t1));
@@ -345,10 +300,6 @@ static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdif
     for (int a = 0; a < dnls_disorder_AXES; ++a) {
         if (sizes[a] < dnls_disorder_least[a] || sizes[a] % dnls_disorder_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < dnls_disorder_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = dnls_disorder_LEAD + ((sizes[dnls_disorder_AXES - 1] + 7) / 8 * 8 + dnls_disorder_HALO + 7)
         / 8 * 8;
@@ -613,10 +564,8 @@ void dnls_disorder_density(const dnls_disorder_solver *s, double *out)
 {
     dnls_disorder_fill(s, dnls_disorder_energy_row, out);
 }
-void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out)
-{
-    dnls_disorder_fill(s, dnls_disorder_casimirs_row, out);
-}
+/* there are none */
+void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out) { (void)s, (void)out; }
 void dnls_disorder_vector_field(const dnls_disorder_solver *s, double *out)
 {
     dnls_disorder_fill(s, dnls_disorder_vector_field_row, out);

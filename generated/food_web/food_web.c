@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e6a86e85b41052c4836662f12fa9dd6ab4f63356835fb899f44c1ce36e470f63
+ * body-sha256: dd0789d765a0541cd810cdd388ed85133ce9cb483da66c1b0925c890e5fe2e87
  */
 #include "food_web.h"
 #include <float.h>
@@ -101,13 +101,6 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
-   open ends, where terms that read them have weight 0. */
-static inline void food_web_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
-{
-    (void)row, (void)length, (void)from, (void)to;
-}
-
 /* What kernels are told of a row. */
 static inline void food_web_locate(const food_web_solver *s, size_t index, food_web_row *row)
 {
@@ -182,42 +175,12 @@ static inline double food_web_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where
-   u is not positive, or not normal. */
-static inline double food_web_log_lane(double u)
-{
-    uint64_t bits, exponent, digits;
-    double m, k, sum = 0.043478260869565216, other = 0.047619047619047616;
-    memcpy(&bits, &u, sizeof bits);
-    exponent = (bits - 0x3fe6a09e667f3bcdU + 0x3ff0000000000000U) >> 52; /* k + 1023 */
-    digits = bits - ((exponent - 1023) << 52);
-    memcpy(&m, &digits, sizeof m);
-    exponent |= 0x4330000000000000U; /* 2^52 + k + 1023, as a double */
-    memcpy(&k, &exponent, sizeof k);
-    k -= 4503599627371519.0;
-    const double f = (m - 1.0) / (m + 1.0), q = f * f, qq = q * q;
-    sum = sum * qq + 0.05263157894736842;
-    other = other * qq + 0.058823529411764705;
-    sum = sum * qq + 0.06666666666666667;
-    other = other * qq + 0.07692307692307693;
-    sum = sum * qq + 0.09090909090909091;
-    other = other * qq + 0.1111111111111111;
-    sum = sum * qq + 0.14285714285714285;
-    other = other * qq + 0.2;
-    sum = (sum * q + other) * q + 0.3333333333333333;
-    /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
-    const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
-    const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
-    return rest + (u >= DBL_MIN && u <= DBL_MAX ? 0.0 : (double)NAN);
-}
-
 /* what all other sites b add to the forces of H_1 at a site a, by bonds that begin there */
 static inline void food_web_gather1_a(const double *coef, const food_web_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     (void)coef;
-    const double *restrict k_row = row->x[1] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->middle[i]; ++k) {
@@ -235,8 +198,7 @@ static inline void food_web_gather1_b(const double *coef, const food_web_row *ro
     ptrdiff_t to)
 {
     (void)coef;
-    const double *restrict k_row = row->x[1] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
@@ -253,7 +215,7 @@ static inline void food_web_gather1_b(const double *coef, const food_web_row *ro
 static inline void food_web_sweep1(const double *coef, const food_web_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
+    double *x_row = row->x[0];
     food_web_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i];
@@ -282,8 +244,7 @@ static inline void food_web_bond_forces_a(const food_web_params *params, const f
     ptrdiff_t from, ptrdiff_t to)
 {
     (void)params;
-    const double *restrict k_row = row->x[1] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x_a_ = x_row[i];
         double sum0 = 0.0;
@@ -301,8 +262,7 @@ static inline void food_web_bond_forces_b(const food_web_params *params, const f
     ptrdiff_t from, ptrdiff_t to)
 {
     (void)params;
-    const double *restrict k_row = row->x[1] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x_a_ = x_row[i];
         double sum0 = 0.0;
@@ -320,25 +280,12 @@ static void food_web_energy_row(const food_web_params *params, const food_web_ro
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict k_row = row->x[1] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     food_web_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double k_ = k_row[i], x = x_row[i];
-        out[i - from] = x - k_ * food_web_log_lane(x);
+        out[i - from] = x - k_ * log(x);
     }
-}
-
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void food_web_casimirs_row(const food_web_params *params, const food_web_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
 }
 
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
@@ -475,10 +422,6 @@ static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width
     for (int a = 0; a < food_web_AXES; ++a) {
         if (sizes[a] < food_web_least[a] || sizes[a] % food_web_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-        if (a < food_web_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = food_web_LEAD + ((sizes[food_web_AXES - 1] + 7) / 8 * 8 + food_web_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -506,7 +449,6 @@ static void food_web_put(const food_web_solver *s, double *rows, const double *v
         double *row = rows + (ptrdiff_t)r * s->width;
         memset(row - food_web_LEAD, 0, (size_t)s->width * sizeof *row);
         memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        food_web_ends(row, s->length, 0, s->length);
     }
 }
 
@@ -745,10 +687,7 @@ static void food_web_fill(const food_web_solver *s, food_web_kernel *kernel, dou
 }
 
 void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }
-void food_web_casimirs(const food_web_solver *s, double *out)
-{
-    food_web_fill(s, food_web_casimirs_row, out);
-}
+void food_web_casimirs(const food_web_solver *s, double *out) { (void)s, (void)out; } /* there are none */
 void food_web_vector_field(const food_web_solver *s, double *out)
 {
     food_web_fill(s, food_web_vector_field_row, out);

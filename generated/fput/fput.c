@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 32d404345acb891a81dc1ec716f2da2e324c005abb1856b906f648dedb82eef1
+ * body-sha256: cc9af07414966eac26b5864759d6dd197bf272834ad84e19e15fa4eab4326363
  */
 #include "fput.h"
 #include <float.h>
@@ -139,8 +139,8 @@ static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
 static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
-    const double *restrict q_row = row->x[0] + row->at[0];
-    double *p_row = row->x[1] + row->at[0];
+    const double *restrict q_row = row->x[0];
+    double *p_row = row->x[1];
     fput_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double q = q_row[i];
@@ -156,8 +156,8 @@ static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_
 static inline void fput_sweep2(const double *coef, const fput_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c3 = coef[3];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1];
+    double *q_row = row->x[0];
     fput_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i];
@@ -176,7 +176,7 @@ static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, 
             const fput_piece at = fput_piece_of(s, unit);
             if (at.from >= at.to) continue;
             fput_sweep1(coef, &at.row, at.from, at.to);
-            fput_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            fput_ends(s->x[1], s->length, at.from, at.to);
         }
         break;
     default: /* H_2 */
@@ -184,7 +184,7 @@ static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, 
             const fput_piece at = fput_piece_of(s, unit);
             if (at.from >= at.to) continue;
             fput_sweep2(coef, &at.row, at.from, at.to);
-            fput_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            fput_ends(s->x[0], s->length, at.from, at.to);
         }
         break;
     }
@@ -196,8 +196,7 @@ static void fput_energy_row(const fput_params *params, const fput_row *row, ptrd
 {
     (void)apart;
     const double alpha = params->alpha, beta = params->beta;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     fput_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -208,25 +207,12 @@ static void fput_energy_row(const fput_params *params, const fput_row *row, ptrd
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void fput_casimirs_row(const fput_params *params, const fput_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
-}
-
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
 static void fput_vector_field_row(const fput_params *params, const fput_row *row, ptrdiff_t from,
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double alpha = params->alpha, beta = params->beta;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     fput_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -286,10 +272,6 @@ static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
     size_t rows = 1;
     for (int a = 0; a < fput_AXES; ++a) {
         if (sizes[a] < fput_least[a] || sizes[a] % fput_periods[a] != 0 || sizes[a] > most / 2) return 0;
-        if (a < fput_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = fput_LEAD + ((sizes[fput_AXES - 1] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -632,7 +614,7 @@ static void fput_fill(const fput_solver *s, fput_kernel *kernel, double *out)
 }
 
 void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }
-void fput_casimirs(const fput_solver *s, double *out) { fput_fill(s, fput_casimirs_row, out); }
+void fput_casimirs(const fput_solver *s, double *out) { (void)s, (void)out; } /* there are none */
 void fput_vector_field(const fput_solver *s, double *out) { fput_fill(s, fput_vector_field_row, out); }
 
 /* ---- Steps by hand ---- */

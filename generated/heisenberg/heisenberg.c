@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 35fb237b3b2dac5a088c89c39c88163bc4e29e50d5b730fa8f713f99b89cf3f2
+ * body-sha256: ef41bd27a61ceb51ce51889e52cdc6b3b126dd75c2b935ef65a40632bb06c9c6
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -196,13 +196,12 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     ptrdiff_t to)
 {
     const double c0 = coef[0];
+    const double *restrict x_row = row->x[0] + row->at[0];
+    double *y_row = row->x[1] + row->at[0], *z_row = row->x[2] + row->at[0];
     const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
     const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
     const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
-    const double *restrict x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
@@ -222,13 +221,12 @@ static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_ro
     ptrdiff_t to)
 {
     const double c0 = coef[0];
+    const double *restrict x_row = row->x[0] + row->at[0];
+    double *y_row = row->x[1] + row->at[0], *z_row = row->x[2] + row->at[0];
     const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
     const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
     const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
-    const double *restrict x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
@@ -248,13 +246,12 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
+    double *x_row = row->x[0] + row->at[0], *z_row = row->x[2] + row->at[0];
+    const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
     const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
     const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
@@ -274,13 +271,12 @@ static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_ro
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
+    double *x_row = row->x[0] + row->at[0], *z_row = row->x[2] + row->at[0];
+    const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
     const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
     const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
@@ -300,14 +296,12 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     ptrdiff_t to)
 {
     const double c1 = coef[1], c2 = coef[2];
-    const double *restrict B_row = row->x[3] + row->at[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
+    const double *restrict B_row = row->x[3] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
+    double *x_row = row->x[0] + row->at[0], *y_row = row->x[1] + row->at[0];
     const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
@@ -327,14 +321,12 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
     ptrdiff_t to)
 {
     const double c1 = coef[1], c2 = coef[2];
-    const double *restrict B_row = row->x[3] + row->at[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
+    const double *restrict B_row = row->x[3] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
+    double *x_row = row->x[0] + row->at[0], *y_row = row->x[1] + row->at[0];
     const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
@@ -438,14 +430,12 @@ static void heisenberg_energy_row(const heisenberg_params *params, const heisenb
 {
     (void)apart;
     const double J = params->J;
-    const double *restrict B_row = row->x[3] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict B_row = row->x[3] + row->at[0], *restrict x_row = row->x[0] + row->at[0],
+        *restrict y_row = row->x[1] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
     const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
     const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     heisenberg_EACH_SITE
@@ -463,9 +453,8 @@ static void heisenberg_casimirs_row(const heisenberg_params *params, const heise
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
+        *restrict z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -478,18 +467,16 @@ static void heisenberg_vector_field_row(const heisenberg_params *params, const h
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double J = params->J;
-    const double *restrict B_row = row->x[3] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict B_row = row->x[3] + row->at[0], *restrict x_row = row->x[0] + row->at[0],
+        *restrict y_row = row->x[1] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
     const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
     const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict y_row4 = row->x[1] + row->at[4]; /* i + 1 */
     const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
     const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */

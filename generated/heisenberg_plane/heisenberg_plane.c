@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9a8b73102cfdfd6b9ed8aab1730b29a609bcd8ee2d295e5974406315d71ff95b
+ * body-sha256: 09c1d8aba5d92eb0f553d66f0a01cb28d87701f46514cdcb9debcb0843c41a7d
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -200,11 +200,10 @@ static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenbe
     ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
+    const double *restrict x_row = row->x[0] + row->at[0];
+    double *y_row = row->x[1] + row->at[0], *z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
     const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
-    const double *restrict x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
@@ -226,11 +225,10 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     ptrdiff_t from, ptrdiff_t to)
 {
     const double c1 = coef[1], w2 = row->present[2], w3 = row->present[3];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
+    double *x_row = row->x[0] + row->at[0], *y_row = row->x[1] + row->at[0];
+    const double *restrict z_row = row->x[2] + row->at[0];
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
@@ -282,11 +280,10 @@ static void heisenberg_plane_energy_row(const heisenberg_plane_params *params,
 {
     (void)apart;
     const double J = params->J, delta = params->delta, w2 = row->present[2];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
+        *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
@@ -304,9 +301,8 @@ static void heisenberg_plane_casimirs_row(const heisenberg_plane_params *params,
     const heisenberg_plane_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
+        *restrict z_row = row->x[2] + row->at[0];
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -319,13 +315,12 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
     const heisenberg_plane_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double J = params->J, delta = params->delta, w2 = row->present[2], w3 = row->present[3];
-    const double *restrict x_row = row->x[0] + row->at[0];
+    const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
+        *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
     const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
-    const double *restrict y_row = row->x[1] + row->at[0];
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
     const double *restrict y_row1 = row->x[1] + row->at[1]; /* i - 1 */
-    const double *restrict z_row = row->x[2] + row->at[0];
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     heisenberg_plane_EACH_SITE

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 16d2d80d04f266cc06325c60a63496584726bf7bdddb19a006c480b9840913ca
+ * body-sha256: ecf5749b0d95ec3ce0dcd6375c8921da0dfbd7aba41a8702c7dbf02668751b10
  */
 #include "kdv.h"
 #include <float.h>
@@ -195,10 +195,9 @@ static size_t kdv_matrix_of(size_t sites, double *memory, kdv_matrix *m)
 /* y at a site from x there and y around it */
 static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    double *restrict out_u = row->out[0] + row->at[0];
+    double *restrict out_u = row->out[0];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2], c3 = coef[3];
-    const double *restrict start_u = row->start[0] + row->at[0];
-    const double *restrict u_row = row->x[0] + row->at[0];
+    const double *restrict start_u = row->start[0], *restrict u_row = row->x[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
@@ -221,7 +220,7 @@ static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, int
         at.row.start = s->x;
         at.row.out = s->y[1 - now];
         kdv_relax(coef, &at.row, at.from, at.to);
-        kdv_ends(s->y[1 - now][0] + at.row.at[0], s->length, at.from, at.to);
+        kdv_ends(s->y[1 - now][0], s->length, at.from, at.to);
         kdv_measure(s->y[now], s->y[1 - now], &at, extent);
     }
 }
@@ -229,9 +228,9 @@ static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, int
 /* what a stage adds to x at a site, from y around it */
 static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    double *restrict out_u = row->out[0] + row->at[0];
+    double *restrict out_u = row->out[0];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2], c3 = coef[3];
-    const double *restrict u_row = row->x[0] + row->at[0];
+    const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
@@ -253,17 +252,17 @@ static void kdv_increment_rows(const kdv_solver *s, const double *coef, int far,
         at.row.x = s->y[now];
         at.row.out = s->x;
         kdv_increment(coef, &at.row, at.from, at.to);
-        kdv_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        kdv_ends(s->x[0], s->length, at.from, at.to);
     }
 }
 
 /* how y at a site follows y around it */
 static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    double *restrict out_u = row->out[0] + row->at[0];
+    double *restrict out_u = row->out[0];
     const double c4 = coef[4], c5 = coef[5], c6 = coef[6];
-    const double *varied_u_0 = row->varied[0] + row->at[0];
-    const double *restrict u_row = row->x[0] + row->at[0];
+    const double *varied_u_0 = row->varied[0];
+    const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double t1 = varied_u_0[i + 1] * (c6 + (c6 - 0.25 * (c5 * u_row[i + 1])))
@@ -293,7 +292,7 @@ static void kdv_energy_row(const kdv_params *params, const kdv_row *row, ptrdiff
 {
     (void)apart;
     const double delta = params->delta, d = params->d;
-    const double *restrict u_row = row->x[0] + row->at[0];
+    const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
@@ -308,7 +307,7 @@ static void kdv_casimirs_row(const kdv_params *params, const kdv_row *row, ptrdi
 {
     (void)apart;
     const double d = params->d;
-    const double *restrict u_row = row->x[0] + row->at[0];
+    const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
@@ -322,7 +321,7 @@ static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, p
 {
     (void)apart;
     const double delta = params->delta, d = params->d;
-    const double *restrict u_row = row->x[0] + row->at[0];
+    const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
@@ -377,10 +376,6 @@ static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
     size_t rows = 1;
     for (int a = 0; a < kdv_AXES; ++a) {
         if (sizes[a] < kdv_least[a] || sizes[a] % kdv_periods[a] != 0 || sizes[a] > most / 2) return 0;
-        if (a < kdv_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = kdv_LEAD + ((sizes[kdv_AXES - 1] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9ed371966273f16615d89ca906594315bd9355c6196a971506355a45634cf21b
+ * body-sha256: 67ca1d69ef9f71faa7529e57fe1dce1a335797bcfffdf3cdff23ab6616407622
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -132,8 +132,8 @@ static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_ro
     ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1];
-    const double *restrict q_row = row->x[0] + row->at[0];
-    double *p_row = row->x[1] + row->at[0];
+    const double *restrict q_row = row->x[0];
+    double *p_row = row->x[1];
     klein_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double q = q_row[i];
@@ -146,8 +146,8 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1];
+    double *q_row = row->x[0];
     klein_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i];
@@ -161,15 +161,15 @@ static void klein_gordon_sweep_rows(const klein_gordon_solver *s, int part, cons
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+        const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             klein_gordon_sweep1(coef, &at.row, at.from, at.to);
-            klein_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            klein_gordon_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_2 */
             klein_gordon_sweep2(coef, &at.row, at.from, at.to);
-            klein_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            klein_gordon_ends(s->x[0], s->length, at.from, at.to);
             break;
         }
     }
@@ -181,8 +181,7 @@ static void klein_gordon_energy_row(const klein_gordon_params *params, const kle
 {
     (void)apart;
     const double d = params->d;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     klein_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -193,25 +192,12 @@ static void klein_gordon_energy_row(const klein_gordon_params *params, const kle
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void klein_gordon_casimirs_row(const klein_gordon_params *params, const klein_gordon_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
-}
-
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
 static void klein_gordon_vector_field_row(const klein_gordon_params *params, const klein_gordon_row *row,
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double d = params->d;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     klein_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -239,10 +225,6 @@ static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_
     for (int a = 0; a < klein_gordon_AXES; ++a) {
         if (sizes[a] < klein_gordon_least[a] || sizes[a] % klein_gordon_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < klein_gordon_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = klein_gordon_LEAD + ((sizes[klein_gordon_AXES - 1] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8
         * 8;
@@ -491,10 +473,8 @@ void klein_gordon_density(const klein_gordon_solver *s, double *out)
 {
     klein_gordon_fill(s, klein_gordon_energy_row, out);
 }
-void klein_gordon_casimirs(const klein_gordon_solver *s, double *out)
-{
-    klein_gordon_fill(s, klein_gordon_casimirs_row, out);
-}
+/* there are none */
+void klein_gordon_casimirs(const klein_gordon_solver *s, double *out) { (void)s, (void)out; }
 void klein_gordon_vector_field(const klein_gordon_solver *s, double *out)
 {
     klein_gordon_fill(s, klein_gordon_vector_field_row, out);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0f403aa6f07ea8191fa799d4f4f88768f49f3ac2180d3dacfaa03c10afce2aa6
+ * body-sha256: 27fb9e096510855ec1d13a99f22e4bdf9d0b144cf24cadf4bc4d94fbd64976f3
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -136,8 +136,8 @@ static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wav
     ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
-    const double *restrict u_row = row->x[0] + row->at[0];
-    double *v_row = row->x[1] + row->at[0];
+    const double *restrict u_row = row->x[0];
+    double *v_row = row->x[1];
     nonlinear_wave_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i];
@@ -152,8 +152,8 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
     ptrdiff_t to)
 {
     const double c3 = coef[3];
-    const double *restrict v_row = row->x[1] + row->at[0];
-    double *u_row = row->x[0] + row->at[0];
+    const double *restrict v_row = row->x[1];
+    double *u_row = row->x[0];
     nonlinear_wave_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double v = v_row[i];
@@ -167,15 +167,15 @@ static void nonlinear_wave_sweep_rows(const nonlinear_wave_solver *s, int part, 
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+        const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
-            nonlinear_wave_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            nonlinear_wave_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_2 */
             nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
-            nonlinear_wave_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            nonlinear_wave_ends(s->x[0], s->length, at.from, at.to);
             break;
         }
     }
@@ -187,8 +187,7 @@ static void nonlinear_wave_energy_row(const nonlinear_wave_params *params, const
 {
     (void)apart;
     const double beta = params->beta, d = params->d;
-    const double *restrict u_row = row->x[0] + row->at[0];
-    const double *restrict v_row = row->x[1] + row->at[0];
+    const double *restrict u_row = row->x[0], *restrict v_row = row->x[1];
     nonlinear_wave_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i], v = v_row[i];
@@ -202,8 +201,7 @@ static void nonlinear_wave_casimirs_row(const nonlinear_wave_params *params, con
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double d = params->d;
-    const double *restrict u_row = row->x[0] + row->at[0];
-    const double *restrict v_row = row->x[1] + row->at[0];
+    const double *restrict u_row = row->x[0], *restrict v_row = row->x[1];
     nonlinear_wave_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i], v = v_row[i];
@@ -217,8 +215,7 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
     const nonlinear_wave_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double beta = params->beta, d = params->d;
-    const double *restrict u_row = row->x[0] + row->at[0];
-    const double *restrict v_row = row->x[1] + row->at[0];
+    const double *restrict u_row = row->x[0], *restrict v_row = row->x[1];
     nonlinear_wave_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double u = u_row[i], v = v_row[i];
@@ -247,10 +244,6 @@ static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrd
     for (int a = 0; a < nonlinear_wave_AXES; ++a) {
         if (sizes[a] < nonlinear_wave_least[a] || sizes[a] % nonlinear_wave_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < nonlinear_wave_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = nonlinear_wave_LEAD + ((sizes[nonlinear_wave_AXES - 1] + 7) / 8 * 8 + nonlinear_wave_HALO
         + 7) / 8 * 8;

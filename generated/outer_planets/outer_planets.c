@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e8950bfed98e76b571ee36933211d5fc4ecb51b3dc81cc271d9ea1e9b5840018
+ * body-sha256: 8a9f202b8df047e49de24cb1873e965155ebda17d11ddb8e3369ae97fca68dd5
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -89,13 +89,6 @@ typedef struct {
 #define outer_planets_EACH_SITE
 #endif
 
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
-   open ends, where terms that read them have weight 0. */
-static inline void outer_planets_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
-{
-    (void)row, (void)length, (void)from, (void)to;
-}
-
 /* What kernels are told of a row. */
 static inline void outer_planets_locate(const outer_planets_solver *s, size_t index, outer_planets_row *row)
 {
@@ -133,13 +126,9 @@ static inline void outer_planets_gather1(const double *coef, const outer_planets
     ptrdiff_t to)
 {
     const double c1 = coef[1];
-    const double *restrict m_row = row->x[6] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
-    double *restrict g0 = row->gathered[0];
-    double *restrict g1 = row->gathered[1];
-    double *restrict g2 = row->gathered[2];
+    const double *restrict m_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
+    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1], *restrict g2 = row->gathered[2];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
         const double m_b_ = m_row[j], x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j];
@@ -164,9 +153,7 @@ static inline void outer_planets_sweep1(const double *coef, const outer_planets_
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *px_row = row->x[3] + row->at[0];
-    double *py_row = row->x[4] + row->at[0];
-    double *pz_row = row->x[5] + row->at[0];
+    double *px_row = row->x[3], *py_row = row->x[4], *pz_row = row->x[5];
     outer_planets_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double change0 = -(c0 * row->gathered[0][i]);
@@ -183,13 +170,9 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict m_row = row->x[6] + row->at[0];
-    const double *restrict px_row = row->x[3] + row->at[0];
-    const double *restrict py_row = row->x[4] + row->at[0];
-    const double *restrict pz_row = row->x[5] + row->at[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
+    const double *restrict m_row = row->x[6], *restrict px_row = row->x[3], *restrict py_row = row->x[4],
+        *restrict pz_row = row->x[5];
+    double *x_row = row->x[0], *y_row = row->x[1], *z_row = row->x[2];
     outer_planets_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
@@ -227,13 +210,9 @@ static inline void outer_planets_pair_forces(const outer_planets_params *params,
     ptrdiff_t from, ptrdiff_t to)
 {
     const double G = params->G;
-    const double *restrict m_row = row->x[6] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
-    double *restrict g0 = row->gathered[0];
-    double *restrict g1 = row->gathered[1];
-    double *restrict g2 = row->gathered[2];
+    const double *restrict m_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
+    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1], *restrict g2 = row->gathered[2];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
         const double m_b_ = m_row[j], x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j];
@@ -257,10 +236,8 @@ static inline void outer_planets_pair_energy(const outer_planets_params *params,
     ptrdiff_t from, ptrdiff_t to)
 {
     const double G = params->G;
-    const double *restrict m_row = row->x[6] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict m_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
     double *restrict g0 = row->gathered[0];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
@@ -282,28 +259,13 @@ static void outer_planets_energy_row(const outer_planets_params *params, const o
 {
     (void)apart;
     outer_planets_pair_energy(params, row, from, to);
-    const double *restrict m_row = row->x[6] + row->at[0];
-    const double *restrict px_row = row->x[3] + row->at[0];
-    const double *restrict py_row = row->x[4] + row->at[0];
-    const double *restrict pz_row = row->x[5] + row->at[0];
+    const double *restrict m_row = row->x[6], *restrict px_row = row->x[3], *restrict py_row = row->x[4],
+        *restrict pz_row = row->x[5];
     outer_planets_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
-        out[i - from] = 0.5 * ((pz * pz + (px * px + py * py)) / m);
+        out[i - from] = 0.5 * ((pz * pz + (px * px + py * py)) / m) + 0.5 * row->gathered[0][i];
     }
-    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];
-}
-
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void outer_planets_casimirs_row(const outer_planets_params *params, const outer_planets_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
 }
 
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
@@ -311,10 +273,8 @@ static void outer_planets_vector_field_row(const outer_planets_params *params, c
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     outer_planets_pair_forces(params, row, from, to);
-    const double *restrict m_row = row->x[6] + row->at[0];
-    const double *restrict px_row = row->x[3] + row->at[0];
-    const double *restrict py_row = row->x[4] + row->at[0];
-    const double *restrict pz_row = row->x[5] + row->at[0];
+    const double *restrict m_row = row->x[6], *restrict px_row = row->x[3], *restrict py_row = row->x[4],
+        *restrict pz_row = row->x[5];
     outer_planets_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
@@ -355,10 +315,6 @@ static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdif
     for (int a = 0; a < outer_planets_AXES; ++a) {
         if (sizes[a] < outer_planets_least[a] || sizes[a] % outer_planets_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < outer_planets_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = outer_planets_LEAD + ((sizes[outer_planets_AXES - 1] + 7) / 8 * 8 + outer_planets_HALO + 7)
         / 8 * 8;
@@ -387,7 +343,6 @@ static void outer_planets_put(const outer_planets_solver *s, double *rows, const
         double *row = rows + (ptrdiff_t)r * s->width;
         memset(row - outer_planets_LEAD, 0, (size_t)s->width * sizeof *row);
         memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        outer_planets_ends(row, s->length, 0, s->length);
     }
 }
 
@@ -625,10 +580,8 @@ void outer_planets_density(const outer_planets_solver *s, double *out)
 {
     outer_planets_fill(s, outer_planets_energy_row, out);
 }
-void outer_planets_casimirs(const outer_planets_solver *s, double *out)
-{
-    outer_planets_fill(s, outer_planets_casimirs_row, out);
-}
+/* there are none */
+void outer_planets_casimirs(const outer_planets_solver *s, double *out) { (void)s, (void)out; }
 void outer_planets_vector_field(const outer_planets_solver *s, double *out)
 {
     outer_planets_fill(s, outer_planets_vector_field_row, out);

@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 3cccb0e7c934b5cf7ce18f2f9fd9c49d6b24afb19a7ee32a8a082071f51a9576
+ * body-sha256: 86eab3382e54e18d9403e80104c6a41fae97ca4ddd7dc2e63206586b7099979c
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -81,13 +81,6 @@ typedef struct {
 #else
 #define point_vortices_EACH_SITE
 #endif
-
-/* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
-   open ends, where terms that read them have weight 0. */
-static inline void point_vortices_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
-{
-    (void)row, (void)length, (void)from, (void)to;
-}
 
 /* What kernels are told of a row. */
 static inline void point_vortices_locate(const point_vortices_solver *s, size_t index,
@@ -189,12 +182,9 @@ static inline double point_vortices_log_lane(double u)
 static inline void point_vortices_pair_forces(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    const double *restrict G_row = row->x[2] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     (void)params;
-    double *restrict g0 = row->gathered[0];
-    double *restrict g1 = row->gathered[1];
+    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
         const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j];
@@ -214,9 +204,7 @@ static inline void point_vortices_pair_forces(const point_vortices_params *param
 static inline void point_vortices_pair_energy(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    const double *restrict G_row = row->x[2] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     (void)params;
     double *restrict g0 = row->gathered[0];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = 0.0;
@@ -237,16 +225,11 @@ static inline void point_vortices_pair_energy(const point_vortices_params *param
 static inline void point_vortices_pair_slopes(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    const double *varied_x_0 = row->varied[0] + row->at[0];
-    const double *varied_y_0 = row->varied[1] + row->at[0];
-    const double *restrict G_row = row->x[2] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
+    const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1];
+    const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     (void)params;
-    double *restrict g0 = row->gathered[0];
-    double *restrict g1 = row->gathered[1];
-    double *restrict g2 = row->gathered[2];
-    double *restrict g3 = row->gathered[3];
+    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1], *restrict g2 = row->gathered[2],
+        *restrict g3 = row->gathered[3];
     for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = g3[i] = 0.0;
     for (ptrdiff_t j = 0; j < row->length; ++j) {
         const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j], v_x_b_ = varied_x_0[j],
@@ -280,12 +263,10 @@ static inline void point_vortices_pair_slopes(const point_vortices_params *param
 static inline void point_vortices_relax(const double *coef, const point_vortices_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
-    double *restrict out_x = row->out[0] + row->at[0];
-    double *restrict out_y = row->out[1] + row->at[0];
+    double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
-    const double *restrict start_x = row->start[0] + row->at[0];
-    const double *restrict start_y = row->start[1] + row->at[0];
-    const double *restrict G_row = row->x[2] + row->at[0];
+    const double *restrict start_x = row->start[0], *restrict start_y = row->start[1], *restrict G_row =
+        row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double G = G_row[i];
@@ -315,10 +296,9 @@ static void point_vortices_relax_rows(const point_vortices_solver *s, const doub
 static inline void point_vortices_increment(const double *coef, const point_vortices_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
-    double *restrict out_x = row->out[0] + row->at[0];
-    double *restrict out_y = row->out[1] + row->at[0];
+    double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
-    const double *restrict G_row = row->x[2] + row->at[0];
+    const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double G = G_row[i];
@@ -346,10 +326,9 @@ static void point_vortices_increment_rows(const point_vortices_solver *s, const 
 static inline void point_vortices_slope(const double *coef, const point_vortices_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
-    double *restrict out_x = row->out[0] + row->at[0];
-    double *restrict out_y = row->out[1] + row->at[0];
+    double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
-    const double *restrict G_row = row->x[2] + row->at[0];
+    const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double G = G_row[i];
@@ -382,21 +361,8 @@ static void point_vortices_energy_row(const point_vortices_params *params, const
     point_vortices_pair_energy(params, row, from, to);
     point_vortices_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
-        out[i - from] = 0.0;
+        out[i - from] = 0.5 * row->gathered[0][i];
     }
-    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];
-}
-
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void point_vortices_casimirs_row(const point_vortices_params *params, const point_vortices_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
 }
 
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
@@ -404,7 +370,7 @@ static void point_vortices_vector_field_row(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     point_vortices_pair_forces(params, row, from, to);
-    const double *restrict G_row = row->x[2] + row->at[0];
+    const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double G = G_row[i];
@@ -468,10 +434,6 @@ static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrd
     for (int a = 0; a < point_vortices_AXES; ++a) {
         if (sizes[a] < point_vortices_least[a] || sizes[a] % point_vortices_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < point_vortices_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = point_vortices_LEAD + ((sizes[point_vortices_AXES - 1] + 7) / 8 * 8 + point_vortices_HALO
         + 7) / 8 * 8;
@@ -512,7 +474,6 @@ static void point_vortices_put(const point_vortices_solver *s, double *rows, con
         double *row = rows + (ptrdiff_t)r * s->width;
         memset(row - point_vortices_LEAD, 0, (size_t)s->width * sizeof *row);
         memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        point_vortices_ends(row, s->length, 0, s->length);
     }
 }
 
@@ -819,7 +780,6 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
                     point_vortices_EACH_SITE
                     for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by * direction[i];
                 }
-                point_vortices_ends(sum, s->length, at.from, at.to);
             }
         }
     }
@@ -1032,7 +992,6 @@ static point_vortices_status point_vortices_move(point_vortices_solver *s, const
                 if (!isfinite(moved)) return point_vortices_BAD_ARGUMENT;
                 row[i] = moving ? moved : row[i];
             }
-            point_vortices_ends(row, s->length, 0, s->length);
         }
     return point_vortices_OK;
 }
@@ -1086,10 +1045,8 @@ void point_vortices_density(const point_vortices_solver *s, double *out)
 {
     point_vortices_fill(s, point_vortices_energy_row, out);
 }
-void point_vortices_casimirs(const point_vortices_solver *s, double *out)
-{
-    point_vortices_fill(s, point_vortices_casimirs_row, out);
-}
+/* there are none */
+void point_vortices_casimirs(const point_vortices_solver *s, double *out) { (void)s, (void)out; }
 void point_vortices_vector_field(const point_vortices_solver *s, double *out)
 {
     point_vortices_fill(s, point_vortices_vector_field_row, out);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: d55bb24e6e49ee6502f3101b37bab8af4e1fad1e06e4ca31e46058bd88909382
+ * body-sha256: 9a736ce88d49a8cccd970c09131d48aa15aa17d662a866935158e36bd9d90610
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -161,16 +161,13 @@ static inline double sine_gordon_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double sine_gordon_sin_lane(double u) { return sine_gordon_turned_sin(u, 0.0); }
 
-/* cos u for the loops over lanes. */
-static inline double sine_gordon_cos_lane(double u) { return sine_gordon_turned_sin(u, 0.5); }
-
 /* the flow of H_1 = sum of 1/2*(d**(-2)*(q[i+1] - q)**2) - cos(q): p shifted */
 static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
     const double c0 = coef[0], c1 = coef[1];
-    const double *restrict q_row = row->x[0] + row->at[0];
-    double *p_row = row->x[1] + row->at[0];
+    const double *restrict q_row = row->x[0];
+    double *p_row = row->x[1];
     sine_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double q = q_row[i];
@@ -183,8 +180,8 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
     ptrdiff_t to)
 {
     const double c2 = coef[2];
-    const double *restrict p_row = row->x[1] + row->at[0];
-    double *q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1];
+    double *q_row = row->x[0];
     sine_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i];
@@ -198,15 +195,15 @@ static void sine_gordon_sweep_rows(const sine_gordon_solver *s, int part, const 
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+        const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             sine_gordon_sweep1(coef, &at.row, at.from, at.to);
-            sine_gordon_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            sine_gordon_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_2 */
             sine_gordon_sweep2(coef, &at.row, at.from, at.to);
-            sine_gordon_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            sine_gordon_ends(s->x[0], s->length, at.from, at.to);
             break;
         }
     }
@@ -218,27 +215,14 @@ static void sine_gordon_energy_row(const sine_gordon_params *params, const sine_
 {
     (void)apart;
     const double d = params->d;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     sine_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = 1.0 / d;
         const double t2 = q_row[i + 1] - q;
-        out[i - from] = 1.0 + 0.5 * (p * p) + (0.5 * (t1 * t1 * (t2 * t2)) - sine_gordon_cos_lane(q));
+        out[i - from] = 1.0 + 0.5 * (p * p) + (0.5 * (t1 * t1 * (t2 * t2)) - cos(q));
     }
-}
-
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void sine_gordon_casimirs_row(const sine_gordon_params *params, const sine_gordon_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
-{
-    (void)params;
-    (void)apart;
-    (void)row;
-    (void)from;
-    (void)to;
-    (void)out;
 }
 
 /* pi grad H, of the sites of a row: out[k * apart + i - from] */
@@ -246,8 +230,7 @@ static void sine_gordon_vector_field_row(const sine_gordon_params *params, const
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double d = params->d;
-    const double *restrict p_row = row->x[1] + row->at[0];
-    const double *restrict q_row = row->x[0] + row->at[0];
+    const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     sine_gordon_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
@@ -275,10 +258,6 @@ static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t 
     for (int a = 0; a < sine_gordon_AXES; ++a) {
         if (sizes[a] < sine_gordon_least[a] || sizes[a] % sine_gordon_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-        if (a < sine_gordon_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = sine_gordon_LEAD + ((sizes[sine_gordon_AXES - 1] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8
         * 8;
@@ -527,10 +506,8 @@ void sine_gordon_density(const sine_gordon_solver *s, double *out)
 {
     sine_gordon_fill(s, sine_gordon_energy_row, out);
 }
-void sine_gordon_casimirs(const sine_gordon_solver *s, double *out)
-{
-    sine_gordon_fill(s, sine_gordon_casimirs_row, out);
-}
+/* there are none */
+void sine_gordon_casimirs(const sine_gordon_solver *s, double *out) { (void)s, (void)out; }
 void sine_gordon_vector_field(const sine_gordon_solver *s, double *out)
 {
     sine_gordon_fill(s, sine_gordon_vector_field_row, out);

@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The stages;
  *   Krylov spaces; Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 2bc5b35bcd59c3e1e4b64044a6b29d360977408787365c793e75f901d7c0b00c
+ * body-sha256: 2c79767b8361b357b14a4552d281588c34354c014115d420da03d70d5b5196ab
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -41,7 +41,6 @@ enum { thermal_heisenberg_SOURCES = 3 }; /* of noise at a site: bath_x, bath_y, 
 enum { thermal_heisenberg_DRAWN = 4 }; /* the first of the arrays of increments */
 enum { thermal_heisenberg_PARTS = 1 }; /* increments of one source in a step, each of a part of it */
 enum { thermal_heisenberg_MOST_SWEEPS = 200 }; /* that a stage may take */
-enum { thermal_heisenberg_WEIGHTS = 2 }; /* kinds of terms that open ends take away */
 
 /* where normal variates are cut off, so that no rare one makes a step impossible */
 #define thermal_heisenberg_BOUND 6.0
@@ -49,11 +48,6 @@ enum { thermal_heisenberg_WEIGHTS = 2 }; /* kinds of terms that open ends take a
 /* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t thermal_heisenberg_least[thermal_heisenberg_AXES] = { 2 };
 static const size_t thermal_heisenberg_periods[thermal_heisenberg_AXES] = { 1 };
-
-/* The terms of H that open ends take away: the least and the largest offsets that they reach along each
-   axis. */
-static const int thermal_heisenberg_weights[thermal_heisenberg_WEIGHTS][thermal_heisenberg_AXES][2] =
-    { { { 0, 1 } }, { { -1, 0 } } };
 
 /* The stages of one step, as fractions of it, each with a row of coefficients. */
 static const double thermal_heisenberg_times[thermal_heisenberg_ROWS_OF_FLOWS] = { 1.0 };
@@ -85,8 +79,6 @@ typedef struct {
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
     double *const *varied; /* a variation of x */
-    /* 1 for terms of H that are there as far as the other axes say, else 0 */
-    double present[thermal_heisenberg_WEIGHTS];
 } thermal_heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -111,17 +103,6 @@ static inline void thermal_heisenberg_ends(double *row, ptrdiff_t length, ptrdif
     }
 }
 
-/* The position of a row along all axes but the last. */
-static inline void thermal_heisenberg_place(const thermal_heisenberg_solver *s, size_t index,
-    ptrdiff_t place[thermal_heisenberg_AXES])
-{
-    place[thermal_heisenberg_AXES - 1] = 0;
-    for (int a = thermal_heisenberg_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
-}
-
 /* What kernels are told of a row. */
 static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s, size_t index,
     thermal_heisenberg_row *row)
@@ -130,15 +111,6 @@ static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s,
     row->at = s->lines + index * thermal_heisenberg_LINES;
     row->length = s->length;
     row->start = row->out = s->x;
-    ptrdiff_t place[thermal_heisenberg_AXES];
-    thermal_heisenberg_place(s, index, place);
-    for (int k = 0; k < thermal_heisenberg_WEIGHTS; ++k) {
-        int there = 1;
-        for (int a = 0; a < thermal_heisenberg_AXES - 1; ++a)
-            there = there && place[a] + thermal_heisenberg_weights[k][a][0] >= 0 &&
-                place[a] + thermal_heisenberg_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
-        row->present[k] = there ? 1.0 : 0.0;
-    }
 }
 
 enum { thermal_heisenberg_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -253,26 +225,18 @@ static double thermal_heisenberg_phi1(double s)
 static inline void thermal_heisenberg_relax(const double *coef, const thermal_heisenberg_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
-    double *restrict out_x = row->out[0] + row->at[0];
-    double *restrict out_y = row->out[1] + row->at[0];
-    double *restrict out_z = row->out[2] + row->at[0];
+    double *restrict out_x = row->out[0], *restrict out_y = row->out[1], *restrict out_z = row->out[2];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
-    const double *restrict start_x = row->start[0] + row->at[0];
-    const double *restrict start_y = row->start[1] + row->at[0];
-    const double *restrict start_z = row->start[2] + row->at[0];
-    const double *restrict T_row = row->x[3] + row->at[0];
-    const double *restrict dw_0_row = row->x[4] + row->at[0];
-    const double *restrict dw_1_row = row->x[5] + row->at[0];
-    const double *restrict dw_2_row = row->x[6] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict start_x = row->start[0], *restrict start_y = row->start[1], *restrict start_z =
+        row->start[2], *restrict T_row = row->x[3], *restrict dw_0_row = row->x[4], *restrict dw_1_row =
+        row->x[5], *restrict dw_2_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double T = T_row[i], dw_0 = dw_0_row[i], dw_1 = dw_1_row[i], dw_2 = dw_2_row[i], x = x_row[i],
             y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = sqrt(2.0 * (T * c0));
         const double t2 = w1 * (c1 * y_row[i - 1]) + w0 * (c1 * y_row[i + 1]);
         const double t3 = w1 * (c1 * x_row[i - 1]) + w0 * (c1 * x_row[i + 1]);
@@ -319,9 +283,9 @@ static void thermal_heisenberg_relax_rows(const thermal_heisenberg_solver *s, co
         at.row.start = s->x;
         at.row.out = s->y[1 - now];
         thermal_heisenberg_relax(coef, &at.row, at.from, at.to);
-        thermal_heisenberg_ends(s->y[1 - now][0] + at.row.at[0], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->y[1 - now][1] + at.row.at[0], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->y[1 - now][2] + at.row.at[0], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->y[1 - now][0], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->y[1 - now][1], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->y[1 - now][2], s->length, at.from, at.to);
         thermal_heisenberg_measure(s->y[now], s->y[1 - now], &at, extent);
     }
 }
@@ -330,23 +294,17 @@ static void thermal_heisenberg_relax_rows(const thermal_heisenberg_solver *s, co
 static inline void thermal_heisenberg_increment(const double *coef, const thermal_heisenberg_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
-    double *restrict out_x = row->out[0] + row->at[0];
-    double *restrict out_y = row->out[1] + row->at[0];
-    double *restrict out_z = row->out[2] + row->at[0];
+    double *restrict out_x = row->out[0], *restrict out_y = row->out[1], *restrict out_z = row->out[2];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
-    const double *restrict T_row = row->x[3] + row->at[0];
-    const double *restrict dw_0_row = row->x[4] + row->at[0];
-    const double *restrict dw_1_row = row->x[5] + row->at[0];
-    const double *restrict dw_2_row = row->x[6] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict T_row = row->x[3], *restrict dw_0_row = row->x[4], *restrict dw_1_row = row->x[5],
+        *restrict dw_2_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double T = T_row[i], dw_0 = dw_0_row[i], dw_1 = dw_1_row[i], dw_2 = dw_2_row[i], x = x_row[i],
             y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = sqrt(2.0 * (T * c0));
         const double t2 = w1 * (c1 * x_row[i - 1]) + w0 * (c1 * x_row[i + 1]);
         const double t3 = w0 * (c1 * z_row[i + 1]) + w1 * (c1 * z_row[i - 1]);
@@ -370,9 +328,9 @@ static void thermal_heisenberg_increment_rows(const thermal_heisenberg_solver *s
         at.row.x = s->y[now];
         at.row.out = s->x;
         thermal_heisenberg_increment(coef, &at.row, at.from, at.to);
-        thermal_heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
     }
 }
 
@@ -380,29 +338,19 @@ static void thermal_heisenberg_increment_rows(const thermal_heisenberg_solver *s
 static inline void thermal_heisenberg_slope(const double *coef, const thermal_heisenberg_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
-    double *restrict out_x = row->out[0] + row->at[0];
-    double *restrict out_y = row->out[1] + row->at[0];
-    double *restrict out_z = row->out[2] + row->at[0];
+    double *restrict out_x = row->out[0], *restrict out_y = row->out[1], *restrict out_z = row->out[2];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
-    const double *varied_x_0 = row->varied[0] + row->at[0];
-    const double *varied_y_0 = row->varied[1] + row->at[0];
-    const double *varied_z_0 = row->varied[2] + row->at[0];
-    const double *restrict start_x = row->start[0] + row->at[0];
-    const double *restrict start_y = row->start[1] + row->at[0];
-    const double *restrict start_z = row->start[2] + row->at[0];
-    const double *restrict T_row = row->x[3] + row->at[0];
-    const double *restrict dw_0_row = row->x[4] + row->at[0];
-    const double *restrict dw_1_row = row->x[5] + row->at[0];
-    const double *restrict dw_2_row = row->x[6] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1], *varied_z_0 = row->varied[2];
+    const double *restrict start_x = row->start[0], *restrict start_y = row->start[1], *restrict start_z =
+        row->start[2], *restrict T_row = row->x[3], *restrict dw_0_row = row->x[4], *restrict dw_1_row =
+        row->x[5], *restrict dw_2_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double T = T_row[i], dw_0 = dw_0_row[i], dw_1 = dw_1_row[i], dw_2 = dw_2_row[i], x = x_row[i],
             y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = sqrt(2.0 * (T * c0));
         const double t2 = w0 * (c1 * z_row[i + 1]) + w1 * (c1 * z_row[i - 1]);
         const double t3 = w1 * (c1 * y_row[i - 1]) + w0 * (c1 * y_row[i + 1]);
@@ -586,13 +534,11 @@ static void thermal_heisenberg_energy_row(const thermal_heisenberg_params *param
 {
     (void)apart;
     const double J = params->J;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
         out[i - from] = -(w0 * (J * (y * y_row[i + 1])) + (w0 * (J * (x * x_row[i + 1]))
             + w0 * (J * (z * z_row[i + 1]))));
     }
@@ -603,9 +549,7 @@ static void thermal_heisenberg_casimirs_row(const thermal_heisenberg_params *par
     const thermal_heisenberg_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -618,14 +562,12 @@ static void thermal_heisenberg_vector_field_row(const thermal_heisenberg_params 
     const thermal_heisenberg_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double J = params->J, lambda = params->lambda;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = w0 * (J * x_row[i + 1]) + w1 * (J * x_row[i - 1]);
         const double t2 = w1 * (J * z_row[i - 1]) + w0 * (J * z_row[i + 1]);
         const double t3 = w0 * (J * y_row[i + 1]) + w1 * (J * y_row[i - 1]);
@@ -775,10 +717,6 @@ static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXE
     for (int a = 0; a < thermal_heisenberg_AXES; ++a) {
         if (sizes[a] < thermal_heisenberg_least[a] || sizes[a] % thermal_heisenberg_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < thermal_heisenberg_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = thermal_heisenberg_LEAD + ((sizes[thermal_heisenberg_AXES - 1] + 7) / 8 * 8
         + thermal_heisenberg_HALO + 7) / 8 * 8;

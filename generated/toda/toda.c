@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 404672f7da71d9564ac9dfee7269068dc72ae619081c917421314dba6ddb2adc
+ * body-sha256: 16226f47f37021dbdf7f95c14acd39ca0e5579ae0e820786018d416528455b37
  */
 #include "toda.h"
 #include <float.h>
@@ -164,8 +164,8 @@ static inline double toda_expm1_lane(double u)
 static inline void toda_sweep1(const double *coef, const toda_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
-    const double *restrict a_row = row->x[0] + row->at[0];
-    double *b_row = row->x[1] + row->at[0];
+    const double *restrict a_row = row->x[0];
+    double *b_row = row->x[1];
     toda_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i];
@@ -177,8 +177,8 @@ static inline void toda_sweep1(const double *coef, const toda_row *row, ptrdiff_
 static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c1 = coef[1];
-    double *a_row = row->x[0] + row->at[0];
-    const double *restrict b_row = row->x[1] + row->at[0];
+    double *a_row = row->x[0];
+    const double *restrict b_row = row->x[1];
     toda_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
@@ -192,15 +192,15 @@ static void toda_sweep_rows(const toda_solver *s, int part, const double *coef, 
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        toda_piece at = toda_piece_of(s, unit);
+        const toda_piece at = toda_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             toda_sweep1(coef, &at.row, at.from, at.to);
-            toda_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            toda_ends(s->x[1], s->length, at.from, at.to);
             break;
         default: /* H_2 */
             toda_sweep2(coef, &at.row, at.from, at.to);
-            toda_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            toda_ends(s->x[0], s->length, at.from, at.to);
             break;
         }
     }
@@ -211,8 +211,7 @@ static void toda_energy_row(const toda_params *params, const toda_row *row, ptrd
     double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict a_row = row->x[0] + row->at[0];
-    const double *restrict b_row = row->x[1] + row->at[0];
+    const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
     toda_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
@@ -225,8 +224,7 @@ static void toda_casimirs_row(const toda_params *params, const toda_row *row, pt
     double *restrict out, size_t apart)
 {
     (void)params;
-    const double *restrict a_row = row->x[0] + row->at[0];
-    const double *restrict b_row = row->x[1] + row->at[0];
+    const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
     toda_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
@@ -240,8 +238,7 @@ static void toda_vector_field_row(const toda_params *params, const toda_row *row
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params;
-    const double *restrict a_row = row->x[0] + row->at[0];
-    const double *restrict b_row = row->x[1] + row->at[0];
+    const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
     toda_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
@@ -265,10 +262,6 @@ static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
     size_t rows = 1;
     for (int a = 0; a < toda_AXES; ++a) {
         if (sizes[a] < toda_least[a] || sizes[a] % toda_periods[a] != 0 || sizes[a] > most / 2) return 0;
-        if (a < toda_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = toda_LEAD + ((sizes[toda_AXES - 1] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2bdd7b55bc16d05b3bfce2e90523391f7a781143cdf6541e3cb5fc539b55a2b9
+ * body-sha256: dc414fc3fcac48125e88c5908cae6ad82b5c9f7e75d4eaacc0bec10ce78e4c05
  */
 #include "volterra.h"
 #include <float.h>
@@ -39,9 +39,6 @@ enum { volterra_COLOUR_STRIDE = 1 }; /* what a step along a row adds to the colo
 /* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t volterra_least[volterra_AXES] = { 2 };
 static const size_t volterra_periods[volterra_AXES] = { 2 };
-
-/* What a step along each axis adds to the colour of a site. */
-static const int volterra_colours[volterra_AXES] = { 1 };
 
 /* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
    of the last flow of a step and the first of the next together. */
@@ -107,27 +104,13 @@ static inline void volterra_ends(double *row, ptrdiff_t length, ptrdiff_t from, 
         for (ptrdiff_t k = 1; k <= volterra_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* The position of a row along all axes but the last. */
-static inline void volterra_place(const volterra_solver *s, size_t index, ptrdiff_t place[volterra_AXES])
-{
-    place[volterra_AXES - 1] = 0;
-    for (int a = volterra_AXES - 2; a >= 0; --a) {
-        place[a] = (ptrdiff_t)(index % s->sizes[a]);
-        index /= s->sizes[a];
-    }
-}
-
 /* What kernels are told of a row. */
 static inline void volterra_locate(const volterra_solver *s, size_t index, volterra_row *row)
 {
     row->x = s->x;
     row->at = s->lines + index * volterra_LINES;
     row->length = s->length;
-    ptrdiff_t place[volterra_AXES];
-    volterra_place(s, index, place);
     row->colour = 0;
-    for (int a = 0; a < volterra_AXES - 1; ++a)
-        row->colour = (int)((row->colour + place[a] * volterra_colours[a]) % volterra_COLOUR_COUNT);
 }
 
 enum { volterra_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -193,7 +176,7 @@ static inline double volterra_expm1_lane(double u)
 static inline void volterra_sweep1(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *a_row = row->x[0] + row->at[0];
+    double *a_row = row->x[0];
     volterra_EACH_SITE
     for (ptrdiff_t i = volterra_first(row, 1, from); i < to; i += 2) {
         const double a = a_row[i];
@@ -205,7 +188,7 @@ static inline void volterra_sweep1(const double *coef, const volterra_row *row, 
 static inline void volterra_sweep2(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *a_row = row->x[0] + row->at[0];
+    double *a_row = row->x[0];
     volterra_EACH_SITE
     for (ptrdiff_t i = volterra_first(row, 0, from); i < to; i += 2) {
         const double a = a_row[i];
@@ -219,15 +202,15 @@ static void volterra_sweep_rows(const volterra_solver *s, int part, const double
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        volterra_piece at = volterra_piece_of(s, unit);
+        const volterra_piece at = volterra_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
             volterra_sweep1(coef, &at.row, at.from, at.to);
-            volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            volterra_ends(s->x[0], s->length, at.from, at.to);
             break;
         default: /* H_2 */
             volterra_sweep2(coef, &at.row, at.from, at.to);
-            volterra_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+            volterra_ends(s->x[0], s->length, at.from, at.to);
             break;
         }
     }
@@ -238,7 +221,7 @@ static void volterra_energy_row(const volterra_params *params, const volterra_ro
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict a_row = row->x[0] + row->at[0];
+    const double *restrict a_row = row->x[0];
     volterra_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i];
@@ -251,7 +234,7 @@ static void volterra_casimirs_row(const volterra_params *params, const volterra_
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict a_row = row->x[0] + row->at[0];
+    const double *restrict a_row = row->x[0];
     volterra_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i];
@@ -264,7 +247,7 @@ static void volterra_vector_field_row(const volterra_params *params, const volte
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict a_row = row->x[0] + row->at[0];
+    const double *restrict a_row = row->x[0];
     volterra_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double a = a_row[i];
@@ -288,10 +271,6 @@ static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width
     for (int a = 0; a < volterra_AXES; ++a) {
         if (sizes[a] < volterra_least[a] || sizes[a] % volterra_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-        if (a < volterra_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = volterra_LEAD + ((sizes[volterra_AXES - 1] + 7) / 8 * 8 + volterra_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 576f08d659e712875b0e8a47f575d881b33829f962cfa69c86876f05f052d010
+ * body-sha256: 7930d82f3063a670bdedfc85a90438f695b5aa726cf9726517ec63dd90593dc0
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -170,9 +170,8 @@ static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder
     ptrdiff_t to)
 {
     const double c0 = coef[0];
-    double *x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    double *z_row = row->x[2] + row->at[0];
+    double *x_row = row->x[0], *z_row = row->x[2];
+    const double *restrict y_row = row->x[1];
     xxz_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
@@ -191,10 +190,8 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
     ptrdiff_t to)
 {
     const double c1 = coef[1], c2 = coef[2];
-    const double *restrict B_row = row->x[3] + row->at[0];
-    double *x_row = row->x[0] + row->at[0];
-    double *y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict B_row = row->x[3], *restrict z_row = row->x[2];
+    double *x_row = row->x[0], *y_row = row->x[1];
     xxz_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
@@ -219,19 +216,19 @@ static void xxz_disorder_sweep_rows(const xxz_disorder_solver *s, int part, cons
         switch (part) {
         case 1: /* H_1 */
             xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
-            xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
             break;
         case 2: /* H_2 */
             at.row.x = z_x_y;
             xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
-            xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-            xxz_disorder_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
             break;
         default: /* H_3 */
             xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
-            xxz_disorder_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            xxz_disorder_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
+            xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
             break;
         }
     }
@@ -243,10 +240,8 @@ static void xxz_disorder_energy_row(const xxz_disorder_params *params, const xxz
 {
     (void)apart;
     const double J = params->J, delta = params->delta;
-    const double *restrict B_row = row->x[3] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict B_row = row->x[3], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
     xxz_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
@@ -260,9 +255,7 @@ static void xxz_disorder_casimirs_row(const xxz_disorder_params *params, const x
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)params, (void)apart;
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     xxz_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
@@ -275,10 +268,8 @@ static void xxz_disorder_vector_field_row(const xxz_disorder_params *params, con
     ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
 {
     const double J = params->J, delta = params->delta;
-    const double *restrict B_row = row->x[3] + row->at[0];
-    const double *restrict x_row = row->x[0] + row->at[0];
-    const double *restrict y_row = row->x[1] + row->at[0];
-    const double *restrict z_row = row->x[2] + row->at[0];
+    const double *restrict B_row = row->x[3], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
+        *restrict z_row = row->x[2];
     xxz_disorder_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
@@ -317,10 +308,6 @@ static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_
     for (int a = 0; a < xxz_disorder_AXES; ++a) {
         if (sizes[a] < xxz_disorder_least[a] || sizes[a] % xxz_disorder_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < xxz_disorder_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
     }
     size_t wide = xxz_disorder_LEAD + ((sizes[xxz_disorder_AXES - 1] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8
         * 8;

@@ -143,8 +143,13 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     swept = [sweep.kernel for part in step.parts for sweep in part]
     swept += step.equation.kernels if step.equation else ()
     seen = program.observables
-    looped = [kernel for kernel in step.kernels if kernel is not step.prepare]
-    ops = operations([*looped, seen.energy, seen.casimirs, seen.vector_field])
+    energies = {seen.energy.name, *(k.name for k in (step.partners.energy.kernels if step.partners else ()))}
+    looped = [
+        kernel
+        for kernel in (*step.kernels, seen.energy, seen.casimirs, seen.vector_field)
+        if kernel is not step.prepare and not (kernel.name in energies and program.profile == "small")
+    ]
+    ops = operations(looped)
     used = operations(swept) if program.lanes and program.profile == "fast" else set()
     return Rows(with_formulas(ops), tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in used))
 

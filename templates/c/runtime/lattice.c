@@ -107,10 +107,12 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     size_t rows = 1;
     for (int a = 0; a < PHI_AXES; ++a) {
         if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
+#if !PHI_ONE_ROW
         if (a < PHI_AXES - 1) {
             if (rows > most / sizes[a]) return 0;
             rows *= sizes[a];
         }
+#endif
     }
     size_t wide = PHI_LEAD + ((sizes[PHI_AXES - 1] + 7) / 8 * 8 + PHI_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -180,7 +182,9 @@ static void phi_put(const phi_solver *s, double *rows, const double *values)
         double *row = rows + (ptrdiff_t)r * s->width;
         memset(row - PHI_LEAD, 0, (size_t)s->width * sizeof *row);
         memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
+#if PHI_HALO
         phi_ends(row, s->length, 0, s->length);
+#endif
     }
 }
 
@@ -485,7 +489,9 @@ static phi_status phi_move(phi_solver *s, const double *x, double kept)
                 if (!isfinite(moved)) return PHI_BAD_ARGUMENT;
                 row[i] = moving ? moved : row[i];
             }
+#if PHI_HALO
             phi_ends(row, s->length, 0, s->length);
+#endif
         }
 #if PHI_COMPENSATED
     phi_forget(s);
@@ -566,7 +572,11 @@ static void phi_fill(const phi_solver *s, phi_kernel *kernel, double *out)
 }
 
 void phi_density(const phi_solver *s, double *out) { phi_fill(s, phi_energy_row, out); }
+#if PHI_CASIMIRS
 void phi_casimirs(const phi_solver *s, double *out) { phi_fill(s, phi_casimirs_row, out); }
+#else
+void phi_casimirs(const phi_solver *s, double *out) { (void)s, (void)out; } /* there are none */
+#endif
 void phi_vector_field(const phi_solver *s, double *out) { phi_fill(s, phi_vector_field_row, out); }
 
 #if PHI_BY_HAND

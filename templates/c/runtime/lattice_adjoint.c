@@ -119,7 +119,9 @@ static double *phi_keep(const phi_solver *s, int sweep, double *to)
             const phi_piece at = phi_piece_of(s, unit);
             double *row = to + PHI_LEAD + at.row.at[0];
             memcpy(row + at.from, s->x[f] + at.row.at[0] + at.from, (size_t)(at.to - at.from) * sizeof *row);
+#if PHI_HALO
             phi_ends(row, s->length, at.from, at.to);
+#endif
         }
         to += phi_block(s->rows, s->width);
     }

@@ -45,7 +45,9 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
     phi_sweep_rows(s, part, coef, far, 0, units);
     s->from = 0;
     s->to = s->length;
+#if PHI_HALO
     for (size_t k = 0; k < PHI_DIM; ++k) phi_ends(s->x[k], s->length, 0, s->length);
+#endif
 #else
 #if PHI_NOISE
     if (drawing) phi_draw_rows(s, s->steps, number > 0, from * units, to * units);
@@ -84,12 +86,16 @@ phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, c
         for (size_t r = 0; r < rows; ++r, x += length) {
             memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
 #if !PHI_ONE_ROW
+#if PHI_HALO
             phi_ends(at + (ptrdiff_t)r * s->width, s->length, 0, s->length);
+#endif
 #endif
         }
     }
 #if PHI_ONE_ROW
+#if PHI_HALO
     phi_ends(s->x[field], s->length, 0, s->length);
+#endif
 #endif
     return PHI_OK;
 }

@@ -65,7 +65,9 @@ static void phi_combine(const phi_solver *s, double *const *to, double own, doub
                     PHI_EACH_SITE
                     for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by * direction[i];
                 }
+#if PHI_HALO
                 phi_ends(sum, s->length, at.from, at.to);
+#endif
             }
         }
     }
@@ -147,7 +149,9 @@ static void phi_apply_blocks(const phi_solver *s, double *const *v, double *cons
                     PHI_EACH_SITE
                     for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by[i] * one[i];
                 }
+#if PHI_HALO
                 phi_ends(sum, s->length, at.from, at.to);
+#endif
             }
         }
     }

@@ -45,7 +45,9 @@ static void phi_draw_rows(const phi_solver *s, size_t steps, int part, size_t fi
                 one[i] = size * pair[0];
             }
         }
+#if PHI_HALO
         for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(s->x[PHI_DRAWN + k] + at.row.at[0], s->length, at.from, at.to);
+#endif
     }
 }
 

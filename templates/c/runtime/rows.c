@@ -39,7 +39,7 @@ typedef struct {
     int chosen;                   /* the colour that a part of H belongs to */
 #endif
 #endif
-#if PHI_OPEN
+#if PHI_OPEN && !PHI_ONE_ROW
     double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */
 #if PHI_BESIDE
     int whole;                    /* whether all of them are */
@@ -71,11 +71,11 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 }
 
 #endif
+#if PHI_HALO
 /* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at open ends,
    where terms that read them have weight 0. */
 static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdiff_t to)
 {
-#if PHI_HALO
 #if PHI_OPEN_ROWS
     for (ptrdiff_t k = 1; k <= PHI_HALO; ++k) {
         const ptrdiff_t inside = k < length ? k : length - 1;
@@ -88,12 +88,10 @@ static inline void phi_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
     if (to == length)
         for (ptrdiff_t k = 1; k <= PHI_HALO; ++k) row[-k] = row[length - k];
 #endif
-#else
-    (void)row, (void)length, (void)from, (void)to;
-#endif
 }
 
-#if !PHI_ONE_ROW || PHI_OPEN || PHI_COLOURS
+#endif
+#if !PHI_ONE_ROW
 /* The position of a row along all axes but the last. */
 static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[PHI_AXES])
 {
@@ -138,11 +136,14 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     row->chosen = 0;
 #endif
 #endif
-#if PHI_OPEN || PHI_COLOURS
+#if PHI_COLOURS
+    row->colour = 0;
+#endif
+#if !PHI_ONE_ROW && PHI_OPEN || !PHI_ONE_ROW && PHI_COLOURS
     ptrdiff_t place[PHI_AXES];
     phi_place(s, index, place);
 #endif
-#if PHI_OPEN
+#if !PHI_ONE_ROW && PHI_OPEN
 #if PHI_BESIDE
     row->whole = 1;
 #endif
@@ -157,8 +158,7 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
     }
 #endif
-#if PHI_COLOURS
-    row->colour = 0;
+#if !PHI_ONE_ROW && PHI_COLOURS
     for (int a = 0; a < PHI_AXES - 1; ++a)
         row->colour = (int)((row->colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
 #endif

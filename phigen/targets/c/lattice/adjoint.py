@@ -184,9 +184,9 @@ def _loop(
     arrays = [*(h.array for h in handed), *range(begin, begin + len(sums))]
     given |= {array: "0.0" for array in arrays if array not in given}
     stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
-    head += [f"    double *restrict bar_{k} = row->bar[{k}] + row->at[0];" for k in sorted(used)]
+    head += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sorted(used)]
     for array in given:
-        head.append(f"    double *restrict handed_{array} = row->handed[{array}] + row->at[0];")
+        head.append(f"    double *restrict handed_{array} = row->handed[{array}]{layout.at(0)};")
         if step.sites.colours > 1:
             head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
     body = names.loaded()
@@ -227,7 +227,7 @@ def _ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> Iterato
     if layout.step.sites.open[-1]:
         return
     for array in sorted({h.array for h in handed if h.offset[-1]}):
-        yield f"{program.name}_ends(handed[{array}] + at.row.at[0], s->length, at.from, at.to);"
+        yield f"{program.name}_ends(handed[{array}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);"
 
 
 def _handing(program: Program, layout: Layout, part: int, handed: Sequence[Handed]) -> Loop:
@@ -238,10 +238,10 @@ def _handing(program: Program, layout: Layout, part: int, handed: Sequence[Hande
         back = tuple(-o for o in h.offset)
         line = layout.line(back)
         pointer = f"handed_{h.array}" + (f"_{line}" if line else "")
-        pointers[pointer] = f"const double *restrict {pointer} = row->handed[{h.array}] + row->at[{line}];"
+        pointers[pointer] = f"const double *restrict {pointer} = row->handed[{h.array}]{layout.at(line)};"
         sums.setdefault(h.base, []).append(beside(pointer, back[-1]))
     lines = [f"    {text}" for text in pointers.values()]
-    lines += [f"    double *restrict bar_{k} = row->bar[{k}] + row->at[0];" for k in sums]
+    lines += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sums]
     lines += [f"    {program.name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
     lines += [f"        bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]
     purpose = f"what sites are handed by those around that the sweeps of H_{part} have changed"

@@ -36,6 +36,10 @@ class Layout:
         """The line of a neighbour."""
         return self.lines.index(tuple(offset[:-1]))
 
+    def at(self, line: int, row: str = "row->") -> str:
+        """What is added to the beginning of an array for a line beside a row; with one axis there is but one row."""
+        return f" + {row}at[{line}]" if len(self.step.sites.axes) > 1 else ""
+
     def place(self, line: int) -> str:
         """Where a line is, beside the row that is worked at."""
         axes = zip(self.step.sites.axes, self.lines[line], strict=False)
@@ -107,6 +111,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
     """The switches of the runtime for lattices."""
     banded = layout.band > 0 and program.offers("recurrences")
     return {
+        "CASIMIRS": bool(program.casimirs),
         "KICKED": program.offers("kicks") and program.profile == "fast",
         "OPEN": bool(layout.weights),
         "SPREAD": program.profile == "fast",

@@ -12,9 +12,9 @@ from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import ONE, ZERO, gradient, substitute
 from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
-from phigen.targets.c.kernels import lane_calls
+from phigen.targets.c.kernels import FUNCTIONS, lane_calls
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.names import SiteNames
+from phigen.targets.c.lattice.names import SiteNames, pointers
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, lower
 from phigen.targets.header import plain
@@ -67,10 +67,14 @@ def weights_of(kernel: Kernel) -> list[str]:
     return [s for s in kernel.inputs["present"] if kind_of(s) == PRESENT]
 
 
-def in_loops(program: Program) -> dict[str, str]:
-    """What the loops call for any argument: versions for lanes where there are such, else phigen's own or libm's."""
+def in_loops(program: Program, *, energy: bool = False) -> dict[str, str]:
+    """What the loops call for any argument: versions for lanes where there are such, else phigen's own or libm's.
+
+    In short code an ``energy``, which is looked at now and then, calls libm's.
+    """
     own = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
-    return own | dict(lane_calls(program)) | {f: own[f] for f in SPECIAL}
+    calls = FUNCTIONS if energy and program.profile == "small" else lane_calls(program)
+    return own | dict(calls) | {f: own[f] for f in SPECIAL}
 
 
 def forms_of(program: Program, kernel: Kernel) -> Iterator[tuple[Kernel, str]]:
@@ -104,16 +108,16 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     if len(stores) > 1:
         body += changes
         stores = [(f, f"change{k}") for k, (f, _) in enumerate(stores)]
-    head = _unused(code)
+    head, here = _unused(code), layout.at(0)
     if sweep.is_tangent:
-        pointers = {f: names.scope[Symbol("out", f)] for f in sorted(moved)}
-        arrays = {f: f"row->varied[{program.coordinates.index(f)}]" for f in pointers}
-        head += [f"    double *{pointer} = {arrays[f]} + row->at[0];" for f, pointer in pointers.items()]
-        body += [f"{pointers[f]}[i] += {value};" for f, value in stores]
+        out = {f: names.scope[Symbol("out", f)] for f in sorted(moved)}
+        arrays = {f: f"row->varied[{program.coordinates.index(f)}]" for f in out}
+        head += [f"    {line}" for line in pointers([("double *", f"{p} = {arrays[f]}{here}") for f, p in out.items()])]
+        body += [f"{out[f]}[i] += {value};" for f, value in stores]
     elif program.compensated:
         for k, (f, value) in enumerate(stores):
             carry, field = names.scope[Symbol("carry", f)], f"{names.pointer(f, 0)}[i]"
-            head.append(f"    double *{carry} = row->carry[{program.coordinates.index(f)}] + row->at[0];")
+            head.append(f"    double *{carry} = row->carry[{program.coordinates.index(f)}]{here};")
             body += [f"const double add{k} = {carry}[i] + {value}, sum{k} = {field} + add{k};"]
             body += [f"{carry}[i] = add{k} - (sum{k} - {field});", f"{field} = sum{k};"]
     else:
@@ -153,12 +157,12 @@ def middle_loop(
         if kernel.name == BLOCK
         else [Symbol("out", f) for f in fields]
     )
-    pointers = [names.scope[s] for s in outputs]
-    head = _unused(code)
-    head += [f"    double *restrict {p} = row->out[{k}] + row->at[0];" for k, p in enumerate(pointers)]
+    out = [names.scope[s] for s in outputs]
+    places = [("double *restrict ", f"{p} = row->out[{k}]{layout.at(0)}") for k, p in enumerate(out)]
+    head = [*_unused(code), *(f"    {line}" for line in pointers(places))]
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    body += [f"{pointers[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
+    body += [f"{out[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
     text = _looped(head, names, body, program.name, "ptrdiff_t i = from; i < to; ++i")
     return Loop(kernel.name + form, _purpose(kernel, form), _arguments(program), text)
 
@@ -171,7 +175,8 @@ def _added(name: str, read: bool, value: str) -> str:
 def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
     """A kernel as a loop that fills arrays over the sites."""
     name, code, partners = program.name, lower(kernel), layout.partners
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), partners.field.names)
+    calls = in_loops(program, energy=kernel.name == "energy")
+    names = SiteNames(program, layout, kernel, code, set(), calls, partners.field.names)
     head = [*comment(f"/* {plain(kernel.purpose)}, of the sites of a row: out[k * apart + i - from] */", "")]
     head.append(
         f"static void {name}_{kernel.name}_row(const {name}_params *params, const {name}_row *row, ptrdiff_t from, "
@@ -179,25 +184,21 @@ def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
     )
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    early = list[str]()
+    gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
+    for own in gather.kernels if gather else ():
+        early.append(f"    {name}_{own.name}(params, row, from, to);")
+    shared = " + 0.5 * row->gathered[0][i]" * bool(kernel.name == "energy" and early)
     for s in code.stores:
         place = {0: "i - from", 1: "(ptrdiff_t)apart + i - from"}.get(
             s.index, f"{s.index} * (ptrdiff_t)apart + i - from"
         )
-        body.append(f"out[{place}] = {names.show(s.value)};")
-    early, late = list[str](), list[str]()
-    gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
-    for own in gather.kernels if gather else ():
-        early.append(f"    {name}_{own.name}(params, row, from, to);")
-    if kernel.name == "energy" and early:
-        late = ["    for (ptrdiff_t i = from; i < to; ++i) out[i - from] += 0.5 * row->gathered[0][i];"]
-    unused = [] if early or late or any(s in code.used for s in kernel.inputs["params"]) else ["params"]
+        body.append(f"out[{place}] = {f'{names.show(s.value)}{shared}'.removeprefix('0.0 + ')};")
+    unused = [] if early or any(s in code.used for s in kernel.inputs["params"]) else ["params"]
     unused += [] if len(code.stores) > 1 else ["apart"]
-    if not code.stores:
-        unused += ["row", "from", "to", "out"]
-        return "\n".join([*head, *(f"    (void){u};" for u in unused), "}"]) + "\n"
     head += ["    " + ", ".join(f"(void){u}" for u in unused) + ";"] if unused else []
     text = _looped([*head, *early], names, body, name, "ptrdiff_t i = from; i < to; ++i")
-    return text + "\n".join([*late, "}\n"])
+    return text + "}\n"
 
 
 def _looped(head: list[str], names: SiteNames, body: list[str], name: str, loop: str) -> str:

@@ -79,7 +79,7 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 def model(program: Program, step: Sweeps) -> str:
     """Tables, and what is computed before the steps."""
     member, layout, schedule, sites = members(program), layout_of(program, step), step.schedule, step.sites
-    flows = schedule.flows
+    flows, several = schedule.flows, len(sites.axes) > 1
     joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
     multiples = [*schedule.multiples, *schedule.multiples[:1]]
     constants = [
@@ -110,7 +110,9 @@ def model(program: Program, step: Sweeps) -> str:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = 1 if len(sites.axes) == 1 else max(1, *far)
         constants += [("SPAN", span, "slices beside one that a flow reads: pieces of a row, or of the first axis")]
-    constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * bool(layout.weights)
+    constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * (
+        bool(layout.weights) and several
+    )
     if sites.colours > 1:
         constants += [("COLOUR_COUNT", sites.colours, "colours of sites")]
         constants += [("COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour")]
@@ -125,12 +127,12 @@ def model(program: Program, step: Sweeps) -> str:
         "constants": constants,
         "least": ", ".join(map(str, sites.least)),
         "periods": ", ".join(map(str, sites.periods)),
-        "several": len(sites.axes) > 1,
-        "ends": len(sites.axes) > 1 or switches(program, step, layout)["BANDED"],
+        "several": several,
+        "ends": several or switches(program, step, layout)["BANDED"],
         "open": ", ".join(str(int(o)) for o in sites.open),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
-        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights),
-        "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 else "",
+        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
+        "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and several else "",
         "times": ", ".join(map(repr, [*schedule.times, joined][: rows_of(step)])),
         "split": step.equation is None,
         "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",

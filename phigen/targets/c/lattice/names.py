@@ -46,7 +46,7 @@ class SiteNames:
         self._own: list[str] = []
         self._other: list[str] = []
         self._first: list[str] = []
-        self._starts: list[str] = []
+        self._starts: list[tuple[str, str]] = []
         member = members(program)
         for s in (s for symbols in kernel.inputs.values() for s in symbols if s in code.used):
             if isinstance(s, Symbol) and s.kind == COEFFICIENT:
@@ -61,7 +61,7 @@ class SiteNames:
                 self._bind_variation(s, str(s.key[0]))
             elif isinstance(s, Symbol) and s.kind == INITIAL:
                 pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
-                self._starts.append(f"const double *restrict {pointer} = row->start[{number}] + row->at[0];")
+                self._starts.append(("const double *restrict ", f"{pointer} = row->start[{number}]{layout.at(0)}"))
                 self.scope.bind(s, f"{pointer}[i]")
             elif isinstance(s, Symbol) and s.kind in seeds:
                 self._bind_seed(s, seeds[s.kind][int(s.key[0])], of_pair=s.kind == "sums_bar")
@@ -105,7 +105,7 @@ class SiteNames:
         line = self.layout.line(offset)
         pointer = self.scope[Symbol("varied", field, line)]
         array = f"row->varied[{self._fields.index(field)}]"
-        self._starts.append(f"const double *{pointer} = {array} + row->at[{line}];")
+        self._starts.append(("const double *", f"{pointer} = {array}{self.layout.at(line)}"))
         if end:
             self._bind_at(end, f"{self.scope[s]} = {pointer}")
         else:
@@ -122,7 +122,8 @@ class SiteNames:
         low, high = bounds(s)[-1]
         tests = [f"i + {-low * -1} >= 0".replace("+ -", "- ")] * (low < 0) + [f"i + {high} < row->length"] * (high > 0)
         if tests:
-            self._weights.append(f"const double {named} = {' && '.join(tests)} ? row->present[{k}] : 0.0;")
+            there = f"row->present[{k}]" if len(self.layout.step.sites.axes) > 1 else "1.0"
+            self._weights.append(f"const double {named} = {' && '.join(tests)} ? {there} : 0.0;")
         else:
             self._first.append(f"{named} = row->present[{k}]")
 
@@ -147,22 +148,32 @@ class SiteNames:
 
     def pointers(self) -> list[str]:
         """What is read before the loop."""
-        lines = [*together(self._first), *dict.fromkeys(self._starts)]
         for f in sorted(self.moved):
             self.pointer(f, 0)
+        found, beside = [*dict.fromkeys(self._starts)], list[str]()
         for (base, line), named in self._pointers.items():
-            mine = base in self.moved and line == 0
-            constant = "" if mine else "const "
-            alone = "" if base in self.moved else "restrict "
-            place = self.layout.arrays.index(base)
-            said = f" /* {self.layout.place(line)} */" if line else ""
-            lines.append(f"{constant}double *{alone}{named} = row->x[{place}] + row->at[{line}];{said}")
-        return lines
+            constant = "" if base in self.moved and line == 0 else "const "
+            kind = f"{constant}double *{'' if base in self.moved else 'restrict '}"
+            place = f"{named} = row->x[{self.layout.arrays.index(base)}]{self.layout.at(line)}"
+            if line:
+                beside.append(f"{kind}{place}; /* {self.layout.place(line)} */")
+            else:
+                found.append((kind, place))
+        return [*together(self._first), *pointers(found), *beside]
 
 
 def beside(pointer: str, offset: int) -> str:
     """A value of a row at an offset from the site i."""
     return f"{pointer}[i{offset:+d}]".replace("+", " + ").replace("-", " - ").replace(" + 0", "")
+
+
+def pointers(found: Sequence[tuple[str, str]]) -> list[str]:
+    """Declarations of pointers, by their kind, as in ``const double *restrict``, and what each points to."""
+    kinds = dict.fromkeys(kind for kind, _ in found)
+    own = {kind: f"*{kind.partition('*')[2]}" for kind in kinds}
+    return [
+        f"{kind.partition('*')[0]}{', '.join(own[kind] + place for k, place in found if k == kind)};" for kind in kinds
+    ]
 
 
 def together(values: Sequence[str]) -> list[str]:

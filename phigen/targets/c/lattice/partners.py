@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.loops import Loop, in_loops
-from phigen.targets.c.lattice.names import SiteNames
+from phigen.targets.c.lattice.names import SiteNames, pointers
 from phigen.targets.code import lower
 
 
@@ -21,18 +21,19 @@ def partners(program: Program, layout: Layout) -> Iterator[str]:
 
 def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> Iterator[Loop]:
     """What all bonds, or pairs with other sites, add up at some sites, from ``coef`` or ``params``."""
+    calls = in_loops(program, energy=gather is layout.partners.energy)
     kind = "double" if source == "coef" else f"{program.name}_params"
     arguments = f"const {kind} *{source}, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
     for number, ends in enumerate(gather.ends):
         unused = [] if set(ends.kernel.inputs[source]) & lower(ends.kernel).used else [f"(void){source};"]
         if layout.graph:
-            text = _over_bonds(program, layout, ends, unused, first=number == 0)
+            text = _over_bonds(program, layout, ends, calls, unused, first=number == 0)
         else:
             targets = [f"g{k}" for k in range(len(gather.names))]
-            pointers = [f"double *restrict {t} = row->gathered[{k}];" for k, t in enumerate(targets)]
+            sums = pointers([("double *restrict ", f"{t} = row->gathered[{k}]") for k, t in enumerate(targets)])
             body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
             begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
-            text = _over_pairs(program, layout, ends.kernel, [*unused, *pointers, *begin], body)
+            text = _over_pairs(program, layout, ends.kernel, calls, [*unused, *sums, *begin], body)
         yield Loop(ends.kernel.name, ends.kernel.purpose, arguments, text)
 
 
@@ -50,11 +51,13 @@ def bonds_of(ends: Ends) -> tuple[str, list[str]]:
     return f"for (ptrdiff_t k = {bounds}; ++k) {{", passed
 
 
-def _over_bonds(program: Program, layout: Layout, ends: Ends, begin: Sequence[str], *, first: bool) -> str:
+def _over_bonds(
+    program: Program, layout: Layout, ends: Ends, calls: Mapping[str, str], begin: Sequence[str], *, first: bool
+) -> str:
     """A loop over sites a, in it one over the bonds that they have to sites b."""
     kernel = ends.kernel
     code = lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program))
+    names = SiteNames(program, layout, kernel, code, set(), calls)
     other, own = names.of_pair()
     count = len(code.stores)
     sums = [f"double {', '.join(f'sum{k} = 0.0' for k in range(count))};"]
@@ -78,10 +81,17 @@ def _over_bonds(program: Program, layout: Layout, ends: Ends, begin: Sequence[st
     )
 
 
-def _over_pairs(program: Program, layout: Layout, kernel: Kernel, begin: Sequence[str], body: Sequence[str]) -> str:
+def _over_pairs(
+    program: Program,
+    layout: Layout,
+    kernel: Kernel,
+    calls: Mapping[str, str],
+    begin: Sequence[str],
+    body: Sequence[str],
+) -> str:
     """A loop over all sites b, in it one over the sites a of a piece; statements with the values of the kernel."""
     name, code = program.name, lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program))
+    names = SiteNames(program, layout, kernel, code, set(), calls)
     other, own = names.of_pair()
     lines = [*own, *(f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments)]
     lines += [text.format(*(names.show(s.value) for s in code.stores)) for text in body]

@@ -51,7 +51,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         )
     for kernel in (step.equation.slope, *step.equation.tangents) if step.equation else ():
         found += _of_equation(program, layout, kernel, {"": in_loops(program)})
-    found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field)]
+    found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field) if k.roots]
     sites = [p for p in program.parameters if p.at == "sites"]
     values = {
         "NAME": name,
@@ -256,7 +256,7 @@ def _either(lines: Mapping[str, Sequence[str]]) -> list[str]:
 
 def _copied_ends(program: Program, layout: Layout, fields: Sequence[int], where: str) -> list[str]:
     """What copies the ends of a row of some fields that were changed."""
-    found = [f"{program.name}_ends({where}[{f}] + at.row.at[0], s->length, at.from, at.to);" for f in fields]
+    found = [f"{program.name}_ends({where}[{f}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);" for f in fields]
     return found if layout.halo else []
 
 
@@ -315,6 +315,7 @@ def over_rows(
         "NAME": program.name,
         "low": max([0, *(-low for low, _ in last)]),
         "high": max([0, *(high for _, high in last)]),
+        "one_row": len(layout.step.sites.axes) == 1,
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and len(layout.step.sites.axes) == 1,
     }
     body = [line for case in cases if not isinstance(case, str) for line in case.orders]
