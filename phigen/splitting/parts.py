@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import inf
 
 from phigen import progress
 from phigen.errors import Diagnostic, SpecError
@@ -15,6 +16,7 @@ from phigen.splitting.ring import Ring, ring_of
 from phigen.splitting.terms import hamiltonian_terms, terms_of
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
+from phigen.symbolic.tower import Poly
 
 #: How often a companion is taken out of the terms.
 ROUNDS = 3
@@ -33,27 +35,49 @@ class Splitting:
 
 
 def split(system: System) -> Splitting:
-    """H as a sum of parts with elementary flows.
+    """H as a sum of parts with elementary flows: as few as possible; of as many those that keep more invariants.
 
     Raises `SpecError`, located at the Hamiltonian, that names the term that stands in the way.
     """
     listed = hamiltonian_terms(system)
     ring = ring_of(system, listed)
     terms = terms_of(ring, listed)
+    invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
     best: list[Flow] | None = None
+    least: tuple[float, float] = (inf, inf)
     conflicts = Conflicts(ring)
     for candidate in _candidates(system, conflicts, terms):
         parts = conflicts.grouped(candidate)
-        if best is not None and len(parts) >= len(best):
+        if len(parts) > least[0]:
+            continue
+        rank = (len(parts), _lost(ring, parts, invariants))
+        if rank >= least:
             continue
         try:
-            best = [flow_of(ring, part) for part in parts]
+            best, least = [flow_of(ring, part) for part in parts], rank
         except NoFlowError as error:
             refused = refused or error
     if best is None:
         raise _refusal(system, refused)
     return Splitting(tuple(_merged(ring, best)))
+
+
+def _invariants(system: System, ring: Ring) -> list[Poly]:
+    """The invariants of the spec, but for those with functions or symbols that H and π do not have."""
+    found = []
+    for e in system.invariants.values():
+        try:
+            found.append(ring.tower.convert(e))
+        except ValueError:
+            continue
+    return found
+
+
+def _lost(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly]) -> int:
+    """How many invariants some part does not keep: s_1 + s_2 is constant along s_1·s_2, but not along x_1 x_2."""
+    sums = [ring.tower.combine(t.element for t in part) for part in parts]
+    return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)
 
 
 def _candidates(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:

@@ -40,6 +40,14 @@ SYSTEMS = {
         "hamiltonian: a*u + b*v + c*w",
         ["a, b, c turned; u, v, w by linear integrals"],
     ),
+    "three spins with a sum to keep": (
+        "coordinates: [a1, b1, c1, a2, b2, c2, a3, b3, c3]\n"
+        "poisson: {brackets: {a1: {b1: c1, c1: -b1}, b1: {c1: a1}, a2: {b2: c2, c2: -b2}, b2: {c2: a2},"
+        " a3: {b3: c3, c3: -b3}, b3: {c3: a3}}}\n"
+        "hamiltonian: a1*a2 + b1*b2 + c1*c2 + a2*a3 + b2*b3 + c2*c3 + a3*a1 + b3*b1 + c3*c1\n"
+        "invariants: {A: a1 + a2 + a3, B: b1 + b2 + b3, C: c1 + c2 + c3}",
+        [f"a{i}, b{i}, c{i} turned; a{k}, b{k}, c{k} by linear integrals" for i, k in ((1, 2), (1, 3), (2, 3))],
+    ),
     "Riccati equations": (
         "coordinates: [x, y]\npoisson: {brackets: {x: {y: 1 - x**2 - y**2}}}\nhamiltonian: x + y**2",
         ["x moved by a Riccati equation", "y moved by a Riccati equation"],
