@@ -147,8 +147,8 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         sizes.append(("GAUGES", len(program.held), "that a trajectory holds fixed: e" if program.monitor else whose))
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
-        kept = program.dimension * len(program.fractions)
-        sizes.append(("TRAIL", kept, "numbers of a step that its transpose needs"))
+        points = program.step.schedule.flows if isinstance(program.step, Splitting) else program.fractions
+        sizes.append(("TRAIL", program.dimension * len(points), "numbers of a step that its transpose needs"))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))

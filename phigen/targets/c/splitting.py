@@ -32,7 +32,8 @@ def printed(program: Program, step: Splitting) -> str:
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
     passed = "x, moved, start" + ", element" * bool(program.attitude)
-    found.append(_steps(program, step, "", "inline ", arguments + more, passed))
+    kept = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
+    found.append(_steps(program, step, "", "inline ", arguments + more + kept, passed, kept=bool(kept)))
     return "\n".join(found)
 
 
@@ -67,19 +68,23 @@ def tangent(program: Program, step: Splitting) -> str:
 def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
     """The transposes of the flows."""
     flows = step.schedule.flows
-    moved = [_moved(flow) for flow in step.flows]
-    kept = [[(place, i) for place, i in enumerate(own) if i < program.dimension] for own in moved]
-    labels = [*(f"case {k}" for k in range(1, len(kept))), "default"]
+    found, parts = [], []
+    for k, kernel in enumerate(adjoint.steps, 1):
+        reached = [[i for i, e in enumerate(o.values) if not e.is_zero] for o in kernel.outputs]
+        outputs = [
+            replace(o, values=tuple(o.values[i] for i in i_s)) for o, i_s in zip(kernel.outputs, reached, strict=True)
+        ]
+        found.append(function(program, replace(kernel, outputs=tuple(outputs)), functions=_functions(program)))
+        label = f"case {k}" if k < len(adjoint.steps) else "default"
+        parts.append((label, k, *(list(enumerate(i_s)) for i_s in reached)))
     own = {
         "NAME": program.name,
         "n": program.dimension,
-        "along": _along(program),
         "row": max(1, step.row),
-        "parts": list(zip(labels, range(1, len(kept) + 1), kept, strict=True)),
+        "parts": parts,
         "part_of": ", ".join(str(part + 1) for part, _ in flows),
         "row_of": ", ".join(str(row) for _, row in flows),
     }
-    found = [function(program, kernel, functions=_functions(program)) for kernel in adjoint.steps]
     return "\n".join([*found, render("c", "adjoint_flows.c", own)])
 
 
@@ -107,8 +112,13 @@ def _moved(kernel: Kernel) -> list[int]:
     return [i for i, e in enumerate(kernel.outputs[0].values) if not e.is_zero]
 
 
-def _steps(program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str) -> str:
-    """The schedule; flows are told their coefficients by an address, and those in lanes by the number of the row."""
+def _steps(
+    program: Program, step: Splitting, form: str, linkage: str, arguments: str, passed: str, *, kept: bool = False
+) -> str:
+    """The schedule; flows are told their coefficients by an address, and those in lanes by the number of the row.
+
+    With ``kept`` the states before each flow are left there, unless it is NULL.
+    """
     schedule = step.schedule
     first, row = ("row", "") if form else ("coef", f"{program.name}_ROW")
 
@@ -116,6 +126,6 @@ def _steps(program: Program, step: Splitting, form: str, linkage: str, arguments
         return f"{rows} * {row}" if row and rows > 1 else row or str(rows)
 
     pattern = [(part + 1, f"{first} + {further(at)}" if at else first) for part, at in schedule.pattern]
-    own = {"form": form, "linkage": linkage, "arguments": arguments, "passed": passed, "pattern": pattern}
+    own = {"form": form, "linkage": linkage, "arguments": arguments, "passed": passed, "pattern": pattern, "kept": kept}
     own |= {"start": first, "next": f"{first} += {further(1)}", "further": f"{first} += {further(schedule.rows)}"}
     return render("c", "flows.c", {"NAME": program.name, "stages": schedule.stages, **own})

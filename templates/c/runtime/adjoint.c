@@ -34,7 +34,7 @@ static void phi_join(phi_cotangent *bar, const double *rows_bar, size_t done, si
 #if PHI_TRACED
 /* Pull cotangents of rows back through a run that ended at s and left its trail, many stages at once. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
-    double trail[][PHI_STAGES][PHI_DIM], phi_cotangent *bar)
+    phi_kept *trail, phi_cotangent *bar)
 {
     phi_traced g;
     phi_lanes slopes[PHI_COEFFICIENTS];
@@ -82,12 +82,16 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
 
 #else
 /* Pull a cotangent back through the step that led to s, whose trail is given; s goes back in time, but for its state. */
-static phi_status phi_back_step(phi_solver *s, double trail[PHI_STAGES][PHI_DIM], phi_cotangent *bar)
+static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *bar)
 {
     phi_status status = PHI_OK;
     phi_go_back(s);
+#if PHI_SPLITTING
+    status = phi_stage_adjoint(s->coef[0], trail, bar, bar->coef[0]);
+#else
     for (int stage = PHI_STAGES - 1; stage >= 0; --stage)
         if (status == PHI_OK) status = phi_stage_adjoint(s->coef[stage], trail[stage], bar, bar->coef[stage]);
+#endif
 #if PHI_RENEWED
 #if PHI_SPLITTING
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k)
@@ -102,7 +106,7 @@ static phi_status phi_back_step(phi_solver *s, double trail[PHI_STAGES][PHI_DIM]
 
 /* Pull cotangents of rows back through a run that ended at s and left its trail. */
 static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const double *rows_bar,
-    double trail[][PHI_STAGES][PHI_DIM], phi_cotangent *bar)
+    phi_kept *trail, phi_cotangent *bar)
 {
     phi_status status = PHI_OK;
     for (size_t done = steps; done > 0 && status == PHI_OK; --done) {
@@ -115,7 +119,7 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
 #endif
 #if PHI_IMPLICIT
 /* The trail of the last steps, from what the solver remembers of them. 0 if it does not remember all. */
-static int phi_remembered(const phi_solver *s, size_t steps, double trail[][PHI_STAGES][PHI_DIM])
+static int phi_remembered(const phi_solver *s, size_t steps, phi_kept *trail)
 {
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         const phi_history *history = &s->history[stage];
@@ -133,7 +137,7 @@ static int phi_remembered(const phi_solver *s, size_t steps, double trail[][PHI_
 
 #endif
 /* Make a few steps, and their trail. */
-static phi_status phi_leave_few(phi_solver *s, size_t steps, double trail[][PHI_STAGES][PHI_DIM])
+static phi_status phi_leave_few(phi_solver *s, size_t steps, phi_kept *trail)
 {
     const phi_solver before = *s;
     phi_status status;
@@ -146,6 +150,8 @@ static phi_status phi_leave_few(phi_solver *s, size_t steps, double trail[][PHI_
             if (status == PHI_OK && !phi_remembered(s, 1, trail + k)) status = PHI_NO_CONVERGENCE;
         }
     }
+#elif PHI_SPLITTING
+    status = phi_integrate_leaving(s, s->h, steps, trail[0]);
 #else
     status = phi_integrate(s, s->h, steps);
 #if PHI_COMPOSED
@@ -167,13 +173,15 @@ static phi_status phi_leave_few(phi_solver *s, size_t steps, double trail[][PHI_
 /* How many steps are recorded at once: those that the solver remembers. */
 #if PHI_RECURRENCES
 #define PHI_AT_ONCE ((size_t)PHI_REMEMBERED)
+#elif PHI_SPLITTING
+#define PHI_AT_ONCE ((size_t)-1)
 #else
 #define PHI_AT_ONCE ((size_t)1)
 #endif
 
 /* Make steps, and their trail. Rows, where not NULL, are the states after each stride steps, and at the end. */
 static phi_status phi_leave_trail(phi_solver *s, size_t steps, size_t stride, double *rows,
-    double trail[][PHI_STAGES][PHI_DIM])
+    phi_kept *trail)
 {
     phi_status status = PHI_OK;
     for (size_t done = 0; done < steps && status == PHI_OK;) {
@@ -264,7 +272,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     const phi_solver before = *s;
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
-    double (*kept)[PHI_STAGES][PHI_DIM] = (double (*)[PHI_STAGES][PHI_DIM])trail;
+    phi_kept *kept = (phi_kept *)trail;
     phi_cotangent bar;
     memset(&bar, 0, sizeof bar);
     status = phi_leave_trail(s, steps, stride, rows, kept);

@@ -25,6 +25,14 @@ typedef struct {
 #endif
 } phi_cotangent;
 
+/* What is kept of a step for the way back: the states before its flows, or the points that its stages have solved for or
+   begun at. */
+#if PHI_SPLITTING
+typedef double phi_kept[PHI_FLOWS][PHI_DIM];
+#else
+typedef double phi_kept[PHI_STAGES][PHI_DIM];
+#endif
+
 #if PHI_PATH
 #define PHI_BACK_NEGLIGIBLE 1e-18    /* terms that rounding hides in their sum, in sizes of start and sum */
 #define PHI_BACK_ROUNDED_SLOPE 1e-13 /* rounding of slopes, in sizes of the path and its slope */
@@ -215,19 +223,13 @@ static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM],
 }
 
 #else
-/* Pull a cotangent back through a step that began at y: its flows are followed, then gone through backwards. */
-static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
+/* Pull a cotangent back through a step whose flows began at y. */
+static phi_status phi_stage_adjoint(const double *coef, phi_kept y, phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
-    double x[PHI_FLOWS + 1][PHI_DIM];
-    memcpy(x[0], y, sizeof x[0]);
-    for (int k = 0; k < PHI_FLOWS; ++k) {
-        memcpy(x[k + 1], x[k], sizeof x[k]);
-        phi_follow(phi_flow_part[k], coef + phi_flow_row[k] * PHI_ROW, x[k + 1]);
-    }
     for (int k = PHI_FLOWS - 1; k >= 0; --k) {
         const int row = phi_flow_row[k] * PHI_ROW;
-        phi_follow_back(phi_flow_part[k], coef + row, x[k], bar->x, coef_bar + row);
+        phi_follow_back(phi_flow_part[k], coef + row, y[k], bar->x, coef_bar + row);
     }
     return PHI_OK;
 }

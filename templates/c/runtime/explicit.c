@@ -46,15 +46,24 @@ static void phi_prepare(const phi_params *params, double h, double *coef)
 enum { PHI_TIME = PHI_DIM, PHI_DOMAIN, PHI_ALONG };
 
 /* One step: the exact flows of the parts of K, one after the other. If it fails, the state is as before. */
+#if PHI_ADJOINT
+static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
+#else
 static phi_status phi_stages(phi_solver *s)
+#endif
 {
     double x[PHI_ALONG] = { 0.0 }, moved[PHI_ALONG] = { 0.0 }, start[PHI_ALONG] = { 0.0 };
     memcpy(x, s->x, sizeof s->x);
     memcpy(start, s->x, sizeof s->x);
     memcpy(moved, s->carry, sizeof s->carry);
-#if PHI_ATTITUDE
+#if PHI_ATTITUDE && PHI_ADJOINT
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef[0], x, moved, start, element, kept);
+#elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
     phi_flows(s->coef[0], x, moved, start, element);
+#elif PHI_ADJOINT
+    phi_flows(s->coef[0], x, moved, start, kept);
 #else
     phi_flows(s->coef[0], x, moved, start);
 #endif
@@ -71,14 +80,23 @@ static phi_status phi_stages(phi_solver *s)
 
 #else
 /* One step: the exact flows of the parts of H, one after the other. If it fails, the state is as before. */
+#if PHI_ADJOINT
+static phi_status phi_stages(phi_solver *s, double (*kept)[PHI_DIM])
+#else
 static phi_status phi_stages(phi_solver *s)
+#endif
 {
     double x[PHI_DIM], moved[PHI_DIM];
     memcpy(x, s->x, sizeof x);
     memcpy(moved, s->carry, sizeof moved);
-#if PHI_ATTITUDE
+#if PHI_ATTITUDE && PHI_ADJOINT
+    double element[PHI_ELEMENT] = { 0.0 };
+    phi_flows(s->coef[0], x, moved, s->x, element, kept);
+#elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
     phi_flows(s->coef[0], x, moved, s->x, element);
+#elif PHI_ADJOINT
+    phi_flows(s->coef[0], x, moved, s->x, kept);
 #else
     phi_flows(s->coef[0], x, moved, s->x);
 #endif

@@ -258,6 +258,9 @@ phi_status phi_step(phi_solver *s, double h)
 #else
 #if PHI_NOISE
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw)
+#elif PHI_SPLITTING && PHI_ADJOINT
+/* phi_integrate, which leaves the states before all flows in kept, unless that is NULL. */
+static phi_status phi_integrate_leaving(phi_solver *s, double h, size_t steps, double (*kept)[PHI_DIM])
 #else
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #endif
@@ -271,7 +274,10 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_RENEWED
         phi_renew(s);
 #endif
-#if PHI_COMPOSED || PHI_SPLITTING
+#if PHI_SPLITTING && PHI_ADJOINT
+        status = phi_stages(s, kept);
+        if (kept != NULL) kept += PHI_FLOWS;
+#elif PHI_COMPOSED || PHI_SPLITTING
         status = phi_stages(s);
 #else
         for (int stage = 0; stage < PHI_STAGES; ++stage) status = phi_stage(s, stage);
@@ -292,6 +298,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 
 #if PHI_NOISE
 phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_along(s, h, steps, NULL); }
+
+#elif PHI_SPLITTING && PHI_ADJOINT
+phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_leaving(s, h, steps, NULL); }
 
 #endif
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }

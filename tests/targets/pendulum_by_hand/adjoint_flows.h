@@ -5,12 +5,6 @@
 static const int phi_flow_part[PHI_FLOWS] = { 1, 2, 1 };
 static const int phi_flow_row[PHI_FLOWS] = { 0, 1, 0 };
 
-static void phi_follow(int part, const double *coef, double x[2])
-{
-    if (part == 1) x[0] += coef[0] * x[1];
-    else x[1] -= coef[1] * sin(x[0]);
-}
-
 static void phi_follow_back(int part, const double *coef, const double x[2], double bar[2], double coef_bar[PHI_ROW])
 {
     if (part == 1) {

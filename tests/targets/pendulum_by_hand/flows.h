@@ -21,10 +21,21 @@ static inline void phi_flow2(const double *coef, double x[2], double moved[2], c
     phi_add(x, moved, start, 1, -coef[1] * sin(x[0]));
 }
 
+#if PHI_ADJOINT
+static void phi_flows(const double *coef, double x[2], double moved[2], const double start[2], double (*kept)[2])
+{
+    for (int k = 0; k < PHI_FLOWS; ++k) {
+        if (kept != NULL) memcpy(kept++, x, sizeof *kept);
+        if (k != 1) phi_flow1(coef, x, moved, start);
+        else phi_flow2(coef + PHI_ROW, x, moved, start);
+    }
+}
+#else
 static void phi_flows(const double *coef, double x[2], double moved[2], const double start[2])
 {
     phi_flow1(coef, x, moved, start);
     phi_flow2(coef + PHI_ROW, x, moved, start);
     phi_flow1(coef, x, moved, start);
 }
+#endif
 #endif
