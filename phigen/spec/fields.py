@@ -192,6 +192,7 @@ FORCES = Record(
         Field("covector", FORMULAS, "by coordinate: tangent to the leaves, so it keeps Casimirs"),
         Field("vector", FORMULAS, "by coordinate: torques, thrust, growth; changes Casimirs"),
     ),
+    example="{covector: {q: gamma*p}}",
 )
 SOURCE = Record(
     "a source of noise",

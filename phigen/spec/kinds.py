@@ -27,6 +27,8 @@ from phigen.spec.yaml_source import Sequence as SequenceNode
 #: Dates of YAML, which as expressions would be differences: 2026-01-01 is 2024.
 _DATE = re.compile(r"\s*[0-9]{4}-[0-9]{1,2}-[0-9]{1,2}([Tt\s]|$)")
 
+_LISTS = "lists are written [a, b]"
+
 Path = tuple[Any, ...]
 Schema = dict[str, Any]
 
@@ -226,8 +228,12 @@ class ListOf(Kind):
     expected = "a list"
 
     def read(self, node: Node, path: Path, reader: Reader) -> list[Any] | None:
+        if isinstance(node, MappingNode) and isinstance(self.item, Name):
+            self.mismatch(node, path, reader, _LISTS)
+            # What uses the names is right.
+            node = SequenceNode(node.location, [key for key, _ in node.entries.values()])
         if not isinstance(node, SequenceNode):
-            return self.mismatch(node, path, reader, "lists are written [a, b]" if isinstance(node, Scalar) else "")
+            return self.mismatch(node, path, reader, _LISTS)
         if len(node.items) < self.least:
             least = counted(self.least, "entry", "entries")
             return reader.error(node, f"{label(path)}expected at least {least}, found {len(node.items)}")
@@ -320,6 +326,8 @@ class Record(Kind):
         for name, (key, item) in node.entries.items():
             if name not in known:
                 reader.error(key, f"{self.what} has no key {shown(name)}", self._hint(name, known))
+                if meant := intended(name, known, MEANT):  # so that nobody says it is missing
+                    reader.locations.setdefault((*path, meant), key.location)
             else:
                 inner = (*path, name)
                 reader.locations[inner] = place(key, item)
@@ -333,9 +341,9 @@ class Record(Kind):
         """What is meant by the name of a key that is none."""
         meant = MEANT.get(name, name)
         misplaced = "" if meant in known else self.elsewhere.get(name) or self.elsewhere.get(meant, "")
-        return misplaced or did_you_mean(name, known, MEANT) or "keys: " + ", ".join(known)
+        return misplaced or did_you_mean(name, known, MEANT) or self.instructions()
 
-    def instructions(self, node: Node) -> str:
+    def instructions(self, node: Node | None = None) -> str:
         """How the mapping is written, for who wrote something else: where that is the name of a key, with this key."""
         named = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
         if named is not None and isinstance(named.kind, Record) and named.kind.example:

@@ -86,7 +86,7 @@ def _sizes(name: str, raw: Raw, declared: Declarations) -> tuple[int, ...]:
     sizes, axes = raw.get("sizes"), declared.lattice.axes if declared.lattice else ()
     wanted = len(axes) or 1
     if sizes is None:
-        if axes:
+        if axes and ("runs", name, "sizes") not in declared.reader.locations:
             example = ", ".join(["32"] * wanted)
             declared.reader.problems.add(
                 f"the run {name!r} has no sizes", declared.reader.locations["runs", name], f"sizes: [{example}]"
