@@ -47,8 +47,12 @@ class Backend(Protocol):
         """A back end whose trajectories all have the given gauge, one value for each Casimir of the gauge."""
         ...
 
-    def ensemble(self, members: Members, threads: int | None = None) -> Floats:
-        """Final states (members, DIM), or frames (rows, members, DIM); in so many threads, None for all cores."""
+    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+        """Final states (members, DIM), or frames (rows, members, DIM); in so many threads, None for all cores.
+
+        ``turned`` (rows, members, numbers) has in its first row the attitudes that members begin with, and gets those of
+        the other rows; where a member has failed it is left as it is. There are two rows where no frames are asked for.
+        """
         ...
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:

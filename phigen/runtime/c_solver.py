@@ -92,8 +92,10 @@ class CSolver:
         struct, interface = aligned_copy(np.frombuffer(saved, dtype=np.uint8)), self.interface
         return CSession(self._c, struct, interface.dimension, interface.element, self._real)
 
-    def ensemble(self, members: Members, threads: int | None = None) -> Floats:
+    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
+        if turned is not None:
+            return one_by_one(self, members, threads, turned)
         if not hasattr(self._c, "ensemble"):
             raise TypeError(f"{self.interface.name} was compiled without ensembles: its spec leaves them out")
         if not len(members) and members.alike:

@@ -2,7 +2,7 @@
 
 Beside the documented functions, sessions use the parts of ``integrate``: ``_values``, ``_admissible``,
 ``_coefficients``, ``_renewed`` where there is a time, ``_advance``, with tangents ``_tangent_stage``, with a monitor
-``_time_of``, and with attitudes what ``reconstruct`` uses.
+``_time_of``, and with attitudes what ``reconstruct`` uses; so do ensembles, see `phigen.runtime.numpy_members`.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from phigen.runtime.interface import (
     Interface,
     LatticeInterface,
     MissingExtraError,
-    row_steps,
 )
 from phigen.runtime.members import Members
 from phigen.runtime.modules import load_module
 from phigen.runtime.numpy_lattice import NumpyLattice
+from phigen.runtime.numpy_members import ensemble
 
 Pair = tuple[Floats, Floats]
 #: Coefficients, parameters and step of a stage, and its time where there is one: passed on to the module.
@@ -307,35 +307,10 @@ class NumpySolver:
         """See `phigen.runtime.backend.Backend`."""
         return NumpySession.from_bytes(self.module, parameters, saved)
 
-    def ensemble(self, members: Members, threads: int | None = None) -> Floats:
-        """See `phigen.runtime.backend.Backend`. Where members fail, the others go on without them; in one thread."""
+    def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`; in one thread."""
         self._expect_admissible(members.x0, members.parameters)
-        x, remaining, gauge = members.x0.copy(), np.arange(len(members)), self._gauges(members.x0, members.parameters)
-        steps, stride = members.steps, members.stride or max(members.steps, 1)
-        frames = members.frames() if members.stride else np.empty((2, *x.shape))
-        frames[1:] = np.nan
-        failures, done, first = dict[int, str](), 0, -1
-        while done < steps and remaining.size:
-            ahead = steps - done if done % stride == 0 else min(stride - done % stride, steps - done)
-            some = members.part(remaining)
-            options: dict[str, Any] = {} if gauge is None else {"gauge": gauge[remaining]}
-            options |= {"t0": some.t0 + done * some.h} if self.interface.time else {}
-            good, lost = ahead, ()
-            if self.interface.noise:
-                draws = members.draws
-                options |= {"seed": draws.seed, "member": some.paths, "step0": draws.step + done}
-            try:
-                made = self.module.integrate(x[remaining], some.h, ahead, stride=stride, **options, **some.parameters)
-            except self.module.StepError as error:
-                made, good, lost = np.asarray(error.states), int(error.step), error.members
-                failures |= {int(remaining[m]): str(error.status) for m in error.members}
-                first = done + good if first < 0 else first
-            for mark, row in zip((done + row_steps(good, stride)).tolist(), made, strict=False):
-                if mark % stride == 0 or mark == steps:
-                    frames[-(-mark // stride), remaining] = row
-            x[remaining], done = made[-1], done + good
-            remaining = np.delete(remaining, lost)
-        return members.told(frames if members.stride else x, failures, first)
+        return ensemble(self.module, members, self._gauges(members.x0, members.parameters), turned)
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""

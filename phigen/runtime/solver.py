@@ -19,7 +19,7 @@ from phigen.runtime.given import Given
 from phigen.runtime.gradients import Jacobian, Pullback
 from phigen.runtime.interface import BackendError, Floats, Interface, MissingExtraError, Progress, row_steps
 from phigen.runtime.live import LiveSession
-from phigen.runtime.members import Members, one_by_one
+from phigen.runtime.members import Members
 from phigen.runtime.named import Named
 from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Followed, Session, rows_along
@@ -347,7 +347,7 @@ class Solver(Named[Backend, Interface]):
         rows = len(row_steps(asked.steps, asked.stride or max(asked.steps, 1)))
         turned = np.full((rows, len(asked), self.interface.element), np.nan)
         turned[0] = arguments.firsts(attitude0, position0, self.interface, len(asked))
-        x = self._together(asked, threads, lambda given, most: one_by_one(self.backend, given, most, turned))
+        x = self._together(asked, threads, lambda given, most: self.backend.ensemble(given, most, turned))
         attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
         assert attitude is not None
         return Turned(x, attitude, position)

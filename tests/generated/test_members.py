@@ -136,6 +136,35 @@ def test_a_step_too_large_for_one_member_is_that_of_no_other(target):
         np.testing.assert_allclose(many.value.trajectory[m], alone, rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize("name", [*KINDS[:-1], "lagrange_top", "dzhanibekov", "thermal_chain"])
+def test_members_in_numpy_have_the_same_bits_beside_one_that_fails(name, monkeypatch):
+    """In the middle of a step, where guesses, carries, times, noise and attitudes have been under way for some."""
+    compilation, others = compiled(name), np.array([0, 1, 3])
+    solve, (start, h, given) = solver(compilation, "numpy"), own(compilation, 4)
+    h = h[0] if solve.interface.noise else h
+    paths = {"seed": 3} if solve.interface.noise else {}
+    module, calls = solve.backend.module, []
+    advance = module._advance
+
+    def fail_once(stage, x, carry, memory):
+        following, rest, memory, status = advance(stage, x, carry, memory)
+        calls.append(None)
+        if len(calls) == 7 * len(module.FRACTIONS):
+            status = np.where(np.arange(len(x)) == 2, "SINGULAR", status)
+        return following, rest, memory, status
+
+    run = solve.attitudes if solve.interface.attitude else solve.ensemble
+    good = run(start, h, 12, 5, **given, **paths)
+    monkeypatch.setattr(module, "_advance", fail_once)
+    with pytest.raises(StepError) as failed:
+        run(start, h, 12, 5, **given, **paths)
+    assert (failed.value.members, failed.value.step, failed.value.status) == ((2,), 6, "SINGULAR")
+    frames = good.x if solve.interface.attitude else good
+    assert np.array_equal(failed.value.trajectory[:, others], frames[:, others])
+    assert np.array_equal(failed.value.trajectory[:2, 2], frames[:2, 2])
+    assert np.isnan(failed.value.trajectory[2:, 2]).all()
+
+
 @pytest.mark.parametrize("name", ["rigid_body", "nambu_pendulum", "duffing"])
 def test_members_whose_guess_misleads_begin_again_with_their_own_numbers(name):
     """The first members' coefficients, parameters, steps or times in place of their own would make other steps."""
