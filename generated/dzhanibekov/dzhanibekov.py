@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 459387b034bbc1bf73e4566703a9df735b92b237b8f44f1141f13fa064a21443
+# body-sha256: 6f360ff3df88dc3f049108fe2e135b9c48cf1dfc0ca07e9b74c9bd71065d696d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -780,10 +780,10 @@ def _first(attitude0):
     q = _numbers(attitude0)
     if q.shape[-1:] != (4,) or not np.isfinite(q).all():
         raise ValueError("attitude0 must be finite quaternions (..., 4)")
-    return _unit(q.reshape(-1, 4))
+    return _normalised(q.reshape(-1, 4))
 
 
-def _unit(q):
+def _normalised(q):
     """Quaternions divided by their lengths."""
     largest = np.abs(q).max(axis=-1, keepdims=True)
     if not (largest > 0.0).all():

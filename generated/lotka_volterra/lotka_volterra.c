@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; Several steps or members at once; The
  *   solver; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
  *   Ensembles
- * body-sha256: 9e797f19e3494e16b4d1fcbf6d8ec843d8fa96878ee69c59abe47bc178496878
+ * body-sha256: 9a4dcd5ef68c8dd375838dcb8bf5f996285d1a163d9512d701cbb2917d22f686
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -1205,7 +1205,7 @@ typedef struct {
     size_t members, steps, own;
     const lotka_volterra_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } lotka_volterra_members;
@@ -1231,7 +1231,7 @@ static lotka_volterra_status lotka_volterra_take_member(const lotka_volterra_mem
 static size_t lotka_volterra_to_frame(const lotka_volterra_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -1670,7 +1670,7 @@ lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return lotka_volterra_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return lotka_volterra_BAD_ARGUMENT;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return lotka_volterra_run(&all);

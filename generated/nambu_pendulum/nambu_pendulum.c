@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; Several steps or members at
  *   once; The solver; Newton's method in lanes; Paths in lanes; Blocks along paths; Blocks of steps;
  *   Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 2153012ce5ac079519398cbfe5620a4d20b6b619e47d98b9eb4919f1efc753bb
+ * body-sha256: 7d2a556bd1e3561e179ed818c74892561c9a32fc6610d4809739ebc7f1b714c1
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1951,7 +1951,7 @@ typedef struct {
     size_t members, steps, own;
     const nambu_pendulum_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } nambu_pendulum_members;
@@ -1977,7 +1977,7 @@ static nambu_pendulum_status nambu_pendulum_take_member(const nambu_pendulum_mem
 static size_t nambu_pendulum_to_frame(const nambu_pendulum_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -2416,7 +2416,7 @@ nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return nambu_pendulum_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return nambu_pendulum_BAD_ARGUMENT;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return nambu_pendulum_run(&all);

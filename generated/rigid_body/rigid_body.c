@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; Several steps or members at once; The solver; Newton's method in lanes;
  *   Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 9dbd2a2176e89333834fb404ec8be7196de50e2c9f1168c999fe973de363adc8
+ * body-sha256: a09cb947c71046f02288f1afddaef0e7a3ce368a3ad2d09fbcd371a38cdeb77c
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1583,8 +1583,8 @@ typedef struct {
     size_t members, steps, own;
     const rigid_body_params *params; /* NULL for the defaults */
     const double *h;
-    const double *gauge; /* NULL to choose it */
-    size_t stride;
+    const double *gauge;   /* NULL to choose it */
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } rigid_body_members;
@@ -1611,7 +1611,7 @@ static rigid_body_status rigid_body_take_member(const rigid_body_members *all, s
 static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -2042,7 +2042,7 @@ rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, doub
     if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
     all.gauge = gauge;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return rigid_body_run(&all);

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 7fc2aad1e6d24da2749245c61b1c2db3a17ea7b72dce951dc818a3e234cc6f21
+# body-sha256: 44ebf237430f9f4a5382cfbde2458e3688137e9d3b68175f2a48c8ac83023e58
 import numpy as np
 
 VERSION = "0.1.0"
@@ -1230,10 +1230,10 @@ def _first(attitude0):
     q = _numbers(attitude0)
     if q.shape[-1:] != (4,) or not np.isfinite(q).all():
         raise ValueError("attitude0 must be finite quaternions (..., 4)")
-    return _unit(q.reshape(-1, 4))
+    return _normalised(q.reshape(-1, 4))
 
 
-def _unit(q):
+def _normalised(q):
     """Quaternions divided by their lengths."""
     largest = np.abs(q).max(axis=-1, keepdims=True)
     if not (largest > 0.0).all():

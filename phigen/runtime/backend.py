@@ -50,8 +50,8 @@ class Backend(Protocol):
     def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
         """Final states (members, DIM), or frames (rows, members, DIM); in so many threads, None for all cores.
 
-        ``turned`` (rows, members, numbers) has in its first row the attitudes that members begin with, and gets those of
-        the other rows; where a member has failed it is left as it is. There are two rows where no frames are asked for.
+        ``turned`` (rows, members, numbers) has the attitudes that members begin with in its first row, and gets those
+        of the frames in the others; where no frames are asked for it has two rows, and gets those of the final states.
         """
         ...
 

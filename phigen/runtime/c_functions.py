@@ -53,6 +53,7 @@ _EXTRAS = {
     "attitude": (None, (_POINTER, _POINTER)),
     "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
     "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
+    "ensemble_attitudes": (_INT, ()),  # as `_of_attitudes` has it
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
 }
 
@@ -72,9 +73,19 @@ def functions_of(library: Any, interface: Interface) -> Any:
     return bound(
         library,
         interface.name,
-        {**_SIGNATURES, **offered, **timed, **monitored, **own},
+        {**_SIGNATURES, **offered, **timed, **monitored, **own, **_of_attitudes(offered, interface)},
         single=interface.single,
     )
+
+
+def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
+    """The signature of ensembles with attitudes: times or a gauge of each, and random numbers, where there are such."""
+    name = "ensemble_attitudes"
+    own = (_POINTER,) if interface.time or "init_gauge" in offered else ()
+    drawn = (_LONG, _WORD, _LONG) if interface.noise else ()
+    rest = (_SIZE, _POINTER, _POINTER, _POINTER)
+    arguments = (_POINTER, _POINTER, _POINTER, _SIZE, *own, _POINTER, _SIZE, *drawn, *rest)
+    return {name: (_INT, arguments)} if name in offered else {}
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:

@@ -94,12 +94,12 @@ class CSolver:
 
     def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
-        if turned is not None:
-            return one_by_one(self, members, threads, turned)
         if not hasattr(self._c, "ensemble"):
             raise TypeError(f"{self.interface.name} was compiled without ensembles: its spec leaves them out")
         if not len(members) and members.alike:
             self._expect_parameters(members)
+        if turned is not None:
+            return self._with_attitudes(members, threads, turned)
         alike = members.alike and not members.stride and self._gauge is None
         if not (alike or hasattr(self._c, "ensemble_each")):
             return one_by_one(self, members, threads)
@@ -164,6 +164,51 @@ class CSolver:
         self._c.ensemble_each(*own, h.ctypes.data, members.steps, stride, at, status.ctypes.data)
         if rows is not None and frames is not None:
             rows[: len(frames)] = frames.transpose(0, 2, 1)
+
+    def _with_attitudes(self, members: Members, threads: int | None, turned: Floats) -> Floats:
+        """`ensemble` with attitudes."""
+        count, made = len(members), members.steps // members.stride if members.stride else 0
+        frames = members.frames() if members.stride else None
+        final, last, status = members.x0.copy(), turned[0].copy(), np.zeros(count, dtype=np.uint8)
+
+        def make(part: slice) -> None:
+            some = members.part(part)
+            x, element = (np.array(a[part].T, dtype=self._real, order="C") for a in (final, last))
+            rows, elements = (np.empty((made, *a.shape), self._real) for a in (x, element))
+            self._all_turned(some, (x, element), (rows, elements), status[part])
+            final[part], last[part] = x.T, element.T
+            if frames is not None:
+                frames[1 : made + 1, part], turned[1 : made + 1, part] = (
+                    a.transpose(0, 2, 1) for a in (rows, elements)
+                )
+
+        shared_out(members, threads, make)
+        good = status[:, np.newaxis] == 0
+        if frames is None:
+            turned[-1] = last
+        elif members.steps % members.stride:
+            frames[-1], turned[-1] = (np.where(good, a, np.nan) for a in (final, last))
+        failures = {int(m): status_name(int(status[m])) for m in np.flatnonzero(status)}
+        return members.told(final if frames is None else frames, failures)
+
+    def _all_turned(
+        self, members: Members, begun: tuple[Floats, Floats], rows: tuple[Floats, Floats], status: Bytes
+    ) -> None:
+        """Integrate some members, in place: their states and attitudes (numbers, members), and those of the frames."""
+        packed, own, h = self._given(members)
+        given = [packed if members.parameters else None, *begun]
+        draws = members.draws.seed, int(members.paths[0]), members.draws.step
+        self._c.ensemble_attitudes(
+            *(None if a is None else a.ctypes.data for a in given),
+            len(members),
+            *(None if a is None else a.ctypes.data for a in own),
+            h.ctypes.data,
+            members.steps,
+            *(draws if self.interface.noise else ()),
+            max(1, members.stride),
+            *(a.ctypes.data if members.stride else None for a in rows),
+            status.ctypes.data,
+        )
 
     def _given(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
         """Of each member the parameters (members, parameters), the time or the gauge, where there is one, the step."""

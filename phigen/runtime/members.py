@@ -129,11 +129,8 @@ def in_threads(threads: int, make: Callable[[Part], None], parts: Iterable[Part]
             raise
 
 
-def one_by_one(backend: Backend, members: Members, threads: int | None = 1, turned: Floats | None = None) -> Floats:
-    """The states that are asked for, by a session for each member.
-
-    ``turned`` (rows, members, numbers) has the attitudes that members begin with, and gets those of all rows.
-    """
+def one_by_one(backend: Backend, members: Members, threads: int | None = 1) -> Floats:
+    """The states that are asked for, by a session for each member."""
     final, failures = members.x0.copy(), dict[int, str]()
     frames = members.frames() if members.stride else None
     marks = row_steps(members.steps, members.stride or max(members.steps, 1))
@@ -145,14 +142,11 @@ def one_by_one(backend: Backend, members: Members, threads: int | None = 1, turn
                 frames[1:, m] = np.nan
             try:
                 draws = replace(members.draws, member=int(members.paths[m])) if len(members.paths) else members.draws
-                begin = None if turned is None else turned[0, m].copy()
-                session = backend.start(members.x0[m], parameters, t0, begin, draws=draws)
+                session = backend.start(members.x0[m], parameters, t0, draws=draws)
                 for row, steps in enumerate(np.diff(marks), 1):
                     session.advance(h, int(steps))
                     if frames is not None:
                         frames[row, m] = session.state()
-                    if turned is not None:
-                        turned[row, m] = session.element()
                 final[m] = session.state()
             except BackendError as error:
                 failures[m] = error.status

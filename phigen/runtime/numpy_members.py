@@ -24,15 +24,19 @@ def ensemble(module: Any, members: Members, gauge: Floats | None, turned: Floats
         if frames is not None:
             frames[row, abreast.who] = abreast.x
         if turned is not None:
-            turned[row, abreast.who] = abreast.elements()
+            turned[row] = np.nan
+            turned[row, abreast.who] = abreast.turned[abreast.who]
+    if turned is not None and frames is None:
+        turned[-1] = abreast.turned
     return members.told(abreast.final if frames is None else frames, abreast.failures, abreast.failed_at)
 
 
 class Abreast:
     """Members that have not failed, ``who`` and at ``x``, with what the loop of ``integrate`` holds of them.
 
-    ``final`` is where each member came, ``failures`` tells how members failed, ``failed_at`` after how many steps the
-    first did. With ``first`` (members, numbers) members have attitudes, and begin with these.
+    ``final`` is where each member came, ``turned`` with which attitude, ``failures`` tells how members failed, and
+    ``failed_at`` after how many steps the first did. With ``first`` (members, numbers) members have attitudes, and
+    begin with these.
     """
 
     def __init__(self, module: Any, members: Members, gauge: Floats | None, first: Floats | None) -> None:
@@ -43,10 +47,11 @@ class Abreast:
         with np.errstate(all="ignore"):
             self._stages = module._coefficients(values, self.x, members.h[()], gauge)
         self._memory = [(self._carry, self._carry)] * len(self._stages)
-        self._first, self._turned = first, (self._carry, self._carry)
+        self._first, self._turned, self.turned = first, (self._carry, self._carry), np.empty_like(members.x0)
         if first is not None:
             still = module._identity(len(members))
             self._rate, self._turned = module._rates(values, self.x, gauge), (still, np.zeros_like(still))
+            self.turned = first.copy()
         self._look()
 
     def advance(self, steps: int) -> None:
@@ -58,13 +63,15 @@ class Abreast:
                     self._leave(failed)
                 else:
                     steps -= 1
-        self.final[self.who] = self.x
+        self._tell()
 
-    def elements(self) -> Floats:
-        """Their attitudes (members, numbers)."""
-        elapsed = self._done * self._h
-        elapsed = elapsed[:, np.newaxis] if np.ndim(elapsed) else elapsed
-        return np.asarray(self._module._attitude(self._first, self._turned[0], self._rate, elapsed))
+    def _tell(self) -> None:
+        """Where those who are left are now."""
+        self.final[self.who] = self.x
+        if self._first is not None:
+            elapsed = self._done * self._h
+            elapsed = elapsed[:, np.newaxis] if np.ndim(elapsed) else elapsed
+            self.turned[self.who] = self._module._attitude(self._first, self._turned[0], self._rate, elapsed)
 
     def _look(self) -> None:
         """What of the steps depends on who is left: their sizes, the times of the start, the random numbers."""
@@ -101,10 +108,10 @@ class Abreast:
 
     def _leave(self, failed: dict[int, str]) -> None:
         """Who is left keeps all that it had, guesses too: so its bits are those that it has without the others."""
-        lost, kept = list(failed), np.delete(np.arange(len(self.who)), list(failed))
+        kept = np.delete(np.arange(len(self.who)), list(failed))
+        self._tell()
         self.failures |= {int(self.who[m]): status for m, status in failed.items()}
         self.failed_at = self._done if self.failed_at < 0 else self.failed_at
-        self.final[self.who[lost]] = self.x[lost]
         self.who, self.x, self._carry = self.who[kept], self.x[kept], self._carry[kept]
         self._memory = [(a[kept], b[kept]) for a, b in self._memory]
         self._stages = [self._module._stage_at(stage, kept) for stage in self._stages]

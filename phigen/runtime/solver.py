@@ -339,18 +339,25 @@ class Solver(Named[Backend, Interface]):
 
         These are (members, …) at the end, with a ``stride`` (rows, members, …): quaternions (4,) or matrices (n, n),
         and positions (3,). Members begin with ``attitude0`` and ``position0``, one for all or (members, …), by default
-        with the identity and at the origin. Each is integrated by itself, as by `integrate`. Raises the same as
-        `ensemble`, and `TypeError` where the spec does not say ``reconstruct``.
+        with the identity and at the origin. Each is integrated by itself, with the bits of `integrate`. Raises the same
+        as `ensemble`, with all three in ``trajectory``, and `TypeError` where the spec does not say ``reconstruct``.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         asked = self._members(X0, h, steps, stride, t0, drawn, parameters, more)
         rows = len(row_steps(asked.steps, asked.stride or max(asked.steps, 1)))
         turned = np.full((rows, len(asked), self.interface.element), np.nan)
         turned[0] = arguments.firsts(attitude0, position0, self.interface, len(asked))
-        x = self._together(asked, threads, lambda given, most: self.backend.ensemble(given, most, turned))
-        attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
-        assert attitude is not None
-        return Turned(x, attitude, position)
+
+        def told(x: Floats) -> Turned:
+            attitude, position = turned_into(self.interface, turned if asked.stride else turned[-1])
+            assert attitude is not None
+            return Turned(x, attitude, position)
+
+        try:
+            return told(self._together(asked, threads, lambda given, most: self.backend.ensemble(given, most, turned)))
+        except StepError as error:
+            error.trajectory = told(error.trajectory)
+            raise
 
     def pullback(
         self,

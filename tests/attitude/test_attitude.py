@@ -439,27 +439,49 @@ def test_members_are_turned_each_by_itself():
     assert np.abs(positions[:, 3] - alone.position).max() < 1e-15 * 5
 
 
-@pytest.mark.parametrize("target", ["c", "numpy"])
+@cache
+def small_top() -> Solver:
+    """The C of the profile small, which has no members with numbers of their own elsewhere."""
+    return solver_of(compile_spec(spec_of(TOP), order=2, profile="small"), "c")
+
+
+@pytest.mark.parametrize("target", ["c", "numpy", "small"])
 def test_members_of_ensembles_have_attitudes_and_positions(target):
-    """Each begins with its own and ends where a run of it alone does, in rows and without; failures are told apart."""
-    top, rng = solver("top", target), np.random.default_rng(2)
-    x0, attitude0, position0 = rng.normal(size=(3, 6)), rng.normal(size=(3, 4)), rng.normal(size=(3, 3))
-    found = top.attitudes(x0, 0.05, 10, 4, attitude0=attitude0, position0=position0, threads=2)
-    assert (found.x.shape, found.attitude.shape, found.position.shape) == ((4, 3, 6), (4, 3, 4), (4, 3, 3))
+    """Each begins with its own and has the bits of a run of it alone, in rows and without, in any number of threads."""
+    top, rng = small_top() if target == "small" else solver("top", target), np.random.default_rng(2)
+    x0, attitude0, position0 = rng.normal(size=(40, 6)), rng.normal(size=(40, 4)), rng.normal(size=(40, 3))
+    found = top.attitudes(x0, 0.05, 10, 4, attitude0=attitude0, position0=position0)
+    again = top.attitudes(x0, 0.05, steps := 10 if target == "numpy" else 2000, steps // 2, threads=2)
+    assert (found.x.shape, found.attitude.shape, found.position.shape) == ((4, 40, 6), (4, 40, 4), (4, 40, 3))
     ends = top.attitudes(x0, 0.05, 10, attitude0=attitude0, position0=position0[0])
-    for m in range(3):
+    for m in (0, 1, 39):
         alone = top.integrate(x0[m], 0.05, 10, 4, attitude0=attitude0[m], position0=position0[m])
         assert np.array_equal(found.x[:, m], alone.x)
-        assert np.abs(found.attitude[:, m] - alone.attitude).max() < 5e-15
-        assert np.abs(found.position[:, m] - alone.position).max() < 5e-15
+        assert np.array_equal(found.attitude[:, m], alone.attitude)
+        assert np.array_equal(found.position[:, m], alone.position)
+        assert np.array_equal(again.attitude[:, m], top.integrate(x0[m], 0.05, steps, steps // 2).attitude)
         assert np.abs(ends.attitude[m] - alone.attitude[-1]).max() < 5e-15
     assert np.abs(ends.position[0] - found.position[-1, 0]).max() < 5e-15
     still = top.attitudes(x0, 0.05, 0)
-    assert np.array_equal(still.attitude, [[1, 0, 0, 0]] * 3)
-    assert np.array_equal(still.position, np.zeros((3, 3)))
+    assert np.array_equal(still.attitude, [[1, 0, 0, 0]] * 40)
+    assert np.array_equal(still.position, np.zeros((40, 3)))
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_a_member_that_fails_keeps_its_last_good_attitude_and_the_others_theirs(target):
+    body, x0 = solver("body", target), np.array([[0.3, 1.0, 0.2], [0.5, 1.0, 0.2], [0.3, 1.2, 0.1]])
+    h, I2 = [0.1, 1e3, 0.2], [2.0, 1.5, 1.2]
     with pytest.raises(phigen.StepError) as failed:
-        top.attitudes([x0[0], 1e9 * x0[1]], [0.05, 1e3], 4)
+        body.attitudes(x0, h, 7, 3, I2=I2)
     assert failed.value.members == (1,)
+    frames = failed.value.trajectory
+    assert np.isnan(frames.attitude[1:, 1]).all()
+    for m in (0, 2):
+        alone = body.integrate(x0[m], h[m], 7, 3, I2=I2[m])
+        assert np.array_equal(frames.attitude[:, m], alone.attitude)
+    with pytest.raises(phigen.StepError) as failed:
+        body.attitudes(x0, h, 7, I2=I2)
+    assert np.array_equal(failed.value.trajectory.attitude[1], [1, 0, 0, 0])
 
 
 def test_other_solvers_have_none():

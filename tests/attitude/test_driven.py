@@ -110,6 +110,26 @@ def test_c_and_javascript_agree_with_numpy(case):
         assert found == pytest.approx(expected, abs=1e-13)
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("case", CASES)
+def test_members_have_the_bits_of_runs_alone(case, target):
+    """With a step, a time, a path of the noise and an attitude of each; to the frames, and after the last of them."""
+    found, count = solver(made(case), target), 3
+    rng = np.random.default_rng(1)
+    x0, q0, h = rng.normal(size=(count, 3)), rng.normal(size=(count, 4)), np.array([0.1, 0.07, 0.11])
+    timed = {"t0": np.array([0.0, 0.4, 2.0])} if found.interface.time else {}
+    drawn = {"seed": 5, "member": 3} if found.interface.noise else {}
+    members = found.attitudes(x0, h, 10, 4, attitude0=q0, **timed, **drawn)
+    ends = found.attitudes(x0, h, 10, attitude0=q0, **timed, **drawn)
+    for m in range(count):
+        own = {name: values[m] for name, values in timed.items()}
+        own |= {"seed": 5, "member": 3 + m} if drawn else {}
+        alone = found.integrate(x0[m], h[m], 10, 4, attitude0=q0[m], **own)
+        assert np.array_equal(members.x[:, m], alone.x)
+        assert np.array_equal(members.attitude[:, m], alone.attitude)
+        assert ends.attitude[m] == pytest.approx(alone.attitude[-1], abs=1e-15)
+
+
 @pytest.mark.parametrize("case", ["monitored", "monitored by log", "shaken", "split and shaken"])
 def test_the_momentum_in_space_is_constant(case):
     """Monitor and noise are Hamiltonian, so their elements belong to the momentum."""

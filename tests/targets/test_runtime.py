@@ -114,6 +114,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
         "gauge.c": ["GAUGE"],
         "level.c": ["GAUGE"],
         "attitude.c": ["ATTITUDE"],
+        "attitudes.c": ["COMPOSED", "ATTITUDE", "ATTITUDES"],
         "noise.c": ["NOISE"],
         "philox.c": ["NOISE"],
     }
@@ -124,7 +125,7 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
 
 @pytest.mark.parametrize("more", [(), ("SPATIAL",), ("MATRICES",), ("MATRICES", "SPATIAL")], ids=" ".join)
 def test_attitudes_compile_with_every_kind_of_group(more, tmp_path):
-    switches = defined(("NEWTON", "COMPOSED", "FAST", "ATTITUDE", *more))
+    switches = defined(("NEWTON", "COMPOSED", "FAST", "ATTITUDE", "ATTITUDES", *more))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, RUNTIME / "runtime.c"], tmp_path)
 
 

@@ -70,6 +70,7 @@ FEATURES = (
     Feature("KICKED", part="kicks"),
     Feature("ENSEMBLE", part="ensemble"),
     Feature("EACH", lambda p: not p.noise, requires=("ENSEMBLE",), part="members"),
+    Feature("ATTITUDES", requires=("ATTITUDE", "ENSEMBLE")),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
     Feature("RECURRENCES", requires=("GUESSED",), part="recurrences"),
     Feature("BLOCKS", requires=("RECURRENCES",), in_lanes=lambda lanes: isinstance(lanes, Blocks), part="lanes"),

@@ -309,11 +309,15 @@ phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SI
     if (!(size > 0.0)) return PHI_BAD_ARGUMENT;
 #if !PHI_MATRICES
     double square = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        first[i] /= size;
-        square += first[i] * first[i];
+    for (int i = 0; i < 4; ++i) square += first[i] * first[i];
+    if (!(fabs(square - 1.0) <= 4.0 * DBL_EPSILON)) { /* else it has been divided by its length before */
+        square = 0.0;
+        for (int i = 0; i < 4; ++i) {
+            first[i] /= size;
+            square += first[i] * first[i];
+        }
+        for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
     }
-    for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
 #endif
     phi_begin_attitude(s, first);
     return PHI_OK;

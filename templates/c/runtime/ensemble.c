@@ -12,6 +12,9 @@
 #else
 #include "solver.c"
 #endif
+#if PHI_ATTITUDES
+#include "attitudes.c"
+#endif
 
 #if PHI_EACH || PHI_NOISE
 /* ---- Ensembles ---- */
@@ -176,7 +179,7 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
 #if PHI_GAUGE
     all.gauge = gauge;
 #endif
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return phi_run(&all);

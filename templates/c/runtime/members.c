@@ -24,7 +24,15 @@ typedef struct {
 #if PHI_GAUGE
     const double *gauge; /* NULL to choose it */
 #endif
-    size_t stride;
+#if PHI_ATTITUDES
+    double *attitude; /* as x is given; NULL where nobody asks for it */
+    double *attitudes; /* NULL for none */
+#endif
+#if PHI_ATTITUDES && PHI_NOISE
+    uint64_t seed, first_step;
+    uint32_t first_member;
+#endif
+    size_t stride; /* 0 where there are no frames */
     double *frames; /* NULL for none */
     unsigned char *status; /* NULL for none */
 } phi_members;
@@ -63,7 +71,7 @@ static phi_status phi_take_member(const phi_members *all, size_t m, double x[PHI
 static size_t phi_to_frame(const phi_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride : left;
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride : left;
 }
 
 /* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
@@ -73,6 +81,18 @@ static void phi_put_frame(const phi_members *all, size_t m, size_t done, const d
         all->frames[((done / all->stride - 1) * PHI_DIM + i) * all->members + m] = x != NULL ? x[i] : (double)NAN;
 }
 
+#if PHI_ATTITUDES
+/* The same for its attitude. */
+static void phi_put_attitude(const phi_members *all, size_t m, size_t done, const phi_solver *s)
+{
+    double element[PHI_ELEMENT];
+    if (all->attitudes == NULL || done % all->stride != 0) return;
+    if (s != NULL) phi_attitude(s, element);
+    for (size_t i = 0; i < PHI_ELEMENT; ++i)
+        all->attitudes[((done / all->stride - 1) * PHI_ELEMENT + i) * all->members + m] = s != NULL ? element[i] : (double)NAN;
+}
+
+#endif
 /* The steps of a member after so many, by itself. */
 static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, phi_solver *s, phi_status status)
 {
@@ -81,6 +101,9 @@ static phi_status phi_end_member(const phi_members *all, size_t m, size_t done, 
         if (status == PHI_OK) status = phi_integrate(s, s->h, steps);
         done += steps;
         phi_put_frame(all, m, done, status == PHI_OK ? s->x : NULL);
+#if PHI_ATTITUDES
+        phi_put_attitude(all, m, done, status == PHI_OK ? s : NULL);
+#endif
     }
     return status;
 }

@@ -227,6 +227,25 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
 #endif
 
 #endif
+#if PHI_ATTITUDES
+/* Many members with attitudes, in place, each by itself as phi_integrate makes it; with OpenMP, members in parallel:
+   x[i * members + m] is coordinate i of member m, attitude[i * members + m] number i of its attitude in the order of
+   phi_attitude, at its start, then at its end. What differs from member to member is given as for a single one, params may be NULL for
+   the defaults. frames and attitudes (or NULL) receive what x and attitude are after every stride-th step, those after
+   (k + 1) * stride steps as row k, NaN where a member failed before. Arrays must not overlap. */
+phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *attitude, size_t members,
+#if PHI_TIMED
+    const double *t0,
+#elif PHI_GAUGE
+    const double *gauge,
+#endif
+    const double *h, size_t steps,
+#if PHI_NOISE
+    uint64_t seed, uint32_t first_member, uint64_t first_step,
+#endif
+    size_t stride, double *frames, double *attitudes, unsigned char *status);
+
+#endif
 
 #endif
 #if PHI_TANGENT

@@ -1,0 +1,94 @@
+#ifndef PHI_FILE_ATTITUDES
+#define PHI_FILE_ATTITUDES
+#include <math.h>
+
+#include "attitude.c"
+#include "members.c"
+#include "model.h"
+#if PHI_NOISE
+#include "noise.c"
+#endif
+
+/* ---- Members with attitudes ---- */
+/* Start a member with the attitude and the random numbers that the ensemble has for it. */
+static phi_status phi_take_turned(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
+{
+    double element[PHI_ELEMENT];
+    phi_status status = phi_take_member(all, m, x, s);
+    for (size_t i = 0; i < PHI_ELEMENT; ++i) element[i] = all->attitude[i * all->members + m];
+#if PHI_POSITION
+    if (status == PHI_OK) status = phi_set_attitude(s, element, element + 4);
+#else
+    if (status == PHI_OK) status = phi_set_attitude(s, element);
+#endif
+#if PHI_NOISE
+    if (status == PHI_OK) status = phi_set_noise(s, all->seed, all->first_member + (uint32_t)m, all->first_step);
+#endif
+    return status;
+}
+
+/* One member, from its start to its end. */
+static phi_status phi_turn_member(const phi_members *all, size_t m)
+{
+    phi_solver s;
+    double x[PHI_DIM], element[PHI_ELEMENT];
+    const phi_status begun = phi_take_turned(all, m, x, &s);
+    const phi_status status = phi_end_member(all, m, 0, &s, begun);
+    phi_put_member(all, m, begun == PHI_OK ? s.x : x, status);
+    if (begun != PHI_OK) return status;
+    phi_attitude(&s, element);
+    for (size_t i = 0; i < PHI_ELEMENT; ++i) all->attitude[i * all->members + m] = element[i];
+    return status;
+}
+
+/* The arguments are in the order of phi_ensemble_each and phi_ensemble_of. */
+phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *attitude, size_t members,
+#if PHI_TIMED
+    const double *t0,
+#elif PHI_GAUGE
+    const double *gauge,
+#endif
+    const double *h, size_t steps,
+#if PHI_NOISE
+    uint64_t seed, uint32_t first_member, uint64_t first_step,
+#endif
+    size_t stride, double *frames, double *attitudes, unsigned char *status)
+{
+    phi_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1, .params = params };
+    phi_status worst = PHI_OK;
+    size_t earliest = members;
+    if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return PHI_BAD_ARGUMENT;
+    if ((frames != NULL || attitudes != NULL) && stride == 0) return PHI_BAD_ARGUMENT;
+#if PHI_TIMED
+    if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
+    all.t0 = t0;
+#elif PHI_GAUGE
+    all.gauge = gauge;
+#endif
+#if PHI_NOISE
+    all.seed = seed;
+    all.first_member = first_member;
+    all.first_step = first_step;
+#endif
+    all.h = h;
+    all.stride = frames != NULL || attitudes != NULL ? stride : 0;
+    all.frames = frames;
+    all.attitudes = attitudes;
+    all.status = status;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic, 16)
+#endif
+    for (size_t m = 0; m < members; ++m) {
+        const phi_status member = phi_turn_member(&all, m);
+        if (member == PHI_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (m < earliest) {
+            earliest = m;
+            worst = member;
+        }
+    }
+    return worst;
+}
+#endif
