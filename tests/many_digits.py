@@ -108,6 +108,7 @@ _RULES: dict[str, Callable[..., Any]] = {
     "E": lambda: +mpmath.e,
     "versin": lambda s: 1 - mpmath.cos(s),
     "inv": lambda s: 1 / s if s > 0 else mpmath.nan,
+    "inv0": lambda s: 1 / s if s > 0 else mpmath.mpf(0),
     **{f"phi{order}": partial(_phi, order) for order in range(3)},
     **{name: partial(_entire, name) for name in ("cosroot", "sinroot", "sinroot1", "arcroot", "exprel", "exprel1")},
 }

@@ -15,11 +15,15 @@ from phigen.symbolic.expression import ZERO, Expression
 
 @dataclass(frozen=True)
 class Forces:
-    """``covector`` ζ with the damping in it and ``vector`` f, by coordinates; ``damping`` λ, 0 if there is none."""
+    """``covector`` ζ with the damping in it and ``vector`` f, by coordinates.
+
+    ``damping`` is λ, 0 if there is none, and ``undamped`` is ζ without it.
+    """
 
     covector: tuple[Expression, ...]
     vector: tuple[Expression, ...]
     damping: Expression = ZERO
+    undamped: tuple[Expression, ...] = ()
 
 
 def forces_of(given: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
@@ -27,5 +31,6 @@ def forces_of(given: SpecForces, coordinates: Sequence[str], field: Sequence[Exp
     if not given:
         return None
     damping = given.damping or ZERO
-    covector = [given.covector.get(c, ZERO) + damping * f for c, f in zip(coordinates, field, strict=True)]
-    return Forces(tuple(covector), tuple(given.vector.get(c, ZERO) for c in coordinates), damping)
+    undamped = tuple(given.covector.get(c, ZERO) for c in coordinates)
+    covector = tuple(z + damping * f for z, f in zip(undamped, field, strict=True))
+    return Forces(covector, tuple(given.vector.get(c, ZERO) for c in coordinates), damping, undamped)

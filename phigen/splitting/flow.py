@@ -12,7 +12,7 @@ from functools import reduce
 
 from phigen import progress
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.splitting import exponential, scalar
+from phigen.splitting import exponential, scalar, spheres
 from phigen.splitting.closure import motion_of
 from phigen.splitting.exponential import NoClosedFormError
 from phigen.splitting.integrals import reduced
@@ -127,8 +127,18 @@ def solved(ring: Ring, field: Sequence[Poly], *, linear: bool = False) -> Solved
     """
     found = _solved(ring, field, linear)
     if isinstance(found, str) and not linear:
-        return _with_integrals(ring, field) or _with_common_factor(ring, field) or found
+        return _with_integrals(ring, field) or _with_common_factor(ring, field) or _on_sphere(ring, field) or found
     return found
+
+
+def _on_sphere(ring: Ring, field: Sequence[Poly]) -> Solved | None:
+    """The same by a closed form on spheres."""
+    found = spheres.solve(ring, field)
+    if found is None:
+        return None
+    moved, manner = found
+    names = ", ".join(ring.coordinates[i] for i in moved)
+    return Solved([moved.get(i, ZERO) for i in range(len(field))], f"{names} {manner}", ())
 
 
 def _solved(ring: Ring, field: Sequence[Poly], linear: bool = False) -> Solved | str:

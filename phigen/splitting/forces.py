@@ -2,6 +2,8 @@
 
 The pieces are, the first that have one: all of it; πζ and f; πζ in the single covectors ζ_i dx_i, f in its components.
 πζ_i dx_i is the field of the coordinate x_i with a factor, tangent to the leaves, so each piece of πζ keeps Casimirs.
+Of damping, ζ = λπb with b = ∇H, the pieces are those of b: in a block of π what of b does not depend on its
+coordinates, and each component of the rest. Those that do not move what others read are one part.
 """
 
 from __future__ import annotations
@@ -9,13 +11,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from phigen.errors import Diagnostic, SpecError
+from phigen.geometry.blocks import blocks
+from phigen.geometry.forces import Forces
 from phigen.geometry.system import System, hamiltonian_vector_field
+from phigen.splitting.conflicts import coloured
 from phigen.splitting.flow import Flow, solved
 from phigen.splitting.ring import ring_of
-from phigen.symbolic.expression import ZERO, Expression
+from phigen.symbolic.expression import ZERO, Expression, gradient, symbols_of, total
 from phigen.symbolic.readable import shortened
 
 Field = tuple[Expression, ...]
+
+_DAMPING_HINT = (
+    "that of a spin has one where H is linear or quadratic along an axis in it; scheme: series takes every H"
+)
 
 
 def force_flows(system: System) -> tuple[Flow, ...]:
@@ -28,9 +37,73 @@ def force_flows(system: System) -> tuple[Flow, ...]:
     if isinstance(whole, Flow):
         return (whole,)
     return (
-        *_pieces(system, tangent, list(_covectors(system, forces.covector)), ("forces", "covector"), ("damping",)),
+        *_tangent_flows(system, forces, tangent),
         *_pieces(system, forces.vector, list(_components(forces.vector)), ("forces", "vector")),
     )
+
+
+def _tangent_flows(system: System, forces: Forces, tangent: Field) -> tuple[Flow, ...]:
+    """The flows of πζ: the whole of it, or of its covectors, or of damping and of the other covectors."""
+    try:
+        covectors = list(_covectors(system, forces.covector))
+        return tuple(_pieces(system, tangent, covectors, ("forces", "covector"), ("damping",)))
+    except SpecError:
+        if forces.damping.is_zero:
+            raise
+    undamped = hamiltonian_vector_field(system.poisson, forces.undamped)
+    covectors = list(_covectors(system, forces.undamped))
+    return (*_damping_flows(system, forces.damping), *_pieces(system, undamped, covectors, ("forces", "covector")))
+
+
+def _damping_flows(system: System, damping: Expression) -> list[Flow]:
+    """The flows of λππb, b = ∇H: those of the blocks of π in as few parts as possible."""
+    found = [
+        flow for block in blocks(system.coordinates, system.poisson) for flow in _damped_block(system, damping, block)
+    ]
+    moved = [{k for k, e in enumerate(flow.increment) if not e.is_zero} for flow in found]
+    read = [{k for k, c in enumerate(system.coordinates) if c in symbols_of(*flow.increment)} for flow in found]
+    neighbours = [
+        {j for j in range(len(found)) if j != i and (moved[i] & read[j] or moved[j] & read[i])}
+        for i in range(len(found))
+    ]
+    colours = coloured(neighbours, moved)
+    return [_joined([f for f, k in zip(found, colours, strict=True) if k == colour]) for colour in sorted(set(colours))]
+
+
+def _joined(flows: Sequence[Flow]) -> Flow:
+    """Flows that neither move nor read what others move, as one."""
+    increment, force = (
+        tuple(total(entries) for entries in zip(*listed, strict=True))
+        for listed in ([f.increment for f in flows], [f.force for f in flows])
+    )
+    return Flow(ZERO, increment, "; ".join(f.manner for f in flows), force=force)
+
+
+def _damped_block(system: System, damping: Expression, block: Sequence[int]) -> Iterator[Flow]:
+    """The flows of λππb for the components of b in a block of π."""
+    slopes = gradient(system.hamiltonian, system.coordinates)
+    ring = ring_of(system, slopes)
+    own = [v for v in ring.state if ring.tower.depends_on(ring.tower.gens[v], [system.coordinates[i] for i in block])]
+    still, rest = [ZERO] * system.dimension, [ZERO] * system.dimension
+    for i in block:
+        parts = ring.terms(ring.tower.convert(slopes[i]), own)
+        still[i] = ring.expression(parts.pop((0,) * len(ring.tower.gens), ring.tower.zero))
+        rest[i] = total(ring.expression(c * ring.monomial(m)) for m, c in parts.items())
+    single = [[e if k == i else ZERO for k in range(system.dimension)] for i, e in enumerate(rest)]
+    for pieces in ([[a + b for a, b in zip(still, rest, strict=True)]], [still, rest], [still, *single]):
+        flows = [_damped(system, damping, b) for b in pieces if any(not e.is_zero for e in b)]
+        if all(isinstance(flow, Flow) for flow in flows):
+            yield from (flow for flow in flows if isinstance(flow, Flow) and flow.moving)
+            return
+    reason = next(flow for flow in flows if isinstance(flow, str))
+    names = ", ".join(system.coordinates[i] for i in block)
+    message = f"scheme splitting: the damping of {names} has no elementary flow: {reason}"
+    raise SpecError([Diagnostic(message, system.locations.get(("damping",)), _DAMPING_HINT)])
+
+
+def _damped(system: System, damping: Expression, b: Sequence[Expression]) -> Flow | str:
+    twice = hamiltonian_vector_field(system.poisson, hamiltonian_vector_field(system.poisson, b))
+    return _flow(system, tuple(damping * e for e in twice))
 
 
 def _covectors(system: System, covector: Sequence[Expression]) -> Iterator[tuple[str, Field]]:

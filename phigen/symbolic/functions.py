@@ -130,6 +130,21 @@ _LISTED = (
         ),
         inline=True,
     ),
+    Function(  # 1/a where a > 0, else 0: what it multiplies vanishes there, or may stay as it is
+        "inv0",
+        own=True,
+        slopes=lambda call, f, a: (-(f**2),),
+        known=lambda call, a: 1 / a,
+        value=lambda library, a: 1 / a if a > 0 else 0 * a,
+        at_zero=None,
+        cost=5,
+        written=_languages(
+            "({0} > 0.0 ? 1.0 / ({0}) : 0.0)",
+            "np.where({0} > 0.0, 1.0 / ({0}), 0.0)",
+            "({0} > 0.0 ? 1.0 / ({0}) : 0.0)",
+        ),
+        inline=True,
+    ),
     Function(
         "log",
         slopes=lambda call, f, a: (1 / a,),

@@ -212,7 +212,7 @@ class Tower(Arithmetic[Poly]):
         args = [self.cancelled(a) for a in args]
         if name == "abs":
             return self.function("sign", args) * args[0]
-        if name == "inv":
+        if name in ("inv", "inv0"):
             return self._reciprocal(args[0])
         first = args[0]
         if name in ENTIRE:

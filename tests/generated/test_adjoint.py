@@ -51,6 +51,11 @@ KINDS = {
     "path, long": (TOP.replace("/2\n", "*8\n") + "birealisation: karasev\ngauge: none\norder: 2\n" + SHORT, Path),
     "path, time, composed": (DRIVEN + "birealisation: karasev\norder: 4\ncomposition: suzuki\n" + SHORT, Path),
     "splitting, time": (SHAKEN + "scheme: splitting\norder: 4\n" + SHORT, Splitting),
+    "splitting, damping": (
+        "coordinates: [x1, x2, x3]\nparameters: {I1: 1, I2: 2, I3: 3, c: 1.1}\npoisson: {lie_algebra: {name: so(3)}}\n"
+        "hamiltonian: x1 + x3*I2/4 - I3*x2**2/9\ndamping: c/9\nscheme: splitting\norder: 4\n" + SHORT,
+        Splitting,
+    ),
     "kicks, time": (DRIVEN + "scheme: splitting\norder: 4\n" + SHORT, Splitting),
     "splitting, monitor": (FALLING + "monitor: log\norder: 4\n" + SHORT, Splitting),
 }

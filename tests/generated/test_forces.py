@@ -16,9 +16,9 @@ SPAN = 2.0
 
 SPIN = """time: t
 coordinates: [x, y, z]
-parameters: {lam: {value: 0.3, positive: true}, g: 0.4}
+parameters: {lam: {value: 0.3, positive: true}, g: 0.4, K: 0.3}
 poisson: {lie_algebra: {name: so(3)}}
-hamiltonian: -z - 0.3*x**2
+hamiltonian: -z - K*x**2
 casimirs: {C: x**2 + y**2 + z**2}
 damping: lam
 tangent: true
@@ -54,6 +54,8 @@ tangent: true
 """,
         [0.6, 0.9],
     ),
+    # damping has flows of its own: of the field, which turns with the time, and of each axis
+    "split damping": (SPIN.replace("-z -", "-z*cos(t) - 0.2*x + 0.1*z**2 -") + "scheme: splitting\n", [0.8, 0.1, 0.5]),
     "split on leaves": (
         SPIN.replace("damping: lam\n", "forces: {covector: {x: g*x*(x**2 + y**2 + z**2), y: g*y}}\n").replace(
             "time: t\n", "scheme: splitting\n"
@@ -73,7 +75,7 @@ tangent: true
         [0.4, 0.5, 0.6],
     ),
 }
-pytestmark = pytest.mark.few("damped", "vector", "populations", "split", "path", of=SYSTEMS)
+pytestmark = pytest.mark.few("damped", "vector", "populations", "split", "split damping", "path", of=SYSTEMS)
 
 
 @cache
@@ -110,7 +112,7 @@ def test_targets_agree_to_roundoff(kind):
     assert x == pytest.approx(expected, abs=1e-13)
 
 
-@pytest.mark.parametrize("kind", ["damped", "covector", "path", "split on leaves"])
+@pytest.mark.parametrize("kind", ["damped", "covector", "path", "split damping", "split on leaves"])
 def test_covectors_keep_casimirs(kind):
     """A force put beside the leaves, such as f for πζ, changes them at the order of the step."""
     found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 20_000, 100)
@@ -121,6 +123,30 @@ def test_damping_takes_energy_down_to_the_minimum():
     energy = solver(made("damped"), "c").integrate(SYSTEMS["damped"][1], 0.1, 2_000).energy
     assert (np.diff(energy) <= 1e-15).all()
     assert energy[-1] == pytest.approx(-np.sqrt(0.9), abs=1e-12)  # the spin along the field
+
+
+#: Damped spins in a splitting, a linear and a quadratic H, which is least at the end.
+SPUN = SPIN.replace("time: t\n", "") + "scheme: splitting\n"
+
+
+@pytest.mark.parametrize("start", [[0.8, 0.1, 0.5], [0, 0, -1], [1e-9, 0, -1], [0, 0, 0]])
+@pytest.mark.parametrize("h", [1e-3, 4.0, 200.0])
+def test_spheres_are_kept_by_steps_of_any_size_and_from_any_start(h, start):
+    """With the field, against it, beside that, and at the centre; a quotient where numbers cancel is another length."""
+    x = solver(compile_text(SPUN), "c").integrate(start, h, 200).x
+    assert np.ptp(np.linalg.norm(x, axis=1)) < 3e-14
+
+
+def test_a_field_or_an_axis_may_vanish():
+    at_rest = solver(compile_text(SPUN.replace("-z", "-g*z")), "c").integrate([0.8, 0.1, 0.5], 0.1, 3, g=0, K=0)
+    assert at_rest.x == pytest.approx(np.tile([0.8, 0.1, 0.5], (4, 1)))
+
+
+def test_damping_in_a_splitting_takes_energy_in_every_step():
+    """Of the wrong sign, or with half of a part left out, it does not, or ends elsewhere."""
+    found = solver(compile_text(SPUN), "c").integrate([0.1, 0.2, -0.9], 0.1, 1_000)
+    assert (np.diff(found.energy) <= 1e-15).all()
+    assert found.energy[-1] == pytest.approx(-np.sqrt(0.86), abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["covector", "vector"])
@@ -175,13 +201,14 @@ def test_the_code_does_not_claim_a_poisson_map():
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ("scheme: splitting", "the force ζ_x = .* has no elementary flow"),
+        ("scheme: splitting\nforces: {covector: {x: y**2}}", "the force ζ_x = y\\*\\*2 has no elementary flow"),
+        ("scheme: splitting\ndamping: lam*z", "the damping of x, y, z has no elementary flow"),
         ("order: 4\ncomposition: none", "has order 2 without a composition"),
         ("birealisation: karasev\nforces: {vector: {x: 1}}", "a vector needs a bi-realisation in closed form"),
         ("order: 2\nmodified_hamiltonian: 1", "not offered for a system with forces"),
     ],
 )
 def test_what_cannot_be_done_is_refused(more, message):
-    text = SPIN.replace("damping: lam", "damping: lam" if "vector" not in more else "order: 2")
+    text = SPIN.replace("damping: lam", "order: 2" if "vector" in more or "damping" in more else "damping: lam")
     with pytest.raises(SpecError, match=message):
         compile_text(text.replace("time: t\n", "") + more + "\n")

@@ -340,14 +340,16 @@ def test_the_weak_order_is_reached(text, order):
 # --- equilibria
 
 
-def test_a_spin_in_a_bath_has_the_magnetisation_of_langevin():
-    """⟨m⟩ = coth(B/T) − T/B; half of the variance of the noise is told from that."""
-    found, members = solver(made("thermal"), "c"), 4_000
+@pytest.mark.parametrize(("scheme", "h"), [("series", 0.1), ("splitting", 0.5)])
+def test_a_spin_in_a_bath_has_the_magnetisation_of_langevin(scheme, h):
+    """⟨m⟩ = coth(B/T) − T/B; half of the variance of the noise is told from that. Splittings are of weak order 2."""
+    found = solver(compile_text(SYSTEMS["thermal"][0] + f"scheme: {scheme}\n"), "c")
+    members = 4_000
     starts, beta = np.tile([0.0, 0.6, 0.8], (members, 1)), 2.0
     expected = 1 / np.tanh(beta) - 1 / beta
 
     def missed(**parameters):
-        z = found.ensemble(starts, 0.1, 150, seed=1, **parameters)[:, 2]
+        z = found.ensemble(starts, h, round(15 / h), seed=1, **parameters)[:, 2]
         return abs(z.mean() - expected) / (z.std() / np.sqrt(members))
 
     assert missed() < 4

@@ -23,7 +23,7 @@ def points(name):
     if name == "acosh":
         return [(Fraction(5, 4), Fraction(1)), (Fraction(3), Fraction(1))]
     inside = [(Fraction(3, 8), Fraction(2, 3)), (Fraction(1, 7), Fraction(-5, 4))]
-    return inside if name in ("log", "power", "inv") else [*inside, (Fraction(-2, 9), Fraction(3))]
+    return inside if name in ("log", "power", "inv", "inv0") else [*inside, (Fraction(-2, 9), Fraction(3))]
 
 
 def of(name):

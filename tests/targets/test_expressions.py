@@ -30,6 +30,7 @@ ARGUMENTS |= {
     "versin": (y,),
     "log1p": (-x,),
     "inv": (y + z,),
+    "inv0": (y + z,),
     "abs": (y - z,),
     "sign": (x - y,),
 }
