@@ -41,20 +41,25 @@ poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + (1 + A*cos(w*t + phase))*(q[i+1] - q)**2/2 + A*q**4
 forces: {vector: {p: -damp*p}}
 """
-LATTICES["driven"] = LATTICES["driven series"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
+LATTICES["driven"] = LATTICES["driven composed"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
 OWN = {"driven": DRIVEN, "far_open": SPECS["far_open"], "spin_graph": SPECS["spin_graph"]}
 
 
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
-#: colours and parameters at bonds, pairs.
+#: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
 IN_C["heisenberg_plane small"] = (4, 6)
+IN_C |= {"driven composed": SITES, "far_open series": (4, 3), "spin_graph series": SITES, "point_vortices": SITES}
+SLOW = ("volterra", "far_open series")
+
+HOW = {"series": {"scheme": "series", "order": 2}, "composed": {"scheme": "series", "order": 4}}
+HOW["small"] = {"profile": "small"}
 
 
 @cache
 def made(name, target="numpy"):
     lattice, *how = name.split()
-    more = {"series": {"scheme": "series", "order": 2}, "small": {"profile": "small"}}.get(" ".join(how), {})
+    more = HOW.get(" ".join(how), {})
     more |= {"tangent": target == "c"}
     spec = phigen.spec.loads(OWN[lattice]) if lattice in OWN else lattice
     return phigen.compile(spec, target=target, adjoint=True, **more)
@@ -92,7 +97,7 @@ def test_pullback_is_the_gradient_of_the_run(name):
     bar = random.normal(size=(3, *x.shape))
     frames, x0_bar, found = solver.pullback(x, H, STEPS, bar, 2, **arguments(solver, given))
     run = solver.integrate(x, H, STEPS, 2, **arguments(solver, given)).x
-    assert frames == pytest.approx(run, abs=1e-14) if "series" in name else np.array_equal(frames, run)
+    assert frames == pytest.approx(run, abs=1e-14) if " " in name else np.array_equal(frames, run)
 
     def weighed(x, **changed):
         return np.sum(bar * solver.integrate(x, H, STEPS, 2, **arguments(solver, {**given, **changed})).x)
@@ -188,7 +193,7 @@ def weighed_tangents(solver, x, bar, stride, parameters):
     return found, along
 
 
-@pytest.mark.parametrize("name", IN_C)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] * (n in SLOW)) for n in IN_C])
 def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     solver, numpy, random = made(name, "c"), made(name), np.random.default_rng(5)
     x = beginning(solver, IN_C[name])
@@ -222,8 +227,23 @@ def test_c_has_the_same_bits_for_any_memory(monkeypatch):
         assert same(part.parameters_bar, whole.parameters_bar)
 
 
-def test_c_has_the_same_bits_for_any_threads():
-    solver, random = made("driven", "c"), np.random.default_rng(8)
+def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
+    solver, random = made("driven composed", "c"), np.random.default_rng(8)
+    x, bar = 0.3 * random.random((2, SITES)), random.normal(size=(4, 2, SITES))
+    whole = solver.pullback(x, H, 17, bar, 7)
+    assert np.array_equal(whole.x1, solver.integrate(x, H, 17, 7).x)
+    for kept, states in ((0, 1), (1200, 1)):
+        monkeypatch.setattr(c_lattice, "KEPT", kept)
+        monkeypatch.setattr(c_lattice, "STATES", states)
+        part = solver.pullback(x, H, 17, bar, 7)
+        assert part.x1 == pytest.approx(whole.x1, abs=1e-14)
+        assert part.x0_bar == pytest.approx(whole.x0_bar, abs=1e-13)
+        assert part.parameters_bar["A"] == pytest.approx(whole.parameters_bar["A"], rel=1e-13)
+
+
+@pytest.mark.parametrize("name", ["driven", "driven composed"])
+def test_c_has_the_same_bits_for_any_threads(name):
+    solver, random = made(name, "c"), np.random.default_rng(8)
     x, bar = 0.3 * random.random((2, 6000)), random.normal(size=(2, 6000))
     found = [*with_threads(lambda: solver.pullback(x, H, 1, bar))]
     for one in found:
@@ -243,8 +263,6 @@ def test_what_cannot_be_pulled_back_is_told():
         phigen.compile("fput", target="numpy").pullback(x, H, STEPS, x)
     with pytest.raises(SpecError, match="adjoint is not offered for lattices with noise"):
         made("thermal_heisenberg")
-    with pytest.raises(SpecError, match="not offered in C"):
-        made("kdv", "c")
     in_c = made("driven", "c")
     with pytest.raises(StepError) as failed:
         in_c.pullback(1e90 * x, H, 9, x)

@@ -52,7 +52,14 @@ int main(void)
     linear_range(&s, s.coef);
     linear_copy(s.y[0], s.x, &s);
     const double first = linear_corrected(&s, s.coef, 0), second = linear_corrected(&s, s.coef, 1);
-    printf("%g %g", first, second);
+    linear_params_bar none;
+    s.sweeps = 0;
+    if (linear_step(&s, STEP) != linear_OK) return 2;
+    const size_t taken = s.sweeps;
+    void *trail = malloc(linear_trail_size(&s, 1));
+    s.sweeps = 0;
+    if (linear_step_adjoint(&s, STEP, x, x, &none, trail) != linear_OK) return 3;
+    printf("%g %g %zu %zu", first, second, taken, s.sweeps - taken);
     return 0;
 }
 """
@@ -73,7 +80,7 @@ pytestmark = pytest.mark.few("chain", "sheet", "net", of=SIZES)
 
 @cache
 def compiled(name: str) -> Compilation:
-    return compile_spec(specs.loads(f"phigen: 1\nname: stiff_{name}\n{TEXTS[name]}\n"))
+    return compile_spec(specs.loads(f"phigen: 1\nname: stiff_{name}\nadjoint: true\ntangent: true\n{TEXTS[name]}\n"))
 
 
 def bonds(name: str, sites: int) -> dict[str, np.ndarray]:
@@ -109,6 +116,18 @@ def test_steps_that_sweeps_cannot_make_are_those_of_the_ordinary_system(name: st
         np.testing.assert_allclose(found, reference, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize(("name", "sizes"), CASES)
+def test_cotangents_go_back_through_such_steps(name: str, sizes: tuple[int, ...]) -> None:
+    """By elimination with the transpose of the matrix, or by Krylov spaces: as tangent vectors go forward."""
+    found = lattice_solver_of(compiled(name), "c")
+    x, more, random = start(name, sizes), bonds(name, sizes[0]), np.random.default_rng(4)
+    bar, along = random.normal(size=(2, *x.shape))
+    ((_, (carried,)),) = found.tangents(x, 0.2, 5, along[None], 5, **more)
+    assert np.sum(found.pullback(x, 0.2, 5, bar, **more).x0_bar * along) == pytest.approx(
+        np.sum(bar * carried), rel=1e-12
+    )
+
+
 @pytest.mark.parametrize("target", ["numpy", "c"])
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_equations_without_a_solution_are_told(target: str, profile: str) -> None:
@@ -128,12 +147,13 @@ def test_one_correction_solves_a_linear_stage(profile: str, axes: str, h: float,
     A wrong matrix would solve stages too, by more corrections; and so would a space of the matrix itself in the plane.
     """
     text, sizes = (LINEAR, "40") if axes == "i" else (PLANE, "19,21")
-    program = compile_spec(specs.loads(f"phigen: 1\nname: linear\n{text}\n"), profile=profile).program
+    program = compile_spec(specs.loads(f"phigen: 1\nname: linear\nadjoint: true\n{text}\n"), profile=profile).program
     write(tmp_path, {**emit(program, "c", "phigen"), "driver.c": DRIVER})
     run(["cc", "-std=c99", f"-DSTEP={h}", f"-DSIZES={sizes}", "-o", "driver", "driver.c", "-lm"], tmp_path)
-    first, second = map(float, run(["./driver"], tmp_path).split())
+    first, second, forth, back = map(float, run(["./driver"], tmp_path).split())
     assert first > 0.1
     assert second < left * first
+    assert back <= forth
 
 
 @pytest.mark.parametrize("name", ["ring", "net"])

@@ -10,7 +10,6 @@ import re
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 
-from phigen.errors import Diagnostic, SpecError
 from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
@@ -41,14 +40,8 @@ Sizes = list[tuple[str, int, str]]
 
 
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
-    """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header.
-
-    Raises `SpecError` for what is not offered: adjoints of the series on lattices.
-    """
+    """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name, lines = program.name, header_lines(program, command)
-    if isinstance(program.step, Sweeps) and program.step.adjoint and program.step.equation:
-        message = f"{name} asks for the transpose of steps, adjoint, not offered in C for the series on lattices"
-        raise SpecError([Diagnostic(message, hint="the target numpy has it")])
     amalgam, header, code = _amalgam(program)
     written = single if program.single else str
     declared = written(amalgam.text(header)) + "\n#ifdef __cplusplus\n}\n#endif\n"

@@ -46,7 +46,7 @@ static size_t phi_share(size_t units, size_t *first)
     return *first + each + (own < more);
 }
 
-#if !PHI_SERIES
+#if !PHI_SERIES || PHI_ADJOINT
 /* Until all threads are here. */
 static void phi_wait(void)
 {
@@ -232,6 +232,9 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
     for (int k = 0; k < PHI_ARRAYS; ++k)
         for (int side = 0; side < 2; ++side)
             s->y[side][k] = k < PHI_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
+#if PHI_ADJOINT
+    memcpy(s->y[2], s->x, sizeof s->x);
+#endif
     memory += 2 * PHI_DIM * block;
 #if PHI_GUESSES
     for (int stage = 0; stage < PHI_STAGES; ++stage)

@@ -47,7 +47,13 @@ typedef struct {
 #endif
 #endif
 #if PHI_SERIES
+#if PHI_ADJOINT
+    double *y[3][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, with the parameters at sites; of one gone back through */
+    double *const *side;      /* while the equation of its cotangents is solved, what is on the right of it, else NULL */
+    double *const *handed, *shares; /* what sites hand to those that they have read; of each piece of a row shares in sums */
+#else
     double *y[2][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, with the parameters at sites */
+#endif
 #if PHI_GUESSES
     phi_guess guess[PHI_STAGES];
 #endif
@@ -82,7 +88,11 @@ typedef struct {
 #endif
 #endif
 #if PHI_ADJOINT
+#if PHI_SERIES
+    double *kept;             /* where a step keeps the y of its stages, while it does */
+#else
     double *kept;             /* where steps keep what the sweeps of them change, while they do */
+#endif
 #endif
 #if PHI_TANGENT
     size_t vectors;           /* tangent vectors that flows carry along, while they do */

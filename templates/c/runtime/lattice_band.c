@@ -88,7 +88,11 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         phi_ends(s->v[k], sites, 0, sites);
     }
+#if PHI_ADJOINT
+    phi_slope_rows(s, coef, 1, s->side != NULL ? 2 : now, s->v, s->y[1 - now], 0, phi_units(s));
+#else
     phi_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, phi_units(s));
+#endif
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;
@@ -121,21 +125,66 @@ static int phi_factorise(phi_solver *s, const double *coef, int now)
     return phi_decompose(m.d, border, border, -1, border, m.pivots + inner);
 }
 
+/* Solve the equation of the matrix, in place. */
+static void phi_solve(const phi_matrix *m)
+{
+    const ptrdiff_t inner = m->inner, border = m->border;
+    double *lower = m->side + inner;
+    phi_substitute(m->a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m->pivots, m->side);
+    for (ptrdiff_t k = 0; k < inner; ++k)
+        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m->c[k * border + i] * m->side[k];
+    phi_substitute(m->d, border, border, -1, border, m->pivots + inner, lower);
+    for (ptrdiff_t j = 0; j < border; ++j)
+        for (ptrdiff_t i = 0; i < inner; ++i) m->side[i] -= m->b[j * inner + i] * lower[j];
+}
+
+#if PHI_ADJOINT
+/* Solve with the transpose of what phi_decompose has made, in place. */
+static void phi_substitute_back(
+    const double *a, ptrdiff_t n, ptrdiff_t tall, ptrdiff_t middle, ptrdiff_t below, const double *pivots, double *x)
+{
+    for (ptrdiff_t j = 0; j < n; ++j) {
+        const ptrdiff_t over = middle < 0 || j < middle ? j : middle;
+        const double *diagonal = a + j * tall + (middle < 0 ? j : middle);
+        for (ptrdiff_t i = 1; i <= over; ++i) x[j] -= diagonal[-i] * x[j - i];
+        x[j] /= *diagonal;
+    }
+    for (ptrdiff_t j = n - 1; j >= 0; --j) {
+        const ptrdiff_t under = n - 1 - j < below ? n - 1 - j : below;
+        const double *diagonal = a + j * tall + (middle < 0 ? j : middle);
+        for (ptrdiff_t i = 1; i <= under; ++i) x[j] -= diagonal[i] * x[j + i];
+        if (pivots[j] > 0.0) phi_swap(x + j, x + j + (ptrdiff_t)pivots[j]);
+    }
+}
+
+/* Solve the equation of the transpose of the matrix: with (A^-1 B)^T first, then D, then C^T and A. */
+static void phi_solve_back(const phi_matrix *m)
+{
+    const ptrdiff_t inner = m->inner, border = m->border;
+    double *lower = m->side + inner;
+    for (ptrdiff_t j = 0; j < border; ++j)
+        for (ptrdiff_t i = 0; i < inner; ++i) lower[j] -= m->b[j * inner + i] * m->side[i];
+    phi_substitute_back(m->d, border, border, -1, border, m->pivots + inner, lower);
+    for (ptrdiff_t k = 0; k < inner; ++k)
+        for (ptrdiff_t i = 0; i < border; ++i) m->side[k] -= m->c[k * border + i] * lower[i];
+    phi_substitute_back(m->a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m->pivots, m->side);
+}
+
+#endif
 /* s->y[now] with the correction by a sweep to the other, in place of what the sweep has made. */
 static void phi_eliminate(phi_solver *s, int now)
 {
     phi_matrix m;
     phi_matrix_of(s->sites, s->matrix, &m);
-    const ptrdiff_t sites = s->length, inner = m.inner, border = m.border;
-    double *lower = m.side + inner;
+    const ptrdiff_t sites = s->length;
     for (ptrdiff_t i = 0; i < sites; ++i)
         for (int k = 0; k < PHI_DIM; ++k) m.side[i * PHI_DIM + k] = s->y[1 - now][k][i] - s->y[now][k][i];
-    phi_substitute(m.a, inner, PHI_TALL, 2 * PHI_BAND, PHI_BAND, m.pivots, m.side);
-    for (ptrdiff_t k = 0; k < inner; ++k)
-        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m.c[k * border + i] * m.side[k];
-    phi_substitute(m.d, border, border, -1, border, m.pivots + inner, lower);
-    for (ptrdiff_t j = 0; j < border; ++j)
-        for (ptrdiff_t i = 0; i < inner; ++i) m.side[i] -= m.b[j * inner + i] * lower[j];
+#if PHI_ADJOINT
+    if (s->side != NULL) phi_solve_back(&m);
+    else phi_solve(&m);
+#else
+    phi_solve(&m);
+#endif
     for (int k = 0; k < PHI_DIM; ++k) {
         for (ptrdiff_t i = 0; i < sites; ++i) s->y[1 - now][k][i] = s->y[now][k][i] + m.side[i * PHI_DIM + k];
         phi_ends(s->y[1 - now][k], sites, 0, sites);

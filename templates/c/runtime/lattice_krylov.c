@@ -73,13 +73,18 @@ static void phi_combine(const phi_solver *s, double *const *to, double own, doub
     }
 }
 
-/* to = a - b; with coefficients b is first made what a sweep does to a. */
+/* to = a - b; with coefficients b is first made what a sweep does to a, or its transpose. */
 static void phi_subtract(phi_solver *s, const double *coef, int now, double *const *a, double *const *b, double *const *to)
 {
     PHI_PARALLEL
     {
         size_t first, end = phi_share(phi_units(s), &first);
+#if PHI_ADJOINT
+        if (coef != NULL && s->side != NULL) phi_pull_rows(s, PHI_SLOPE_BACK, coef, a, NULL, b, first, end);
+        if (coef != NULL && s->side == NULL) phi_slope_rows(s, coef, 1, now, a, b, first, end);
+#else
         if (coef != NULL) phi_slope_rows(s, coef, 1, now, a, b, first, end);
+#endif
         for (size_t unit = first; unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);
             for (int k = 0; k < PHI_DIM; ++k) {
@@ -119,7 +124,11 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
     PHI_PARALLEL
     {
         size_t first, end = phi_share(phi_units(s), &first);
+#if PHI_ADJOINT
+        phi_own_slope_rows(s, coef, 1, s->side != NULL ? 2 : now, first, end);
+#else
         phi_own_slope_rows(s, coef, 1, now, first, end);
+#endif
         for (size_t unit = first; unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);
             for (ptrdiff_t i = at.from; i < at.to; ++i) {
@@ -145,7 +154,12 @@ static void phi_apply_blocks(const phi_solver *s, double *const *v, double *cons
                 double *sum = to[k] + at.row.at[0];
                 for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][at.row.at[0] + i];
                 for (int l = 0; l < PHI_DIM; ++l) {
-                    const double *one = v[l] + at.row.at[0], *by = s->block[k * PHI_DIM + l] + at.row.at[0];
+#if PHI_ADJOINT
+                    const int entry = s->side != NULL ? l * PHI_DIM + k : k * PHI_DIM + l;
+#else
+                    const int entry = k * PHI_DIM + l;
+#endif
+                    const double *one = v[l] + at.row.at[0], *by = s->block[entry] + at.row.at[0];
                     PHI_EACH_SITE
                     for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by[i] * one[i];
                 }

@@ -6,11 +6,19 @@
 #include "model.h"
 #include "rows.c"
 #include "sweeps.h"
+#if PHI_ADJOINT
+#include "lattice_back.c"
+#endif
 
 /* ---- The stages ---- */
 static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
 
+#if PHI_ADJOINT
+/* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. Where there is
+   s->side, y is the cotangent of that in s->y[2], and a sweep adds to this side the transpose of what one does there. */
+#else
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. */
+#endif
 static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 {
     const size_t units = phi_units(s);
@@ -19,8 +27,14 @@ static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
     {
         phi_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = phi_share(units, &first);
-        if (coef != NULL) phi_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+#if PHI_ADJOINT
+        if (coef != NULL && s->side != NULL) phi_pull_rows(s, PHI_SLOPE_BACK, coef, s->y[now], s->side, s->y[1 - now], first, end);
+        const int measured = coef != NULL && s->side == NULL;
+#else
+        const int measured = coef != NULL;
+#endif
+        if (measured) phi_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; !measured && unit < end; ++unit) {
             const phi_piece at = phi_piece_of(s, unit);
             phi_measure(s->y[now], s->y[1 - now], &at, &own);
         }
@@ -66,12 +80,12 @@ static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *no
 }
 
 #if !PHI_GUESSES
-#define phi_predict(s, stage) phi_copy((s)->y[0], (s)->x, s)
+#define phi_predict(s, x, stage) phi_copy((s)->y[0], x, s)
 #define phi_forget(s) ((s)->stiff = 0)
 
 #else
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void phi_predict(const phi_solver *s, int stage)
+static void phi_predict(const phi_solver *s, double *const *x, int stage)
 {
     PHI_PARALLEL
     {
@@ -79,7 +93,7 @@ static void phi_predict(const phi_solver *s, int stage)
         for (int k = 0; k < PHI_DIM; ++k)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
                 for (int d = 0; d < s->guess[stage].order; ++d) {
                     const double *difference = s->guess[stage].difference[d][k];
                     for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
@@ -89,7 +103,7 @@ static void phi_predict(const phi_solver *s, int stage)
 }
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
-static void phi_remember(phi_solver *s, int stage, int now)
+static void phi_remember(phi_solver *s, double *const *from, int stage, int now)
 {
     phi_guess *guess = &s->guess[stage];
     double size[PHI_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
@@ -100,7 +114,7 @@ static void phi_remember(phi_solver *s, int stage, int now)
         for (int k = 0; k < PHI_DIM; ++k)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
+                const double *restrict y = s->y[now][k], *restrict x = from[k];
                 for (ptrdiff_t i = first; i < end; ++i) {
                     double next = y[i] - x[i];
                     for (int d = 0; d < guess->count; ++d) {
@@ -137,10 +151,42 @@ static void phi_forget(phi_solver *s)
 #endif
 #include "lattice_newton.c"
 
+#if PHI_ADJOINT
+/* Keep the y of a stage, and x where its transpose reads that; returns where the next are kept. */
+static double *phi_keep_stage(const phi_solver *s, int now, double *to)
+{
+    const size_t block = phi_block(s->rows, s->width);
+#if PHI_STARTS
+    double *const *const kept[] = { s->y[now], s->x };
+#else
+    double *const *const kept[] = { s->y[now] };
+#endif
+    PHI_PARALLEL
+    {
+        size_t unit, end = phi_share(phi_units(s), &unit);
+        for (; unit < end; ++unit) {
+            const phi_piece at = phi_piece_of(s, unit);
+            for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k) {
+                double *row = to + k * block + PHI_LEAD + at.row.at[0];
+                const double *from = kept[k / PHI_DIM][k % PHI_DIM] + at.row.at[0];
+                memcpy(row + at.from, from + at.from, (size_t)(at.to - at.from) * sizeof *row);
+#if PHI_HALO
+                phi_ends(row, s->length, at.from, at.to);
+#endif
+            }
+        }
+    }
+    return to + PHI_KEPT * PHI_DIM * block;
+}
+
+#endif
 /* The stages of a step. */
 static phi_status phi_stages(phi_solver *s, int far)
 {
     const size_t units = phi_units(s);
+#if PHI_ADJOINT
+    double *kept = s->kept;
+#endif
 #if PHI_NOISE
     PHI_PARALLEL
     {
@@ -161,21 +207,24 @@ static phi_status phi_stages(phi_solver *s, int far)
         phi_refresh(coef, s->now, coef + PHI_PREPARED);
 #endif
         int now = 0;
-        phi_predict(s, stage);
+        phi_predict(s, s->x, stage);
         phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, &now);
         if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             const double range = phi_range(s, coef);
-            phi_predict(s, stage);
+            phi_predict(s, s->x, stage);
             status = phi_newton(s, coef, range, &now);
         }
 #if PHI_TANGENT
         for (size_t k = 0; k < s->vectors && status == PHI_OK; ++k) status = phi_vary(s, coef, now, k);
 #endif
         if (status != PHI_OK) return status;
+#if PHI_ADJOINT
+        if (kept != NULL) kept = phi_keep_stage(s, now, kept);
+#endif
 #if PHI_GUESSES
-        phi_remember(s, stage, now);
+        phi_remember(s, s->x, stage, now);
 #endif
         PHI_PARALLEL
         {

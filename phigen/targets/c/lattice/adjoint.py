@@ -3,6 +3,7 @@
 A sweep is gone back through in two goes, so that every site is written by itself alone, whatever the threads. In the
 first, each site finds what it gives to the values that it has read. What is its own it adds at once; what belongs to
 others it puts into arrays, one for each value that is ``handed``. In the second, each site adds what it is handed.
+So it is with the kernels of the equation of a stage, see `adjoint_stages`.
 """
 
 from __future__ import annotations
@@ -13,32 +14,22 @@ from dataclasses import dataclass
 from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Adjoint, Sweep, Sweeps
-from phigen.symbolic.symbols import COEFFICIENT, Symbol
+from phigen.scheme.steps import Adjoint, Ends, Gather, Sweep, Sweeps
 from phigen.targets.c.kernels import function, members
-from phigen.targets.c.lattice.layout import Layout, layout_of
-from phigen.targets.c.lattice.loops import Loop, forms_of, in_loops
-from phigen.targets.c.lattice.names import SiteNames, beside
+from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
+from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
+from phigen.targets.c.lattice.layout import Layout, layout_of, starts_are_read
+from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
 from phigen.targets.c.lattice.parts import Case, calls_over_sites, over_rows
-from phigen.targets.code import Code, lower
 from phigen.targets.rendering import render
 
 
 @dataclass(frozen=True)
-class Handed:
-    """A value that a sweep hands to the site at an offset: the number of its array, and the number of that of bars."""
-
-    array: int
-    base: int
-    offset: tuple[int, ...]
-
-
-@dataclass(frozen=True)
 class Back:
-    """How a part goes back: its loops, what is called for each piece of a row in the first and in the second go, and
-    how many arrays of values are handed."""
+    """How a part, or a kernel, goes back: its loops, what is called for each piece of a row in the first and in the
+    second go, and how many arrays of values are handed."""
 
     loops: tuple[Loop, ...]
     first: tuple[str, ...]
@@ -46,21 +37,37 @@ class Back:
     handed: int
 
 
+@dataclass(frozen=True)
+class _Pulled:
+    """A transposed kernel, where its cotangents are, what is gathered for it, and the transposes of the kernels of
+    that; what is called before it, for pieces of rows."""
+
+    kernel: Kernel
+    seeds: Seeds
+    gather: Gather | None
+    ends: tuple[tuple[Ends, Kernel], ...]
+    before: tuple[str, ...] = ()
+
+
 def printed(program: Program, step: Sweeps, adjoint: Adjoint) -> str:
-    """The loops, and which of them go back through which part."""
+    """The loops, and which of them go back through which part, or kernel of the equation of a stage."""
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     found = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     found += [function(program, adjoint.refresh)] if adjoint.refresh else []
-    parts = [_part(program, layout, kernels, k) for k in range(len(step.parts))]
+    if step.equation:
+        parts = [*_of_equation(program, layout, kernels)]
+        setups: list[tuple[str, ...]] = [_SETUP_OF_STAGES] * len(parts)
+    else:
+        parts = [*_of_parts(program, layout, kernels)]
+        chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(parts))]
+        setups = [(*_SETUP, *["at.row.chosen = colour;"] * own) for own in chosen]
     found += [loop.text(program) for part in parts for loop in part.loops]
-    setups = [
-        [*_SETUP, *["at.row.chosen = colour;"] * bool(step.by_colour and step.by_colour[k])] for k in range(len(parts))
-    ]
     back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
-    found.append(_over(program, layout, "How a part goes back", "back_rows", dict(enumerate(back, 1))))
+    title = "How a kernel goes back" if step.equation else "How a part goes back"
+    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1))))
     where = _givers(program) if len(step.sites.axes) > 1 else []
     hand = {
-        k: Case(p.second, [*setup, *where], beside=False)
+        k: Case(p.second, [*(line for line in setup if line != _VARIED), *where], beside=False)
         for k, (p, setup) in enumerate(zip(parts, setups, strict=True), 1)
         if p.second
     }
@@ -69,6 +76,8 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint) -> str:
 
 
 _SETUP = ("at.row.x = x;", "at.row.bar = bar;", "at.row.handed = handed;")
+_VARIED = "at.row.varied = v;"
+_SETUP_OF_STAGES = ("at.row.x = s->y[2];", _VARIED, "at.row.bar = bar;", "at.row.handed = s->handed;")
 
 
 def _has_ends(calls: Sequence[str]) -> bool:
@@ -76,32 +85,62 @@ def _has_ends(calls: Sequence[str]) -> bool:
     return any("second" in call for call in calls)
 
 
-def _part(program: Program, layout: Layout, kernels: Mapping[str, Kernel], number: int) -> Back:
-    """The two goes of all sweeps of a part."""
+def _of_parts(program: Program, layout: Layout, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
+    """The two goes of all sweeps of each part."""
+    for number, part in enumerate(layout.step.parts, 1):
+        pulled = list[_Pulled]()
+        for sweep in part:
+            bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
+            seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
+            ends = tuple((e, kernels[e.kernel.name + BACK]) for e in (sweep.gather.ends if sweep.gather else ()))
+            before = tuple(_gathered(program, layout, sweep))
+            pulled.append(_Pulled(kernels[sweep.kernel.name + BACK], seeds, sweep.gather, ends, before))
+        yield _back(program, layout, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
+
+
+def _of_equation(program: Program, layout: Layout, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
+    """The two goes of each kernel that a stage is gone back through by; in the first one what is gathered is found."""
+    fields, gather = program.coordinates, layout.partners.field
+    for number, (name, own, wanted) in enumerate(KERNELS):
+        kernel = restricted(layout, fields, kernels[own + BACK], wanted, name)
+        seed = next(array for array in kernel.inputs if array.endswith("_bar"))
+        seeds = Seeds(seed, tuple(f"v_{k}" for k in range(len(fields))))
+        read = gather if kernel.inputs["gathered"] else None
+        ends = tuple(
+            (e, restricted(layout, fields, kernels[e.kernel.name + BACK], wanted, f"{e.kernel.name}_{name}"))
+            for e in (gather.ends if read else ())
+        )
+        before = (f"{program.name}_{e.kernel.name}(&s->params, &at.row, at.from, at.to);" for e in gather.ends)
+        pulled = _Pulled(kernel, seeds, read, ends, () if number else tuple(before))
+        yield _back(program, layout, name.replace("_back", "_hand"), f"{name} has read", [pulled])
+
+
+def _back(program: Program, layout: Layout, name: str, whom: str, pulled: Sequence[_Pulled]) -> Back:
+    """The two goes of some kernels, of which the second is ``name``."""
     loops, first, second = list[Loop](), list[str](), list[str]()
     beside, given = list[Handed](), 0
-    sums = f"sums + unit * {program.name}_COEFFICIENTS"
 
     def called(loop: Loop, sites: str = "at.from, at.to") -> str:
-        return f"{program.name}_{loop.name}(coef, &at.row, {sites}, {sums});"
+        source, sums = ("&s->params", "numbers") if "*params" in loop.arguments else ("coef", "sums")
+        return f"{program.name}_{loop.name}({source}, &at.row, {sites}, {sums} + unit * {program.name}_SUMS);"
 
-    for sweep in layout.step.parts[number]:
-        kernel = kernels[sweep.kernel.name + BACK]
-        listed, begin = _handed(layout, kernel, given), given
-        given = max([given, *(h.array + 1 for h in listed)]) + (len(sweep.gather.names) if sweep.gather else 0)
-        own = [_loop(program, layout, sweep, form, more, listed, begin) for form, more in forms_of(program, kernel)]
-        first += _gathered(program, layout, sweep)
-        first += [called(call.loop, call.sites) for call in calls_over_sites(own)]
-        ends = sweep.gather.ends if sweep.gather else ()
-        bonds = [
-            loop for e in ends for loop in gathering_back(program, layout, e, kernels[e.kernel.name + BACK], begin)
+    for one in pulled:
+        sums = one.gather.names if one.gather else ()
+        listed = handed_by(layout, one.kernel, given)
+        given = max([given, *(h.array + 1 for h in listed)])
+        own = [
+            first_loop(program, layout, kernel, form, one.seeds, sums, listed, given)
+            for kernel, form in forms_of(program, one.kernel)
         ]
+        first += [*one.before, *(called(call.loop, call.sites) for call in calls_over_sites(own))]
+        bonds = [loop for end, kernel in one.ends for loop in gathering_back(program, layout, end, kernel, given)]
+        given += len(sums)
         second += map(called, bonds)
         loops += [*own, *bonds]
         beside += listed
-    first += _ends(program, layout, beside)
+    first += copied_ends(program, layout, beside)
     if beside:
-        loop = _handing(program, layout, number + 1, beside)
+        loop = handing(program, layout, name, whom, beside)
         second.append(f"{program.name}_{loop.name}(&at.row, at.from, at.to);")
         loops.append(loop)
     return Back(tuple(loops), tuple(first), tuple(second), given)
@@ -119,12 +158,20 @@ def _gathered(program: Program, layout: Layout, sweep: Sweep) -> Iterator[str]:
 
 def _over(program: Program, layout: Layout, title: str, head: str, cases: Mapping[int, Case]) -> str:
     """A function that does what is called for pieces of rows, of some parts."""
-    coloured, arguments = bool(layout.step.by_colour), "double *const *x, double *const *bar, double *const *handed"
-    if head == "back_rows" or layout.step.partners:
+    coloured, whole = bool(layout.step.by_colour), head == "back_rows" or layout.step.partners is not None
+    arguments = "double *const *x, double *const *bar, double *const *handed"
+    if layout.step.equation:
+        numbers = ["double *numbers"] * bool(layout.step.partners)
+        arguments = ", ".join(["double *const *bar", *numbers])
+        if head == "back_rows":
+            arguments = "const double *coef, double *const *v, double *const *bar, double *sums"
+    elif whole:
         arguments = f"const double *coef, {arguments}, double *sums"
     more = {"title": title, "head": head, "coloured": coloured}
     more["arguments"] = f"int {'flow' if coloured else 'part'}, {arguments}"
     unused = ["part"] * (len(cases) == 1 and not coloured)
+    calls = [call for case in cases.values() for call in case.calls]
+    unused += ["numbers"] * ("*numbers" in arguments and not any("numbers" in call for call in calls))
     return over_rows(program, layout, list(cases.values()), list(cases), unused=unused, **more)
 
 
@@ -133,7 +180,10 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back]) -> str:
     rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in moved]
     values = {
         "NAME": program.name,
-        "parts": len(step.parts),
+        "parts": len(parts),
+        "kernels": [f"{name.upper()} = {k}" for k, (name, *_) in enumerate(KERNELS, 1)] if step.equation else (),
+        "kept": 1 + starts_are_read(step),
+        "sums": _sums(program, step),
         "moves": ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
         "handed": max(1, *(part.handed for part in parts)) if parts else 1,
@@ -143,110 +193,10 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back]) -> str:
     return render("c", "lattice_adjoint.c", values)
 
 
-def _handed(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
-    """What a sweep hands to sites beside, in arrays from the first on: one for values that are the same."""
-    arrays: dict[int, int] = {}
-    found = []
-    for name, value in kernel.along("site"):
-        base, offset = layout.step.sites.places[name]
-        if any(offset) and not value.is_zero:
-            array = arrays.setdefault(id(value), first + len(arrays))
-            found.append(Handed(array, layout.bar(base), offset))
-    return found
-
-
-def _loop(
-    program: Program, layout: Layout, sweep: Sweep, kernel: Kernel, form: str, handed: Sequence[Handed], begin: int
-) -> Loop:
-    """The first go of a sweep; the cotangents of sums over bonds or pairs are handed in arrays from ``begin`` on."""
-    name, code, step = program.name, lower(kernel), layout.step
-    moved = [program.coordinates[i] for i in sweep.moved]
-    seeds, sums = {"change_bar": [f"bar_{layout.bar(f)}" for f in moved]}, sweep.gather.names if sweep.gather else ()
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), sums, seeds)
-    head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
-    used, given = {layout.bar(f) for f in moved}, dict[int, str]()
-    places = {(h.base, h.offset): h.array for h in handed}
-    for store in (s for s in code.stores if not s.value.is_zero):
-        value = names.show(store.value)
-        if store.array == "coef_bar":
-            shares.append((store.index, value))
-            continue
-        if store.array == "gathered_bar":
-            given[begin + sums.index(kernel.inputs["gathered"][store.index])] = value
-            continue
-        base, offset = step.sites.places[kernel.inputs["site"][store.index]]
-        number = layout.bar(base)
-        if any(offset):
-            given.setdefault(places[number, offset], value)
-        else:
-            used.add(number)
-            stores.append(f"bar_{number}[i] += {value};")
-    arrays = [*(h.array for h in handed), *range(begin, begin + len(sums))]
-    given |= {array: "0.0" for array in arrays if array not in given}
-    stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
-    head += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sorted(used)]
-    for array in given:
-        head.append(f"    double *restrict handed_{array} = row->handed[{array}]{layout.at(0)};")
-        if step.sites.colours > 1:
-            head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
-    body = names.loaded()
-    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    body += [*stores, *(f"share{k}[i - begin] = {value};" for k, (_, value) in enumerate(shares))]
-    text = _looped(name, layout, sweep, [*head, *(f"    {line}" for line in names.pointers())], body, shares)
-    arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
-    return Loop(kernel.name + form, kernel.purpose, arguments, text)
-
-
-def _looped(
-    name: str, layout: Layout, sweep: Sweep, head: Sequence[str], body: Sequence[str], shares: Sequence[tuple[int, str]]
-) -> str:
-    """The loop over sites; where they have shares in sums, over so many of them at once that these are kept apart."""
-    coloured = layout.step.sites.colours > 1
-    begin, end = ("begin", "end") if shares else ("from", "to")
-    start = f"{name}_first(row, {sweep.colour}, {begin})" if coloured else begin
-    onward = f"i += {layout.colour_step}" if coloured else "++i"
-    loop = [f"{name}_EACH_SITE", f"for (ptrdiff_t i = {start}; i < {end}; {onward}) {{"]
-    loop += [*(f"    {line}" for line in body), "}"]
-    if not shares:
-        return "\n".join([*head, "    (void)sums;", *(f"    {line}" for line in loop)]) + "\n"
-    kept = ", ".join(f"share{k}[{name}_ADDED]" for k in range(len(shares)))
-    inner = [f"const ptrdiff_t end = to - begin < {name}_ADDED ? to : begin + {name}_ADDED;"]
-    if coloured:
-        inner += [f"memset(share{k}, 0, sizeof share{k});" for k in range(len(shares))]
-    inner += [*loop, *(f"sums[{c}] += {name}_added(share{k}, end - begin);" for k, (c, _) in enumerate(shares))]
-    lines = [f"double {kept};", f"for (ptrdiff_t begin = from; begin < to; begin += {name}_ADDED) {{"]
-    return "\n".join([*head, *(f"    {line}" for line in [*lines, *(f"    {line}" for line in inner), "}"])]) + "\n"
-
-
-def _unused(code: Code) -> list[str]:
-    return [] if any(isinstance(s, Symbol) and s.kind == COEFFICIENT for s in code.used) else ["    (void)coef;"]
-
-
-def _ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> Iterator[str]:
-    """What copies the ends of rows of what is handed along them; beyond open ends there is nothing."""
-    if layout.step.sites.open[-1]:
-        return
-    for array in sorted({h.array for h in handed if h.offset[-1]}):
-        yield f"{program.name}_ends(handed[{array}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);"
-
-
-def _handing(program: Program, layout: Layout, part: int, handed: Sequence[Handed]) -> Loop:
-    """The second go of a part: a site at an offset from another is handed what that has for it."""
-    sums: dict[int, list[str]] = {}
-    pointers: dict[str, str] = {}
-    for h in handed:
-        back = tuple(-o for o in h.offset)
-        line = layout.line(back)
-        pointer = f"handed_{h.array}" + (f"_{line}" if line else "")
-        pointers[pointer] = f"const double *restrict {pointer} = row->handed[{h.array}]{layout.at(line)};"
-        sums.setdefault(h.base, []).append(beside(pointer, back[-1]))
-    lines = [f"    {text}" for text in pointers.values()]
-    lines += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sums]
-    lines += [f"    {program.name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
-    lines += [f"        bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]
-    purpose = f"what sites are handed by those around that the sweeps of H_{part} have changed"
-    arguments = f"const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
-    return Loop(f"hand{part}", purpose, arguments, "\n".join([*lines, "    }"]) + "\n")
+def _sums(program: Program, step: Sweeps) -> str:
+    """How many sums there are of each piece of a row."""
+    beside = f" + {program.name}_NUMBERS" * bool(step.equation and step.partners)
+    return f"{program.name}_COEFFICIENTS{beside}"
 
 
 def _givers(program: Program) -> list[str]:

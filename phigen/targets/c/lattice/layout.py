@@ -10,6 +10,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import VARIED, Gather, Partners, Sweeps
+from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
@@ -127,6 +128,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "NUMBERED": any(p.at == "all" for p in program.parameters),
         "HANDS": any(hands(step)),
         "SHARES": shares(step),
+        "STARTS": starts_are_read(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "BANDED": banded,
@@ -157,6 +159,8 @@ def hands(step: Sweeps) -> list[bool]:
     """Of each part of H whether its transpose gives anything to other sites."""
     found: list[bool] = []
     back = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
+    if step.equation and step.adjoint:
+        return [True]
     for part in step.parts if step.adjoint else ():
         read = [(s, e) for sweep in part for s, e in back[sweep.kernel.name + BACK].along("site")]
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
@@ -165,13 +169,18 @@ def hands(step: Sweeps) -> list[bool]:
 
 
 def shares(step: Sweeps) -> bool:
-    """Whether sites have shares in the cotangents of coefficients."""
-    swept = [sweep for part in step.parts for sweep in part]
-    names = {sweep.kernel.name + BACK for sweep in swept}
-    if step.partners and not step.partners.graph:
-        names |= {kernel.name + BACK for sweep in swept if sweep.gather for kernel in sweep.gather.kernels}
-    kernels = [kernel for kernel in step.adjoint.steps if kernel.name in names] if step.adjoint else []
-    return any(not e.is_zero for kernel in kernels for _, e in kernel.along(TABLE))
+    """Whether sites have shares in sums over all of them: the cotangents of coefficients, or of parameters."""
+    kernels = step.adjoint.steps if step.adjoint else ()
+    if step.partners and step.partners.graph:
+        kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
+    summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
+    return any(not e.is_zero for along in summed for _, e in along)
+
+
+def starts_are_read(step: Sweeps) -> bool:
+    """Whether the transpose of a stage reads x at its start, beside y."""
+    relax = next((k for k in step.adjoint.steps if k.name == "relax" + BACK), None) if step.adjoint else None
+    return relax is not None and not {*relax.inputs.get("start", ())}.isdisjoint(symbols_of(*relax.roots))
 
 
 def bounds(weight: str) -> list[tuple[int, int]]:

@@ -23,6 +23,9 @@ from phigen.targets.code import Store, lower
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 
+#: Cotangents that all sites add up.
+_SUMS = ("coef_bar", "params_bar")
+
 
 def gathering_back(program: Program, layout: Layout, ends: Ends, kernel: Kernel, first: int) -> Iterator[Loop]:
     """The loops for the ends of bonds or pairs, where the cotangents of sums are in arrays from the first on."""
@@ -51,19 +54,22 @@ def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end)
     other, own = names.of_pair()
     stores = [s for s in code.stores if not s.value.is_zero]
-    bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array != "coef_bar"}
+    bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array not in _SUMS}
     head = names.pointers()
-    head += [f"const double *handed_{first + k} = row->handed[{first + k}];" for k in range(count)]
+    used = [k for k, s in enumerate(kernel.inputs["sums_bar"]) if s in code.used]
+    head += [f"const double *handed_{first + k} = row->handed[{first + k}];" for k in used]
     head += [f"double *bar_{k} = row->bar[{k}];" for k in sorted(set(bars.values()))]
-    head += ["(void)sums;"] * all(s.array != "coef_bar" for s in stores)
-    head += ["(void)coef;"] * code.used.isdisjoint(kernel.inputs["coef"])
+    source = "params" if "params" in kernel.inputs else "coef"
+    head += ["(void)sums;"] * all(s.array != f"{source}_bar" for s in stores)
+    head += [f"(void){source};"] * code.used.isdisjoint(kernel.inputs[source])
     values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     shown = [names.show(s.value) for s in stores]
     if layout.graph:
         text = _over_bonds(layout, ends, stores, shown, bars, head, own, [*other, *values])
     else:
         text = _over_pairs(name, stores, shown, bars, head, own, other, values)
-    arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
+    kind = "double" if source == "coef" else f"{name}_params"
+    arguments = f"const {kind} *{source}, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
     said = "the site where the sum is" if end == "a" else "the other site"
     return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
 
@@ -86,11 +92,11 @@ def _over_bonds(
 ) -> str:
     """A loop over sites, in it one over their bonds."""
     loop, passed = bonds_of(ends)
-    shares = [k for k, s in enumerate(stores) if s.array == "coef_bar"]
+    shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
     sites = [k for k, s in enumerate(stores) if s.array == "site_bar"]
     inner = [*passed, "const ptrdiff_t j = row->other[k];" * any("[j]" in v for v in values), *values]
     for k, (store, value) in enumerate(zip(stores, shown, strict=True)):
-        kept = {"coef_bar": f"share{k}", "site_bar": f"own{k}"}
+        kept = {**dict.fromkeys(_SUMS, f"share{k}"), "site_bar": f"own{k}"}
         inner.append(f"{kept.get(store.array, f'bar_{bars.get(k)}[k]')} += {value};")
     lines = [*head, *(f"double share{k} = 0.0;" for k in shares), "for (ptrdiff_t i = from; i < to; ++i) {"]
     lines += [f"    {line}" for line in [*own, *(f"double own{k} = 0.0;" for k in sites), loop]]
@@ -111,7 +117,7 @@ def _over_pairs(
     values: Sequence[str],
 ) -> str:
     """A loop over all sites, in it one over those of a piece."""
-    shares = [k for k, s in enumerate(stores) if s.array == "coef_bar"]
+    shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
     inner = [*own, *values]
     for k, value in enumerate(shown):
         inner.append(f"{f'share{k}[i - from]' if k in shares else f'bar_{bars[k]}[i]'} += i == j ? 0.0 : {value};")

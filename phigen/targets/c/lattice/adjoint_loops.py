@@ -1,0 +1,160 @@
+"""The loops that pull cotangents back through a kernel at sites, in two goes: see `adjoint`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.symbolic.symbols import COEFFICIENT, Symbol
+from phigen.targets.c.lattice.layout import Layout
+from phigen.targets.c.lattice.loops import Loop, in_loops
+from phigen.targets.c.lattice.names import SiteNames, beside
+from phigen.targets.code import Code, Store, lower
+
+
+@dataclass(frozen=True)
+class Handed:
+    """A value that a kernel hands to the site at an offset: the number of its array, and the number of that of bars."""
+
+    array: int
+    base: int
+    offset: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Seeds:
+    """Where the cotangents of what a kernel finds are read, which are symbols of a ``kind``: in arrays of cotangents by
+    their numbers, ``bars``, or if these are empty in the variation that rows tell of; the ``colour`` of the sites."""
+
+    kind: str
+    pointers: tuple[str, ...]
+    bars: tuple[int, ...] = ()
+    colour: int = 0
+
+    def declared(self, code: Code, here: str) -> list[str]:
+        """The declarations of those pointers that are not cotangents to be added to."""
+        read = {int(s.key[0]) for s in code.used if isinstance(s, Symbol) and s.kind == self.kind}
+        if self.bars:
+            return []
+        return [f"    const double *restrict {self.pointers[k]} = row->varied[{k}]{here};" for k in sorted(read)]
+
+
+def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
+    """What a kernel hands to sites beside, in arrays from the first on: one for values that are the same."""
+    arrays: dict[int, int] = {}
+    found = []
+    for name, value in kernel.along("site"):
+        base, offset = layout.step.sites.places[name]
+        if any(offset) and not value.is_zero:
+            array = arrays.setdefault(id(value), first + len(arrays))
+            found.append(Handed(array, layout.bar(base), offset))
+    return found
+
+
+def first_loop(
+    program: Program,
+    layout: Layout,
+    kernel: Kernel,
+    form: str,
+    seeds: Seeds,
+    sums: Sequence[str],
+    handed: Sequence[Handed],
+    begin: int,
+) -> Loop:
+    """The first go of a kernel; cotangents of ``sums`` over bonds or pairs are handed in arrays from ``begin`` on."""
+    name, code, step = program.name, lower(kernel), layout.step
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), sums, {seeds.kind: seeds.pointers})
+    head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
+    used, given = {*seeds.bars}, dict[int, str]()
+    places = {(h.base, h.offset): h.array for h in handed}
+    for store in (s for s in code.stores if not s.value.is_zero):
+        value = names.show(store.value)
+        if store.array == "coef_bar":
+            shares.append((store.index, value))
+            continue
+        if store.array == "gathered_bar":
+            given[begin + sums.index(kernel.inputs["gathered"][store.index])] = value
+            continue
+        base, offset = _place(layout, kernel, store)
+        number = layout.bar(base)
+        if any(offset):
+            given.setdefault(places[number, offset], value)
+        else:
+            used.add(number)
+            stores.append(f"bar_{number}[i] += {value};")
+    arrays = [*(h.array for h in handed), *range(begin, begin + len(sums))]
+    given |= {array: "0.0" for array in arrays if array not in given}
+    stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
+    head += seeds.declared(code, layout.at(0))
+    head += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sorted(used)]
+    for array in given:
+        head.append(f"    double *restrict handed_{array} = row->handed[{array}]{layout.at(0)};")
+        if step.sites.colours > 1:
+            head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
+    body = names.loaded()
+    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
+    body += [*stores, *(f"share{k}[i - begin] = {value};" for k, (_, value) in enumerate(shares))]
+    text = _looped(name, layout, seeds.colour, [*head, *(f"    {line}" for line in names.pointers())], body, shares)
+    arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
+    return Loop(kernel.name + form, kernel.purpose, arguments, text)
+
+
+def _looped(
+    name: str, layout: Layout, colour: int, head: Sequence[str], body: Sequence[str], shares: Sequence[tuple[int, str]]
+) -> str:
+    """The loop over sites; where they have shares in sums, over so many of them at once that these are kept apart."""
+    coloured = layout.step.sites.colours > 1
+    begin, end = ("begin", "end") if shares else ("from", "to")
+    start = f"{name}_first(row, {colour}, {begin})" if coloured else begin
+    onward = f"i += {layout.colour_step}" if coloured else "++i"
+    loop = [f"{name}_EACH_SITE", f"for (ptrdiff_t i = {start}; i < {end}; {onward}) {{"]
+    loop += [*(f"    {line}" for line in body), "}"]
+    if not shares:
+        return "\n".join([*head, "    (void)sums;", *(f"    {line}" for line in loop)]) + "\n"
+    kept = ", ".join(f"share{k}[{name}_ADDED]" for k in range(len(shares)))
+    inner = [f"const ptrdiff_t end = to - begin < {name}_ADDED ? to : begin + {name}_ADDED;"]
+    if coloured:
+        inner += [f"memset(share{k}, 0, sizeof share{k});" for k in range(len(shares))]
+    inner += [*loop, *(f"sums[{c}] += {name}_added(share{k}, end - begin);" for k, (c, _) in enumerate(shares))]
+    lines = [f"double {kept};", f"for (ptrdiff_t begin = from; begin < to; begin += {name}_ADDED) {{"]
+    return "\n".join([*head, *(f"    {line}" for line in [*lines, *(f"    {line}" for line in inner), "}"])]) + "\n"
+
+
+def _place(layout: Layout, kernel: Kernel, store: Store) -> tuple[str, tuple[int, ...]]:
+    """The field or parameter that a cotangent is of, and the offset of its site."""
+    if store.array == "start_bar":
+        return str(kernel.inputs["start"][store.index].key[0]), ()  # type: ignore[attr-defined]
+    return layout.step.sites.places[kernel.inputs["site"][store.index]]
+
+
+def _unused(code: Code) -> list[str]:
+    return [] if any(isinstance(s, Symbol) and s.kind == COEFFICIENT for s in code.used) else ["    (void)coef;"]
+
+
+def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> Iterator[str]:
+    """What copies the ends of rows of what is handed along them; beyond open ends there is nothing."""
+    if layout.step.sites.open[-1]:
+        return
+    for array in sorted({h.array for h in handed if h.offset[-1]}):
+        yield f"{program.name}_ends(at.row.handed[{array}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);"
+
+
+def handing(program: Program, layout: Layout, name: str, whom: str, handed: Sequence[Handed]) -> Loop:
+    """The second go of a part: a site at an offset from another is handed what that has for it."""
+    sums: dict[int, list[str]] = {}
+    pointers: dict[str, str] = {}
+    for h in handed:
+        back = tuple(-o for o in h.offset)
+        line = layout.line(back)
+        pointer = f"handed_{h.array}" + (f"_{line}" if line else "")
+        pointers[pointer] = f"const double *restrict {pointer} = row->handed[{h.array}]{layout.at(line)};"
+        sums.setdefault(h.base, []).append(beside(pointer, back[-1]))
+    lines = [f"    {text}" for text in pointers.values()]
+    lines += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sums]
+    lines += [f"    {program.name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines += [f"        bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]
+    purpose = f"what sites are handed by those around that {whom}"
+    arguments = f"const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
+    return Loop(name, purpose, arguments, "\n".join([*lines, "    }"]) + "\n")

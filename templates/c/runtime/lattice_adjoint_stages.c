@@ -1,0 +1,122 @@
+#ifndef PHI_FILE_LATTICE_ADJOINT_STAGES
+#define PHI_FILE_LATTICE_ADJOINT_STAGES
+#include <math.h>
+#include <string.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "lattice_trail.c"
+
+/* ---- The transpose of stages ---- */
+/* y solves y = r(x, y), and x moves by a(y): the cotangent m of y solves m = (dr/dy)^T m + (da/dy)^T v, where v is that of x after the
+   stage, and that of x before it is v + (dr/dx)^T m. The equation for m is solved as that for y is, by the same code. */
+
+/* Add the cotangent of a row. */
+static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
+{
+    for (size_t f = 0; f < PHI_DIM; ++f) {
+        phi_put(s, g->row_bar[f], row_bar + f * s->sites);
+        for (size_t i = 0; i < g->block; ++i) (g->bar[f] - PHI_LEAD)[i] += (g->row_bar[f] - PHI_LEAD)[i];
+    }
+    (void)steps;
+}
+
+/* Pull cotangents back through a stage, from the y that it has kept. */
+static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept, int stage)
+{
+    const double *coef = s->coef + stage * PHI_ROW;
+    double *side[PHI_BARS], *m[PHI_BARS];
+    memcpy(side, g->bar, sizeof side);
+    memcpy(side, g->row_bar, sizeof *side * PHI_DIM);
+    for (size_t f = 0; f < PHI_DIM; ++f) {
+        s->y[2][f] = kept + f * g->block + PHI_LEAD;
+#if PHI_STARTS
+        s->x[f] = s->y[2][f] + PHI_DIM * g->block;
+#endif
+        memset(side[f] - PHI_LEAD, 0, g->block * sizeof **side);
+    }
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(phi_units(s), &first);
+        phi_pull_rows(s, PHI_ADVANCE_BACK, coef, g->bar, side, side, first, end);
+    }
+    int now = 0;
+    s->side = side;
+    phi_predict(s, side, stage);
+    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, 1, &now);
+    if (status != PHI_OK) {
+        s->stiff = 1;
+        now = 0;
+        phi_predict(s, side, stage);
+        status = phi_newton(s, coef, HUGE_VAL, &now);
+    }
+    s->side = NULL;
+    if (status != PHI_OK) return PHI_SINGULAR;
+#if PHI_GUESSES
+    phi_remember(s, side, stage, now);
+#endif
+    memcpy(m, s->y[now], sizeof *m * PHI_DIM);
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(phi_units(s), &first);
+        phi_pull_rows(s, PHI_RELAX_BACK, coef, m, g->bar, g->bar, first, end);
+    }
+    return PHI_OK;
+}
+
+/* Pull cotangents back through the step after so many, from what its stages have kept. */
+static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, double *kept)
+{
+    double *x[PHI_DIM], *left = kept + g->of_step;
+    phi_status status = PHI_OK;
+    memcpy(x, s->x, sizeof x);
+    for (int stage = PHI_STAGES - 1; stage >= 0; --stage) {
+#if PHI_TIMED
+        s->now = phi_time_after(s, steps) + phi_middles[stage] * s->h;
+#endif
+#if PHI_RENEWED
+        phi_refresh(s->coef + stage * PHI_ROW, s->now, s->coef + stage * PHI_ROW + PHI_PREPARED);
+#endif
+        left -= PHI_KEPT * PHI_DIM * g->block;
+        if (status == PHI_OK) status = phi_stage_back(s, g, left, stage);
+    }
+    memcpy(s->x, x, sizeof x);
+    (void)steps;
+    return status;
+}
+
+/* Take the steps from done to until, of a run that has not ended before; rows, where not NULL, get the states after stride, 2 stride, ...
+   steps and at the end, from where guesses begin anew, as those of phi_integrate do. The y of stages are kept if so wanted. */
+static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
+    double *rows, int keeping)
+{
+    phi_status status = PHI_OK;
+    double *kept = g->kept;
+    for (; done < until && status == PHI_OK; kept += g->of_step) {
+        if (rows != NULL && done % stride == 0) phi_forget(s);
+        s->kept = keeping ? kept : NULL;
+        status = phi_try(s);
+        if (status != PHI_OK) break;
+        phi_stand(s, s->steps + 1);
+        ++done;
+        if (rows != NULL && (done == steps || done % stride == 0))
+            phi_take(s, s->x, rows + (done - 1) / stride * PHI_DIM * s->sites);
+    }
+    s->kept = NULL;
+    return status;
+}
+
+/* Stand after all steps, or before them. */
+static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_status status)
+{
+    if (status == PHI_OK && steps > 0) {
+        phi_copy(s->x, g->end, s);
+        phi_stand(s, g->first_step + steps);
+    } else {
+        g->count = 1;
+        phi_return(s, g);
+    }
+    return status;
+}
+#endif

@@ -1,0 +1,72 @@
+#ifndef PHI_FILE_LATTICE_BACK
+#define PHI_FILE_LATTICE_BACK
+#include <string.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+
+/* ---- The transpose of sweeps ---- */
+#if PHI_SHARES
+#if PHI_GATHER
+enum { PHI_ADDED = 2 * PHI_PIECE }; /* sites whose shares in a sum are kept apart before they are added */
+#else
+enum { PHI_ADDED = 256 }; /* sites whose shares in a sum are kept apart before they are added */
+#endif
+
+/* The sum of some values, in an order that lets loops vectorise. */
+static inline double phi_added(const double *values, ptrdiff_t count)
+{
+    double lanes[8] = { 0.0 }, sum = 0.0;
+    const ptrdiff_t whole = count - count % 8;
+    for (ptrdiff_t i = 0; i < whole; i += 8)
+        for (int l = 0; l < 8; ++l) lanes[l] += values[i + l];
+    for (ptrdiff_t i = whole; i < count; ++i) sum += values[i];
+    for (int l = 0; l < 8; ++l) sum += lanes[l];
+    return sum;
+}
+
+#endif
+#if !PHI_ONE_ROW
+/* The rows from which a row is handed what is its own; beyond open ends a row of zeros after all others. */
+static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
+{
+    ptrdiff_t place[PHI_AXES];
+    phi_place(s, index, place);
+    for (int k = 0; k < PHI_LINES; ++k) {
+        at[k] = s->lines[index * PHI_LINES + (size_t)k];
+        for (int a = 0; a < PHI_AXES - 1; ++a) {
+            const ptrdiff_t p = place[a] + phi_lines[k][a];
+            if (phi_open[a] && (p < 0 || p >= (ptrdiff_t)s->sizes[a])) at[k] = (ptrdiff_t)s->rows * s->width;
+        }
+    }
+}
+
+#endif
+#include "adjoint_sweeps.h"
+#if PHI_SERIES
+
+/* to = from, or 0, with what v gives by the transpose of a kernel where y is s->y[2], for pieces of rows: all threads come here at once. */
+static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from,
+    double *const *to, size_t first, size_t end)
+{
+    for (size_t unit = first; unit < end && from != to; ++unit) {
+        const phi_piece at = phi_piece_of(s, unit);
+        for (int k = 0; k < PHI_DIM; ++k) {
+            double *sum = to[k] + at.row.at[0];
+            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][at.row.at[0] + i];
+        }
+    }
+    phi_back_rows(s, kernel, coef, v, to, s->shares + (coef - s->coef), first, end);
+#if PHI_HANDS
+    if (!phi_hands[kernel - 1]) return;
+    phi_wait();
+#if PHI_GATHER
+    phi_hand_rows(s, kernel, to, s->shares + PHI_COEFFICIENTS, first, end);
+#else
+    phi_hand_rows(s, kernel, to, first, end);
+#endif
+#endif
+}
+#endif
+#endif

@@ -1,0 +1,154 @@
+#ifndef PHI_FILE_LATTICE_TRAIL
+#define PHI_FILE_LATTICE_TRAIL
+#include <stdint.h>
+#include <string.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "lattice_back.c"
+
+/* ---- What is kept to go back ---- */
+/* What is pulled back through steps, and the memory for it. */
+typedef struct {
+    double *bar[PHI_BARS];       /* cotangents of the fields, then of parameters at sites, and at the bonds of each site */
+    double *row_bar[PHI_BARS];   /* those of the fields of one row, and the same of parameters */
+    double *handed[PHI_HANDED];  /* what sites hand to those that they have read */
+    double *sums;                /* of each piece of a row those of the coefficients */
+#if PHI_SERIES
+    double *kept;                /* of each step of a segment, and each of its stages, y and what else its transpose reads */
+    double *end[PHI_DIM];        /* what steps after the last go on from */
+#else
+    double *kept;                /* of each step of a segment, and each of its sweeps, the fields before that it changes */
+    double *x[PHI_ARRAYS];       /* the fields before what was gone back through last */
+    double *end[PHI_DIM];        /* what steps after the last go on from, */
+    size_t last_far;             /* and how many of these by functions for large arguments */
+#endif
+    size_t block, of_step;       /* numbers of one field, and that a step keeps */
+    double *states;              /* what segments begin with ... */
+#if PHI_SERIES
+    size_t *marks;               /* ... and of each the number of its step */
+#else
+    size_t *marks;               /* ... and of each the number of its step, then of steps by functions for large arguments */
+#endif
+    size_t most, count;          /* how many there may be, and are */
+    size_t longest;              /* most steps of a segment */
+    size_t first_step;           /* steps that were made before */
+} phi_transpose;
+
+#if PHI_SERIES
+/* The numbers that a step keeps. */
+static size_t phi_numbers_kept(const phi_solver *s) { return PHI_STAGES * PHI_KEPT * PHI_DIM * phi_block(s->rows, s->width); }
+
+/* Stand after so many steps. */
+static void phi_stand(phi_solver *s, size_t steps)
+{
+    s->steps = steps;
+    s->t = s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
+#if PHI_TIMED
+    s->now = s->t;
+#endif
+}
+
+#endif
+#if PHI_BOND_PARAMETERS
+/* Room for values at the bonds of each site. */
+static size_t phi_at_bonds(const phi_solver *s) { return ((size_t)s->bonds[s->sites] + 7) / 8 * 8; }
+
+#endif
+/* The numbers that any transpose has room for. */
+static size_t phi_always(const phi_solver *s)
+{
+    const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
+    size_t numbers = (PHI_ARRAYS + 2 * PHI_DIM) * block + PHI_HANDED * (block + (size_t)s->width);
+#if PHI_BOND_PARAMETERS
+    numbers += PHI_BOND_ARRAYS * phi_at_bonds(s);
+#endif
+    return numbers + units * PHI_SUMS;
+}
+
+/* The bytes of the state that a segment begins with. */
+static size_t phi_state_size(const phi_solver *s)
+{
+    return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double) + 2 * sizeof(size_t);
+}
+
+size_t phi_trail_size(const phi_solver *s, size_t steps)
+{
+    const size_t of_step = phi_numbers_kept(s) * sizeof(double);
+    if (steps > SIZE_MAX / 8 / of_step) return 0;
+    return phi_always(s) * sizeof(double) + steps * of_step + phi_state_size(s) + 64;
+}
+
+/* Share memory out, all that is not taken in any case between what the steps of a segment keep and the states that segments
+   begin with: as few of these as there may be, or half and half where all that is too little for two runs. */
+static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
+{
+    double *next = (double *)(void *)((char *)memory + (64 - (uintptr_t)memory % 64) % 64);
+    const size_t block = phi_block(s->rows, s->width), room = size - 64 - phi_always(s) * sizeof *next;
+    const size_t of_state = phi_state_size(s);
+    memset(next, 0, phi_always(s) * sizeof *next);
+    memset(g, 0, sizeof *g);
+    g->block = block;
+    g->of_step = phi_numbers_kept(s);
+    const size_t of_step = g->of_step * sizeof *next, fit = (room - of_state) / of_step;
+    g->longest = fit < steps ? fit : steps > 0 ? steps : 1;
+    while (g->longest > 1 && (room - g->longest * of_step) / of_state < steps / g->longest + 1)
+        g->longest -= (g->longest + 7) / 8;
+    g->most = (room - g->longest * of_step) / of_state;
+    if (g->most < steps / g->longest + 1) {
+        g->longest = fit > 2 ? fit / 2 : 1;
+        g->most = (room - g->longest * of_step) / of_state;
+    }
+    for (int f = 0; f < PHI_ARRAYS; ++f, next += block) g->bar[f] = g->row_bar[f] = next + PHI_LEAD;
+    for (int f = 0; f < PHI_DIM; ++f, next += block) g->row_bar[f] = next + PHI_LEAD;
+    for (int f = 0; f < PHI_DIM; ++f, next += block) g->end[f] = next + PHI_LEAD;
+    for (int k = 0; k < PHI_HANDED; ++k, next += block + (size_t)s->width) g->handed[k] = next + PHI_LEAD;
+#if PHI_BOND_PARAMETERS
+    for (int k = PHI_ARRAYS; k < PHI_BARS; ++k, next += phi_at_bonds(s)) g->bar[k] = g->row_bar[k] = next;
+#endif
+    g->states = next;
+    g->kept = next + g->most * PHI_DIM * block;
+    g->sums = g->kept + g->longest * g->of_step;
+    g->marks = (size_t *)(void *)(g->sums + phi_units(s) * PHI_SUMS);
+    memset(g->sums, 0, phi_units(s) * PHI_SUMS * sizeof *next);
+}
+
+/* The fields of the state that a segment begins with. */
+static void phi_fields_of_state(const phi_transpose *g, size_t number, double *fields[PHI_DIM])
+{
+    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = g->states + (number * PHI_DIM + f) * g->block + PHI_LEAD;
+}
+
+/* Another segment begins here, after so many steps. */
+static void phi_mark(const phi_solver *s, phi_transpose *g, size_t done)
+{
+    double *fields[PHI_DIM];
+    phi_fields_of_state(g, g->count, fields);
+    phi_copy(fields, s->x, s);
+    g->marks[2 * g->count] = done;
+#if !PHI_SERIES
+    g->marks[2 * g->count + 1] = s->far;
+#endif
+    ++g->count;
+}
+
+/* Go back to where the last segment begins; returns the number of its step. */
+static size_t phi_return(phi_solver *s, const phi_transpose *g)
+{
+    double *fields[PHI_DIM];
+    const size_t done = g->marks[2 * (g->count - 1)];
+    phi_fields_of_state(g, g->count - 1, fields);
+    phi_copy(s->x, fields, s);
+#if PHI_SERIES
+    phi_stand(s, g->first_step + done);
+    phi_forget(s);
+#else
+    phi_copy(s->before, fields, s);
+    s->far = g->marks[2 * (g->count - 1) + 1];
+    s->steps = g->first_step + done;
+    s->open = PHI_FLOWS > 1 && done > 0;
+#endif
+    return done;
+}
+#endif
