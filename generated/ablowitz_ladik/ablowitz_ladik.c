@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e9ae7cdabb97f6238bce9bcb9b0fa707386991acec918002cd7a2f793d92a76f
+ * body-sha256: 9d888122731d1549dfd0df699e760632c90d670faa2623ce5e192967f1255b06
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -61,7 +61,7 @@ static int ablowitz_ladik_allowed(const ablowitz_ladik_params *params, size_t si
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void ablowitz_ladik_prepare(const ablowitz_ladik_params *params, double h, double coef[restrict 4])
 {
     (void)params;

@@ -2,7 +2,7 @@
  * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2fbec0742fd019ccb2e96e45a4b320fad214663d159873715bd6885a4e5aca1d
+ * body-sha256: a70cfd203db795be2f7efeb89046d1e2c9e2e130f93b1777d49b55283ebde3d9
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define ablowitz_ladik_AXES 1
 #define ablowitz_ladik_DIM 2
 #define ablowitz_ladik_ORDER 4
@@ -29,10 +28,8 @@ enum { ablowitz_ladik_ARRAYS = 2 };         /* arrays over the sites: fields, th
 enum { ablowitz_ladik_COEFFICIENTS = 104 }; /* numbers that depend on params and h only */
 
 /* How a step ends; ablowitz_ladik_status_string says it in words. */
-typedef enum {
-    ablowitz_ladik_OK = 0, ablowitz_ladik_NO_CONVERGENCE, ablowitz_ladik_SINGULAR, ablowitz_ladik_NOT_FINITE,
-        ablowitz_ladik_BAD_ARGUMENT
-} ablowitz_ladik_status;
+typedef enum { ablowitz_ladik_OK = 0, ablowitz_ladik_NO_CONVERGENCE, ablowitz_ladik_SINGULAR,
+    ablowitz_ladik_NOT_FINITE, ablowitz_ladik_BAD_ARGUMENT } ablowitz_ladik_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with ablowitz_ladik_init; a copy of the struct is the

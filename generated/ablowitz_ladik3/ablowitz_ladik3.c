@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 0c726fb5999ed2992bed41803049b5512daac38d0eff55dd548e5e557926008d
+ * body-sha256: b55e0ca04c373cd534d2869648574bb438b28a9385b8af3731628b7ca8255536
  */
 #include "ablowitz_ladik3.h"
 #include <float.h>
@@ -33,7 +33,7 @@ enum { ablowitz_ladik3_FIXED = 1 };   /* values that are constant along a path *
 static const double ablowitz_ladik3_fractions[ablowitz_ladik3_STAGES] = { 0.4144907717943757,
     0.4144907717943757, -0.6579630871775028, 0.4144907717943757, 0.4144907717943757 };
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double h, double coef[3])
 {
     (void)params;
@@ -42,7 +42,8 @@ static void ablowitz_ladik3_prepare(const ablowitz_ladik3_params *params, double
     coef[2] = (-4.0) * h;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void ablowitz_ladik3_generate(const double coef[3], const double y[6], double slope[6],
     double jacobian[36])
 {
@@ -531,8 +532,8 @@ ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const abl
     const double x0[ablowitz_ladik3_DIM])
 {
     if (s == NULL || x0 == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
-    ablowitz_ladik3_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : ablowitz_ladik3_default_params };
+    if (params == NULL) params = &ablowitz_ladik3_default_params;
+    ablowitz_ladik3_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!ablowitz_ladik3_finite(fresh.x, ablowitz_ladik3_DIM)) return ablowitz_ladik3_BAD_ARGUMENT;
     *s = fresh;
@@ -640,16 +641,16 @@ size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s) { retu
 ablowitz_ladik3_status ablowitz_ladik3_ensemble(const ablowitz_ladik3_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    ablowitz_ladik3_status worst = isfinite(h) ? ablowitz_ladik3_OK : ablowitz_ladik3_BAD_ARGUMENT;
+    ablowitz_ladik3_status result = isfinite(h) ? ablowitz_ladik3_OK : ablowitz_ladik3_BAD_ARGUMENT;
     if (x == NULL && members > 0) return ablowitz_ladik3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         ablowitz_ladik3_solver s;
         for (size_t i = 0; i < ablowitz_ladik3_DIM; ++i) s.x[i] = x[i * members + m];
-        ablowitz_ladik3_status member = ablowitz_ladik3_init(&s, params, s.x);
-        if (member == ablowitz_ladik3_OK) member = ablowitz_ladik3_integrate(&s, h, steps);
+        ablowitz_ladik3_status ended = ablowitz_ladik3_init(&s, params, s.x);
+        if (ended == ablowitz_ladik3_OK) ended = ablowitz_ladik3_integrate(&s, h, steps);
         for (size_t i = 0; i < ablowitz_ladik3_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == ablowitz_ladik3_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == ablowitz_ladik3_OK) result = ended;
     }
-    return worst;
+    return result;
 }

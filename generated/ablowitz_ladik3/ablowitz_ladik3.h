@@ -2,7 +2,7 @@
  * ablowitz_ladik3.h: the declarations; ablowitz_ladik3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ade62bd4bd8457c0eb2b5d25aa79048a457de953e534802343bfe971894e1c98
+ * body-sha256: 409e4fd8cb690721c6adb6d5890b33dccddcdaefdd1d5f081ee0fdc6c840f408
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define ablowitz_ladik3_DIM 6
 #define ablowitz_ladik3_ORDER 4
 #define ablowitz_ladik3_CASIMIRS 0
@@ -26,10 +25,8 @@ typedef struct {
 extern const ablowitz_ladik3_params ablowitz_ladik3_default_params;
 
 /* How a step ends; ablowitz_ladik3_status_string says it in words. */
-typedef enum {
-    ablowitz_ladik3_OK = 0, ablowitz_ladik3_NO_CONVERGENCE, ablowitz_ladik3_SINGULAR,
-        ablowitz_ladik3_NOT_FINITE, ablowitz_ladik3_BAD_ARGUMENT
-} ablowitz_ladik3_status;
+typedef enum { ablowitz_ladik3_OK = 0, ablowitz_ladik3_NO_CONVERGENCE, ablowitz_ladik3_SINGULAR,
+    ablowitz_ladik3_NOT_FINITE, ablowitz_ladik3_BAD_ARGUMENT } ablowitz_ladik3_status;
 const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status);
 
 enum { ablowitz_ladik3_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 8331d364c4d60cde36db4686238ceb887a7cb9dc773145c94658f17d4fce26f0
+# body-sha256: 438f80c71a66accaa253e561b9577d434676a8e54084843781a07846fb114985
 import numpy as np
 
 VERSION = "0.1.0"
@@ -117,8 +117,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     x1 = y[..., 0]
     y1 = y[..., 1]
     x2 = y[..., 2]

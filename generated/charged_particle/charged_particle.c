@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 80fc902e4022bf03a398632d6d9234464ef1885a71c293834cf9d5ec32c117ba
+ * body-sha256: 6edf61c3ff2a3b3b4589c5131f04b1591de682e011e286ef061af341009a9526
  */
 #include "charged_particle.h"
 #include <float.h>
@@ -28,7 +28,7 @@ enum { charged_particle_TERMS = 30 };
 enum { charged_particle_SERIES = 19 }; /* of a path, those of the coordinates first */
 enum { charged_particle_FIXED = 1 };   /* values that are constant along a path */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void charged_particle_prepare(const charged_particle_params *params, double h, double coef[14])
 {
     (void)params;
@@ -50,7 +50,8 @@ static void charged_particle_prepare(const charged_particle_params *params, doub
     coef[13] = t4;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void charged_particle_generate(const double coef[14], const double y[6], double slope[6],
     double jacobian[36])
 {
@@ -513,8 +514,8 @@ charged_particle_status charged_particle_init(charged_particle_solver *s,
     const charged_particle_params *params, const double x0[charged_particle_DIM])
 {
     if (s == NULL || x0 == NULL) return charged_particle_BAD_ARGUMENT;
-    charged_particle_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : charged_particle_default_params };
+    if (params == NULL) params = &charged_particle_default_params;
+    charged_particle_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!charged_particle_finite(fresh.x, charged_particle_DIM)) return charged_particle_BAD_ARGUMENT;
     *s = fresh;
@@ -603,16 +604,16 @@ size_t charged_particle_solver_steps_done(const charged_particle_solver *s) { re
 charged_particle_status charged_particle_ensemble(const charged_particle_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    charged_particle_status worst = isfinite(h) ? charged_particle_OK : charged_particle_BAD_ARGUMENT;
+    charged_particle_status result = isfinite(h) ? charged_particle_OK : charged_particle_BAD_ARGUMENT;
     if (x == NULL && members > 0) return charged_particle_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         charged_particle_solver s;
         for (size_t i = 0; i < charged_particle_DIM; ++i) s.x[i] = x[i * members + m];
-        charged_particle_status member = charged_particle_init(&s, params, s.x);
-        if (member == charged_particle_OK) member = charged_particle_integrate(&s, h, steps);
+        charged_particle_status ended = charged_particle_init(&s, params, s.x);
+        if (ended == charged_particle_OK) ended = charged_particle_integrate(&s, h, steps);
         for (size_t i = 0; i < charged_particle_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == charged_particle_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == charged_particle_OK) result = ended;
     }
-    return worst;
+    return result;
 }

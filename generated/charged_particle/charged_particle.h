@@ -2,7 +2,7 @@
  * charged_particle.h: the declarations; charged_particle.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1a77cf484ae80f17e0c4036ab14f1cfc0a9c10fc1f1ae6cc3e095b03d02d28cd
+ * body-sha256: 45256399f05cd8bce4aa62031b7c6d1cb425d949f325c7d7b0881bf90d028080
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define charged_particle_DIM 6
 #define charged_particle_ORDER 4
 #define charged_particle_CASIMIRS 0
@@ -25,10 +24,8 @@ typedef struct {
 extern const charged_particle_params charged_particle_default_params;
 
 /* How a step ends; charged_particle_status_string says it in words. */
-typedef enum {
-    charged_particle_OK = 0, charged_particle_NO_CONVERGENCE, charged_particle_SINGULAR,
-        charged_particle_NOT_FINITE, charged_particle_BAD_ARGUMENT
-} charged_particle_status;
+typedef enum { charged_particle_OK = 0, charged_particle_NO_CONVERGENCE, charged_particle_SINGULAR,
+    charged_particle_NOT_FINITE, charged_particle_BAD_ARGUMENT } charged_particle_status;
 const char *charged_particle_status_string(charged_particle_status status);
 
 enum { charged_particle_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -9,7 +9,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 717f09ad698d8a08af049bf42d5f86dab4944f18347a1a4a21705f8db0525d80
+# body-sha256: f493833dc8bc18fc872c196d3f205b1d90521d9f999541e3b0ddf64c64a9e0d2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -135,8 +135,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     x = y[..., 0]
     y_ = y[..., 1]
     z = y[..., 2]

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 95d5783a637f4b6d3c1ea13e3130199b3f6f48a59d52c6501f3d68ba5c734309
+ * body-sha256: 0458a3c4cceb991489287de66e2f56f9a15e226914fbcc86fc79222458582650
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -65,7 +65,7 @@ static int chiral_magnet_allowed(const chiral_magnet_params *params, size_t site
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void chiral_magnet_prepare(const chiral_magnet_params *params, double h, double coef[restrict 5])
 {
     coef[0] = h;

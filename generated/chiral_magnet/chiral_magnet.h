@@ -2,7 +2,7 @@
  * chiral_magnet.h: the declarations; chiral_magnet.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e3247dfc5143c4995a054c558cc2a3dcf9b5a4f08dac354cf42cb5d76335ae0a
+ * body-sha256: 2940718a6660e850324849651d8aba6048698f201f7991e0e9104206bcc6ab6e
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define chiral_magnet_AXES 1
 #define chiral_magnet_DIM 3
 #define chiral_magnet_ORDER 2
@@ -36,10 +35,8 @@ enum { chiral_magnet_GATHERED = 3 };      /* sums over other sites that are held
 enum { chiral_magnet_BOND_ARRAYS = 2 };   /* parameters at bonds */
 
 /* How a step ends; chiral_magnet_status_string says it in words. */
-typedef enum {
-    chiral_magnet_OK = 0, chiral_magnet_NO_CONVERGENCE, chiral_magnet_SINGULAR, chiral_magnet_NOT_FINITE,
-        chiral_magnet_BAD_ARGUMENT
-} chiral_magnet_status;
+typedef enum { chiral_magnet_OK = 0, chiral_magnet_NO_CONVERGENCE, chiral_magnet_SINGULAR,
+    chiral_magnet_NOT_FINITE, chiral_magnet_BAD_ARGUMENT } chiral_magnet_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with chiral_magnet_init; a copy of the struct is the same

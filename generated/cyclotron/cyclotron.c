@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: cf962599488282f4ecd322cf83c62ded4e0e1582f5fc37568189ba514dfec217
+ * body-sha256: 11d6256140787870be1d5252de964cf2ae9fb580c4b962ab9aaa8b69911686a4
  */
 #include "cyclotron.h"
 #include <float.h>
@@ -25,7 +25,7 @@ const cyclotron_params cyclotron_default_params = { 0 };
 enum { cyclotron_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define cyclotron_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void cyclotron_prepare(const cyclotron_params *params, double h, double coef[3])
 {
     (void)params;
@@ -35,8 +35,8 @@ static void cyclotron_prepare(const cyclotron_params *params, double h, double c
     coef[2] = 1.0 / 6.0 * t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void cyclotron_linearise(const double coef[3], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -274,8 +274,8 @@ cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *par
     const double x0[cyclotron_DIM])
 {
     if (s == NULL || x0 == NULL) return cyclotron_BAD_ARGUMENT;
-    cyclotron_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : cyclotron_default_params };
+    if (params == NULL) params = &cyclotron_default_params;
+    cyclotron_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!cyclotron_finite(fresh.x, cyclotron_DIM)) return cyclotron_BAD_ARGUMENT;
     *s = fresh;
@@ -358,16 +358,16 @@ size_t cyclotron_solver_steps_done(const cyclotron_solver *s) { return s->steps;
 cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    cyclotron_status worst = isfinite(h) ? cyclotron_OK : cyclotron_BAD_ARGUMENT;
+    cyclotron_status result = isfinite(h) ? cyclotron_OK : cyclotron_BAD_ARGUMENT;
     if (x == NULL && members > 0) return cyclotron_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         cyclotron_solver s;
         for (size_t i = 0; i < cyclotron_DIM; ++i) s.x[i] = x[i * members + m];
-        cyclotron_status member = cyclotron_init(&s, params, s.x);
-        if (member == cyclotron_OK) member = cyclotron_integrate(&s, h, steps);
+        cyclotron_status ended = cyclotron_init(&s, params, s.x);
+        if (ended == cyclotron_OK) ended = cyclotron_integrate(&s, h, steps);
         for (size_t i = 0; i < cyclotron_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == cyclotron_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == cyclotron_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * cyclotron.h: the declarations; cyclotron.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 04b413a55eac735c4866a797f0225f6c2a30210f4bbf1d624d580c5101049866
+ * body-sha256: ad4c6ba6850f893bee50a6ae31f88fb2d3b4f846100747d52376907f6aba1432
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define cyclotron_DIM 3
 #define cyclotron_ORDER 4
 #define cyclotron_CASIMIRS 1
@@ -25,10 +24,8 @@ typedef struct {
 extern const cyclotron_params cyclotron_default_params;
 
 /* How a step ends; cyclotron_status_string says it in words. */
-typedef enum {
-    cyclotron_OK = 0, cyclotron_NO_CONVERGENCE, cyclotron_SINGULAR, cyclotron_NOT_FINITE,
-        cyclotron_BAD_ARGUMENT
-} cyclotron_status;
+typedef enum { cyclotron_OK = 0, cyclotron_NO_CONVERGENCE, cyclotron_SINGULAR, cyclotron_NOT_FINITE,
+    cyclotron_BAD_ARGUMENT } cyclotron_status;
 const char *cyclotron_status_string(cyclotron_status status);
 
 enum { cyclotron_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 48412adaf47f5a2bfcf1bec1cd9ba6a401211f0275b6a89f11fadee30f426ab8
+ * body-sha256: 79489c0963a9d823fc6ef8813fb4272d71c0fd055e91b5e74b62033af87c42c7
  */
 #include "dnls.h"
 #include <float.h>
@@ -61,7 +61,7 @@ static int dnls_allowed(const dnls_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void dnls_prepare(const dnls_params *params, double h, double coef[restrict 2])
 {
     coef[0] = h;

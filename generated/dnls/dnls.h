@@ -2,7 +2,7 @@
  * dnls.h: the declarations; dnls.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d844630029098cae9dbc68a027ad2dae6c0038f39c98583854d06dc631c2d8de
+ * body-sha256: 95ef82d8dfbbd09a6e562b41d64740755a844aeae013408e8e9512cdd30a661b
  */
 #ifndef DNLS_H
 #define DNLS_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define dnls_AXES 1
 #define dnls_DIM 2
 #define dnls_ORDER 4
@@ -29,9 +28,8 @@ enum { dnls_ARRAYS = 2 };        /* arrays over the sites: fields, then paramete
 enum { dnls_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 
 /* How a step ends; dnls_status_string says it in words. */
-typedef enum {
-    dnls_OK = 0, dnls_NO_CONVERGENCE, dnls_SINGULAR, dnls_NOT_FINITE, dnls_BAD_ARGUMENT
-} dnls_status;
+typedef enum { dnls_OK = 0, dnls_NO_CONVERGENCE, dnls_SINGULAR, dnls_NOT_FINITE,
+    dnls_BAD_ARGUMENT } dnls_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with dnls_init; a copy of the struct is the same solver,

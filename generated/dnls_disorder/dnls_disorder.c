@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9f1ac39a8472f0b498ff80b3aa12a6851d33c77184d05a34f155274110c2e169
+ * body-sha256: 8f5cc49800dedc361a395e2e28412e9de51958929ef742e13baecbaa0dbc192b
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -64,7 +64,7 @@ static int dnls_disorder_allowed(const dnls_disorder_params *params, size_t site
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void dnls_disorder_prepare(const dnls_disorder_params *params, double h, double coef[restrict 2])
 {
     coef[0] = h;

@@ -2,7 +2,7 @@
  * dnls_disorder.h: the declarations; dnls_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f0d93950712c0a309da00ba7cf09ee234c992dbd6aad44fc7ec551f1986d9017
+ * body-sha256: 459b1c7d6bf916878b678998f08e6d18ad2b98bd8fc300253b585b7de7d8852d
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define dnls_disorder_AXES 1
 #define dnls_disorder_DIM 2
 #define dnls_disorder_ORDER 4
@@ -30,10 +29,8 @@ enum { dnls_disorder_ARRAYS = 3 };        /* arrays over the sites: fields, then
 enum { dnls_disorder_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 
 /* How a step ends; dnls_disorder_status_string says it in words. */
-typedef enum {
-    dnls_disorder_OK = 0, dnls_disorder_NO_CONVERGENCE, dnls_disorder_SINGULAR, dnls_disorder_NOT_FINITE,
-        dnls_disorder_BAD_ARGUMENT
-} dnls_disorder_status;
+typedef enum { dnls_disorder_OK = 0, dnls_disorder_NO_CONVERGENCE, dnls_disorder_SINGULAR,
+    dnls_disorder_NOT_FINITE, dnls_disorder_BAD_ARGUMENT } dnls_disorder_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with dnls_disorder_init; a copy of the struct is the same

@@ -16,7 +16,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 72e1799070634371d506b3a44fbc1661d308241dac57733052a59436eece39d2
+ * body-sha256: 30c019dc236fb87885f4eb2970da639b71914ae82d61c24fc267c59b22ebd60f
  */
 #include "double_well.h"
 #include <float.h>
@@ -41,13 +41,13 @@ static int double_well_allowed(const double_well_params *params)
         && params->gamma > 0.0 && isfinite(params->T) && params->T > 0.0;
 }
 
-/* everything that depends on the increments of the noise, but not on the state */
+/* Everything that depends on the increments of the noise, but not on the state. */
 static void double_well_at_step(const double coef[9], const double dw[1], double now[1])
 {
     now[0] = coef[8] * dw[0];
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void double_well_prepare(const double_well_params *params, double h, double coef[9])
 {
     const double t1 = params->barrier * h, t2 = params->gamma * h;
@@ -62,8 +62,8 @@ static void double_well_prepare(const double_well_params *params, double h, doub
     coef[8] = sqrt(2.0 * (params->T * params->gamma));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void double_well_linearise(const double coef[10], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
@@ -336,8 +336,8 @@ double_well_status double_well_init(double_well_solver *s, const double_well_par
     const double x0[double_well_DIM])
 {
     if (s == NULL || x0 == NULL) return double_well_BAD_ARGUMENT;
-    double_well_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : double_well_default_params };
+    if (params == NULL) params = &double_well_default_params;
+    double_well_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     double_well_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!double_well_finite(fresh.x, double_well_DIM) || !double_well_allowed(&fresh.params)
@@ -428,7 +428,7 @@ size_t double_well_solver_steps_done(const double_well_solver *s) { return s->st
 double_well_status double_well_ensemble_of(const double_well_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
 {
-    double_well_status worst = isfinite(h) ? double_well_OK : double_well_BAD_ARGUMENT;
+    double_well_status result = isfinite(h) ? double_well_OK : double_well_BAD_ARGUMENT;
     size_t earliest = members;
     if (x == NULL && members > 0) return double_well_BAD_ARGUMENT;
 #ifdef _OPENMP
@@ -437,21 +437,21 @@ double_well_status double_well_ensemble_of(const double_well_params *params, dou
     for (size_t m = 0; m < members; ++m) {
         double_well_solver s;
         for (size_t i = 0; i < double_well_DIM; ++i) s.x[i] = x[i * members + m];
-        double_well_status member = double_well_init(&s, params, s.x);
-        if (member == double_well_OK) double_well_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
-        if (member == double_well_OK) member = double_well_integrate(&s, h, steps);
+        double_well_status ended = double_well_init(&s, params, s.x);
+        if (ended == double_well_OK) double_well_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
+        if (ended == double_well_OK) ended = double_well_integrate(&s, h, steps);
         for (size_t i = 0; i < double_well_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (member == double_well_OK) continue;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (ended == double_well_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
 #endif
         if (m < earliest) {
             earliest = m;
-            worst = member;
+            result = ended;
         }
     }
-    return worst;
+    return result;
 }
 
 double_well_status double_well_ensemble(const double_well_params *params, double *x, size_t members, double h,

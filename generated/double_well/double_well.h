@@ -2,7 +2,7 @@
  * double_well.h: the declarations; double_well.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7f6c8d05c6ef28af8575b83cd91d04d7c1ebcc87a2e591244db9d0b6137a6876
+ * body-sha256: e91be10f473e0de7216b9053eb64d03a1c4e3caacab951e79433b350d8886852
  */
 #ifndef DOUBLE_WELL_H
 #define DOUBLE_WELL_H
@@ -11,7 +11,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define double_well_DIM 2
 #define double_well_ORDER 2
 #define double_well_CASIMIRS 0
@@ -31,10 +30,8 @@ typedef struct {
 extern const double_well_params double_well_default_params;
 
 /* How a step ends; double_well_status_string says it in words. */
-typedef enum {
-    double_well_OK = 0, double_well_NO_CONVERGENCE, double_well_SINGULAR, double_well_NOT_FINITE,
-        double_well_BAD_ARGUMENT
-} double_well_status;
+typedef enum { double_well_OK = 0, double_well_NO_CONVERGENCE, double_well_SINGULAR, double_well_NOT_FINITE,
+    double_well_BAD_ARGUMENT } double_well_status;
 const char *double_well_status_string(double_well_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with double_well_init. */

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 021bbfce744e3644cdb6b3ae409a40f9213ae0abc0f662114bb5ec7a49a5e610
+ * body-sha256: da05015b906fd414bc300df4ebb0bc6e255a62fb3da450604bc7fe520bec12e7
  */
 #include "duffing.h"
 #include <float.h>
@@ -35,7 +35,7 @@ static int duffing_allowed(const duffing_params *params)
     return isfinite(params->A) && isfinite(params->omega) && params->omega > 0.0;
 }
 
-/* everything that depends on the time, but not on the state */
+/* Everything that depends on the time, but not on the state. */
 static void duffing_at_time(const double coef[22], double t, double now[11])
 {
     const double t1 = coef[14] * t, t2 = cos(t1), t3 = coef[16] * t2, t4 = sin(t1), t5 = coef[19] * t4;
@@ -53,7 +53,7 @@ static void duffing_at_time(const double coef[22], double t, double now[11])
     now[10] = (-0.5) * t3;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void duffing_prepare(const duffing_params *params, double h, double coef[22])
 {
     const double t1 = h * h, t2 = h * t1, t3 = t2 * (0.125 - 3.0 / 80.0 * t1);
@@ -86,8 +86,8 @@ static void duffing_prepare(const duffing_params *params, double h, double coef[
     coef[21] = t9 * t2 * (1.0 / 12.0 + t1 * (-1.0 / 120.0 - t10));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void duffing_linearise(const double coef[33], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
@@ -317,7 +317,8 @@ duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, 
     double t0)
 {
     if (s == NULL || x0 == NULL || !isfinite(t0)) return duffing_BAD_ARGUMENT;
-    duffing_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params : duffing_default_params };
+    if (params == NULL) params = &duffing_default_params;
+    duffing_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     duffing_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
@@ -416,18 +417,18 @@ size_t duffing_solver_steps_done(const duffing_solver *s) { return s->steps; }
 duffing_status duffing_ensemble_at(const duffing_params *params, double *x, size_t members, double t0,
     double h, size_t steps, unsigned char *status)
 {
-    duffing_status worst = isfinite(h) ? duffing_OK : duffing_BAD_ARGUMENT;
+    duffing_status result = isfinite(h) ? duffing_OK : duffing_BAD_ARGUMENT;
     if (x == NULL && members > 0) return duffing_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         duffing_solver s;
         for (size_t i = 0; i < duffing_DIM; ++i) s.x[i] = x[i * members + m];
-        duffing_status member = duffing_init_at(&s, params, s.x, t0);
-        if (member == duffing_OK) member = duffing_integrate(&s, h, steps);
+        duffing_status ended = duffing_init_at(&s, params, s.x, t0);
+        if (ended == duffing_OK) ended = duffing_integrate(&s, h, steps);
         for (size_t i = 0; i < duffing_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == duffing_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == duffing_OK) result = ended;
     }
-    return worst;
+    return result;
 }
 
 duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t members, double h,

@@ -2,7 +2,7 @@
  * duffing.h: the declarations; duffing.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4673778570137c98b3b5886f31a336a3d57665d59345320014e985be46822b16
+ * body-sha256: 6085385a1efb266139f08651126666fe0b61ba9829b7398038d725208c563f4f
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define duffing_DIM 2
 #define duffing_ORDER 6
 #define duffing_CASIMIRS 0
@@ -26,9 +25,8 @@ typedef struct {
 extern const duffing_params duffing_default_params;
 
 /* How a step ends; duffing_status_string says it in words. */
-typedef enum {
-    duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing_NOT_FINITE, duffing_BAD_ARGUMENT
-} duffing_status;
+typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing_NOT_FINITE,
+    duffing_BAD_ARGUMENT } duffing_status;
 const char *duffing_status_string(duffing_status status);
 
 enum { duffing_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

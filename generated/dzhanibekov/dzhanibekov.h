@@ -2,7 +2,7 @@
  * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ddace1d14fd0ca9c093134334f0dedd87c15f0b3f6d53cc6e7c6af8d3df3f3e4
+ * body-sha256: 20e457a99e0e6325d8c8193119b909d8a096db3ddf716fe7877101d389ad4e84
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define dzhanibekov_DIM 3
 #define dzhanibekov_ORDER 6
 #define dzhanibekov_CASIMIRS 1
@@ -31,10 +30,8 @@ typedef struct {
 extern const dzhanibekov_params dzhanibekov_default_params;
 
 /* How a step ends; dzhanibekov_status_string says it in words. */
-typedef enum {
-    dzhanibekov_OK = 0, dzhanibekov_NO_CONVERGENCE, dzhanibekov_SINGULAR, dzhanibekov_NOT_FINITE,
-        dzhanibekov_BAD_ARGUMENT
-} dzhanibekov_status;
+typedef enum { dzhanibekov_OK = 0, dzhanibekov_NO_CONVERGENCE, dzhanibekov_SINGULAR, dzhanibekov_NOT_FINITE,
+    dzhanibekov_BAD_ARGUMENT } dzhanibekov_status;
 const char *dzhanibekov_status_string(dzhanibekov_status status);
 
 enum { dzhanibekov_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
@@ -97,16 +94,6 @@ dzhanibekov_status dzhanibekov_kick(dzhanibekov_solver *s, const double change[d
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 dzhanibekov_status dzhanibekov_ensemble(const dzhanibekov_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* Many members with attitudes, in place, each by itself as dzhanibekov_integrate makes it; with OpenMP,
-   members in parallel: x[i * members + m] is coordinate i of member m, attitude[i * members + m] number i of
-   its attitude in the order of dzhanibekov_attitude, at its start, then at its end. What differs from member
-   to member is given as for a single one, params may be NULL for the defaults. frames and attitudes (or NULL)
-   receive what x and attitude are after every stride-th step, those after (k + 1) * stride steps as row k,
-   NaN where a member failed before. Arrays must not overlap. */
-dzhanibekov_status dzhanibekov_ensemble_attitudes(const dzhanibekov_params *params, double *x,
-    double *attitude, size_t members, const double *gauge, const double *h, size_t steps, size_t stride,
-    double *frames, double *attitudes, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double dzhanibekov_hamiltonian(const dzhanibekov_params *params, const double x[dzhanibekov_DIM]);

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 6f360ff3df88dc3f049108fe2e135b9c48cf1dfc0ca07e9b74c9bd71065d696d
+# body-sha256: 0a25e6093378bd87b19aa6e4c22d7a80803d9163fea1435612284db4ed8e3d59
 import numpy as np
 
 VERSION = "0.1.0"
@@ -545,7 +545,8 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]
@@ -780,10 +781,10 @@ def _first(attitude0):
     q = _numbers(attitude0)
     if q.shape[-1:] != (4,) or not np.isfinite(q).all():
         raise ValueError("attitude0 must be finite quaternions (..., 4)")
-    return _normalised(q.reshape(-1, 4))
+    return _unit(q.reshape(-1, 4))
 
 
-def _normalised(q):
+def _unit(q):
     """Quaternions divided by their lengths."""
     largest = np.abs(q).max(axis=-1, keepdims=True)
     if not (largest > 0.0).all():

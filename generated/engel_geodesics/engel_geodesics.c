@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 5dfee5a5edbafca72ac25149415a13b2d7146acb4a5e34023fde31b1057d0add
+ * body-sha256: 80ac67423d2caa0c29775606299cd1f630792cffdd6371c6a38b9dc4570c6c19
  */
 #include "engel_geodesics.h"
 #include <float.h>
@@ -25,7 +25,7 @@ const engel_geodesics_params engel_geodesics_default_params = { 0 };
 enum { engel_geodesics_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define engel_geodesics_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void engel_geodesics_prepare(const engel_geodesics_params *params, double h, double coef[3])
 {
     (void)params;
@@ -35,8 +35,8 @@ static void engel_geodesics_prepare(const engel_geodesics_params *params, double
     coef[2] = 1.0 / 6.0 * t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void engel_geodesics_linearise(const double coef[3], const double y[4], double displacement[4],
     double increment[4], double jacobian[16], double increment_jacobian[16])
 {
@@ -303,8 +303,8 @@ engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const eng
     const double x0[engel_geodesics_DIM])
 {
     if (s == NULL || x0 == NULL) return engel_geodesics_BAD_ARGUMENT;
-    engel_geodesics_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : engel_geodesics_default_params };
+    if (params == NULL) params = &engel_geodesics_default_params;
+    engel_geodesics_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!engel_geodesics_finite(fresh.x, engel_geodesics_DIM)) return engel_geodesics_BAD_ARGUMENT;
     *s = fresh;
@@ -393,16 +393,16 @@ size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s) { retu
 engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    engel_geodesics_status worst = isfinite(h) ? engel_geodesics_OK : engel_geodesics_BAD_ARGUMENT;
+    engel_geodesics_status result = isfinite(h) ? engel_geodesics_OK : engel_geodesics_BAD_ARGUMENT;
     if (x == NULL && members > 0) return engel_geodesics_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         engel_geodesics_solver s;
         for (size_t i = 0; i < engel_geodesics_DIM; ++i) s.x[i] = x[i * members + m];
-        engel_geodesics_status member = engel_geodesics_init(&s, params, s.x);
-        if (member == engel_geodesics_OK) member = engel_geodesics_integrate(&s, h, steps);
+        engel_geodesics_status ended = engel_geodesics_init(&s, params, s.x);
+        if (ended == engel_geodesics_OK) ended = engel_geodesics_integrate(&s, h, steps);
         for (size_t i = 0; i < engel_geodesics_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == engel_geodesics_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == engel_geodesics_OK) result = ended;
     }
-    return worst;
+    return result;
 }

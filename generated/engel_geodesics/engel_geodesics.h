@@ -2,7 +2,7 @@
  * engel_geodesics.h: the declarations; engel_geodesics.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 21db396c56d0a00c296471503909f22da359e4af68a1f4a81a252e4bc88846e2
+ * body-sha256: b3254bb7c7135383e1b78fa7fcda8dca5300621f7dd08ab799e681a31e45c093
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define engel_geodesics_DIM 4
 #define engel_geodesics_ORDER 4
 #define engel_geodesics_CASIMIRS 2
@@ -25,10 +24,8 @@ typedef struct {
 extern const engel_geodesics_params engel_geodesics_default_params;
 
 /* How a step ends; engel_geodesics_status_string says it in words. */
-typedef enum {
-    engel_geodesics_OK = 0, engel_geodesics_NO_CONVERGENCE, engel_geodesics_SINGULAR,
-        engel_geodesics_NOT_FINITE, engel_geodesics_BAD_ARGUMENT
-} engel_geodesics_status;
+typedef enum { engel_geodesics_OK = 0, engel_geodesics_NO_CONVERGENCE, engel_geodesics_SINGULAR,
+    engel_geodesics_NOT_FINITE, engel_geodesics_BAD_ARGUMENT } engel_geodesics_status;
 const char *engel_geodesics_status_string(engel_geodesics_status status);
 
 enum { engel_geodesics_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: dd0789d765a0541cd810cdd388ed85133ce9cb483da66c1b0925c890e5fe2e87
+ * body-sha256: 650d4f316be775c140fc0b9da4f55e411331a8b1ae1bfc0b0240378aa2945940
  */
 #include "food_web.h"
 #include <float.h>
@@ -70,7 +70,7 @@ static int food_web_allowed(const food_web_params *params, size_t sites, size_t 
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void food_web_prepare(const food_web_params *params, double h, double coef[restrict 1])
 {
     (void)params;

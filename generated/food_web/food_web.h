@@ -2,7 +2,7 @@
  * food_web.h: the declarations; food_web.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a9b5def4ce6694d95c6f2c86937fb791e2a2134fd06ce5f5049e44ef3c6dfe18
+ * body-sha256: 933dfdbb4e1fefbcf0bdddd2b1972e1bc7123b6eec35ada2b96a9c116b5198bb
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define food_web_AXES 1
 #define food_web_DIM 1
 #define food_web_ORDER 4
@@ -32,9 +31,8 @@ enum { food_web_GATHERED = 1 };      /* sums over other sites that are held for 
 enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 
 /* How a step ends; food_web_status_string says it in words. */
-typedef enum {
-    food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE, food_web_BAD_ARGUMENT
-} food_web_status;
+typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
+    food_web_BAD_ARGUMENT } food_web_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with food_web_init; a copy of the struct is the same

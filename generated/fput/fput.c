@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: cc9af07414966eac26b5864759d6dd197bf272834ad84e19e15fa4eab4326363
+ * body-sha256: 8b1d11decad03d6f013492501e70cda881f08ba1247f9c05051045d69035e93c
  */
 #include "fput.h"
 #include <float.h>
@@ -63,7 +63,7 @@ static int fput_allowed(const fput_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void fput_prepare(const fput_params *params, double h, double coef[restrict 4])
 {
     coef[0] = params->beta;

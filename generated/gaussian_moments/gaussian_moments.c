@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 44bb2cf79559d82b8014fa57ee92c60a2dc7cd59ad9a1b8629fc0afe0dec32a9
+ * body-sha256: d00f9e942217fcedef27f3458bd1007310fa133aa0aea7e0cd8f7c2afbb56c91
  */
 #include "gaussian_moments.h"
 #include <float.h>
@@ -82,7 +82,7 @@ static double gaussian_moments_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void gaussian_moments_prepare(const gaussian_moments_params *params, double h, double coef[14])
 {
     const double t1 = h * h, t2 = t1 * t1, t3 = h * t2, t4 = params->g * params->g, t5 = t3 * t4;
@@ -103,8 +103,8 @@ static void gaussian_moments_prepare(const gaussian_moments_params *params, doub
     coef[13] = 36.0 / 5.0 * t7;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void gaussian_moments_linearise(const double coef[14], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -379,8 +379,8 @@ gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     const gaussian_moments_params *params, const double x0[gaussian_moments_DIM])
 {
     if (s == NULL || x0 == NULL) return gaussian_moments_BAD_ARGUMENT;
-    gaussian_moments_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : gaussian_moments_default_params };
+    if (params == NULL) params = &gaussian_moments_default_params;
+    gaussian_moments_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     gaussian_moments_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!gaussian_moments_finite(fresh.x, gaussian_moments_DIM) || !gaussian_moments_allowed(&fresh.params)
@@ -472,16 +472,16 @@ size_t gaussian_moments_solver_steps_done(const gaussian_moments_solver *s) { re
 gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    gaussian_moments_status worst = isfinite(h) ? gaussian_moments_OK : gaussian_moments_BAD_ARGUMENT;
+    gaussian_moments_status result = isfinite(h) ? gaussian_moments_OK : gaussian_moments_BAD_ARGUMENT;
     if (x == NULL && members > 0) return gaussian_moments_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         gaussian_moments_solver s;
         for (size_t i = 0; i < gaussian_moments_DIM; ++i) s.x[i] = x[i * members + m];
-        gaussian_moments_status member = gaussian_moments_init(&s, params, s.x);
-        if (member == gaussian_moments_OK) member = gaussian_moments_integrate(&s, h, steps);
+        gaussian_moments_status ended = gaussian_moments_init(&s, params, s.x);
+        if (ended == gaussian_moments_OK) ended = gaussian_moments_integrate(&s, h, steps);
         for (size_t i = 0; i < gaussian_moments_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == gaussian_moments_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == gaussian_moments_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * gaussian_moments.h: the declarations; gaussian_moments.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 97d222d85da8bbb744631f68c725e0665079068c1ae83f23e91d590696e52bca
+ * body-sha256: a9f5ea731f5b9934ed25d5204a9b87e4fecbad256045ce46948bd9a2913a74c8
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define gaussian_moments_DIM 3
 #define gaussian_moments_ORDER 6
 #define gaussian_moments_CASIMIRS 1
@@ -26,10 +25,8 @@ typedef struct {
 extern const gaussian_moments_params gaussian_moments_default_params;
 
 /* How a step ends; gaussian_moments_status_string says it in words. */
-typedef enum {
-    gaussian_moments_OK = 0, gaussian_moments_NO_CONVERGENCE, gaussian_moments_SINGULAR,
-        gaussian_moments_NOT_FINITE, gaussian_moments_BAD_ARGUMENT
-} gaussian_moments_status;
+typedef enum { gaussian_moments_OK = 0, gaussian_moments_NO_CONVERGENCE, gaussian_moments_SINGULAR,
+    gaussian_moments_NOT_FINITE, gaussian_moments_BAD_ARGUMENT } gaussian_moments_status;
 const char *gaussian_moments_status_string(gaussian_moments_status status);
 
 enum { gaussian_moments_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

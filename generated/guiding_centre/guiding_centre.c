@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 9f4df12b488167fb37cfbe97c829d215560eac832623d2d03fb41c3fc3dbcb7c
+ * body-sha256: ceeb1d7aa440af542e643fd3fe1e3661f98838fc8fc9e391109c484a2d7ddeb8
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -40,7 +40,7 @@ static int guiding_centre_allowed(const guiding_centre_params *params)
         && params->k > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void guiding_centre_prepare(const guiding_centre_params *params, double h, double coef[5])
 {
     const double t1 = params->kappa * params->kappa;
@@ -51,7 +51,8 @@ static void guiding_centre_prepare(const guiding_centre_params *params, double h
     coef[4] = params->kappa;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void guiding_centre_generate(const double coef[5], const double y[4], double slope[4],
     double jacobian[16])
 {
@@ -618,8 +619,8 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     const double x0[guiding_centre_DIM])
 {
     if (s == NULL || x0 == NULL) return guiding_centre_BAD_ARGUMENT;
-    guiding_centre_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : guiding_centre_default_params };
+    if (params == NULL) params = &guiding_centre_default_params;
+    guiding_centre_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     guiding_centre_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!guiding_centre_finite(fresh.x, guiding_centre_DIM) || !guiding_centre_allowed(&fresh.params)
@@ -728,16 +729,16 @@ size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s) { return
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    guiding_centre_status worst = isfinite(h) ? guiding_centre_OK : guiding_centre_BAD_ARGUMENT;
+    guiding_centre_status result = isfinite(h) ? guiding_centre_OK : guiding_centre_BAD_ARGUMENT;
     if (x == NULL && members > 0) return guiding_centre_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         guiding_centre_solver s;
         for (size_t i = 0; i < guiding_centre_DIM; ++i) s.x[i] = x[i * members + m];
-        guiding_centre_status member = guiding_centre_init(&s, params, s.x);
-        if (member == guiding_centre_OK) member = guiding_centre_integrate(&s, h, steps);
+        guiding_centre_status ended = guiding_centre_init(&s, params, s.x);
+        if (ended == guiding_centre_OK) ended = guiding_centre_integrate(&s, h, steps);
         for (size_t i = 0; i < guiding_centre_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == guiding_centre_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == guiding_centre_OK) result = ended;
     }
-    return worst;
+    return result;
 }

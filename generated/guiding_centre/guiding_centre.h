@@ -2,7 +2,7 @@
  * guiding_centre.h: the declarations; guiding_centre.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d1a745c4842a91d05863abd333064c4699332173896a8cb230aed75d6751ab05
+ * body-sha256: 27c3acf928b468b95d7b2a16c0883758fb2bdab5973b578e12d91b0691c72660
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define guiding_centre_DIM 4
 #define guiding_centre_ORDER 4
 #define guiding_centre_CASIMIRS 0
@@ -28,10 +27,8 @@ typedef struct {
 extern const guiding_centre_params guiding_centre_default_params;
 
 /* How a step ends; guiding_centre_status_string says it in words. */
-typedef enum {
-    guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR, guiding_centre_NOT_FINITE,
-        guiding_centre_BAD_ARGUMENT
-} guiding_centre_status;
+typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR,
+    guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
 const char *guiding_centre_status_string(guiding_centre_status status);
 
 enum { guiding_centre_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

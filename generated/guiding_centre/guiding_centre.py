@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: a6b4e66d0fb735b6213872c282f7739779455809a7ecf0ae4527ed8a2bf79157
+# body-sha256: 175187e77fcbc961a097eca29554b812ab5a7a838daf96d94f35e7518e7c4c4b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -124,8 +124,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     x = y[..., 0]
     y_ = y[..., 1]
     z = y[..., 2]

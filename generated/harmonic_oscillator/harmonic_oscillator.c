@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: bde4982ed0d57adb353d7fb599a9809cbf1f8a24b402d5d6b3740c44cffb574a
+ * body-sha256: 534f67b23d571e2d291d08f5bb3ed472eeee4a72bbc656179b536e38c88b10d0
  */
 #include "harmonic_oscillator.h"
 #include <float.h>
@@ -32,7 +32,7 @@ static int harmonic_oscillator_allowed(const harmonic_oscillator_params *params)
     return isfinite(params->m) && params->m > 0.0 && isfinite(params->k) && params->k > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params, double h, double coef[5])
 {
     const double t1 = 1.0 / params->m, t2 = 0.5 + 1.0 / 24.0 * (t1 * (params->k * (h * h)));
@@ -44,8 +44,8 @@ static void harmonic_oscillator_prepare(const harmonic_oscillator_params *params
     coef[4] = (-2.0) * t3;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void harmonic_oscillator_linearise(const double coef[5], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
@@ -123,8 +123,8 @@ static int harmonic_oscillator_solve(double matrix[harmonic_oscillator_DIM * har
     for (int k = 0; k < harmonic_oscillator_DIM; ++k) {
         int best = k;
         for (int i = k + 1; i < harmonic_oscillator_DIM; ++i)
-            if (fabs(matrix[i * harmonic_oscillator_DIM + k]) > fabs(matrix[best * harmonic_oscillator_DIM
-                + k])) best = i;
+            if (fabs(matrix[i * harmonic_oscillator_DIM + k])
+                > fabs(matrix[best * harmonic_oscillator_DIM + k])) best = i;
         const double pivot = matrix[best * harmonic_oscillator_DIM + k], last = side[k];
         if (!(fabs(pivot) > 0.0)) return 0;
         for (int j = k; j < harmonic_oscillator_DIM && best != k; ++j) {
@@ -282,8 +282,8 @@ harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *
     const harmonic_oscillator_params *params, const double x0[harmonic_oscillator_DIM])
 {
     if (s == NULL || x0 == NULL) return harmonic_oscillator_BAD_ARGUMENT;
-    harmonic_oscillator_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : harmonic_oscillator_default_params };
+    if (params == NULL) params = &harmonic_oscillator_default_params;
+    harmonic_oscillator_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     harmonic_oscillator_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!harmonic_oscillator_finite(fresh.x, harmonic_oscillator_DIM)
@@ -378,17 +378,17 @@ size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s
 harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    harmonic_oscillator_status worst = isfinite(h) ? harmonic_oscillator_OK
+    harmonic_oscillator_status result = isfinite(h) ? harmonic_oscillator_OK
         : harmonic_oscillator_BAD_ARGUMENT;
     if (x == NULL && members > 0) return harmonic_oscillator_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         harmonic_oscillator_solver s;
         for (size_t i = 0; i < harmonic_oscillator_DIM; ++i) s.x[i] = x[i * members + m];
-        harmonic_oscillator_status member = harmonic_oscillator_init(&s, params, s.x);
-        if (member == harmonic_oscillator_OK) member = harmonic_oscillator_integrate(&s, h, steps);
+        harmonic_oscillator_status ended = harmonic_oscillator_init(&s, params, s.x);
+        if (ended == harmonic_oscillator_OK) ended = harmonic_oscillator_integrate(&s, h, steps);
         for (size_t i = 0; i < harmonic_oscillator_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == harmonic_oscillator_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == harmonic_oscillator_OK) result = ended;
     }
-    return worst;
+    return result;
 }

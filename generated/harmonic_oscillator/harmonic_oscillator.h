@@ -2,7 +2,7 @@
  * harmonic_oscillator.h: the declarations; harmonic_oscillator.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3c29cb3fedfa15eac656b1818d37622a898f9a8f2baf65bb2edb6a42352ed81c
+ * body-sha256: 876d7acebf15a060f3b990ece809432bb84561d9434058cf75cd438eccaadade
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define harmonic_oscillator_DIM 2
 #define harmonic_oscillator_ORDER 4
 #define harmonic_oscillator_CASIMIRS 0
@@ -26,10 +25,8 @@ typedef struct {
 extern const harmonic_oscillator_params harmonic_oscillator_default_params;
 
 /* How a step ends; harmonic_oscillator_status_string says it in words. */
-typedef enum {
-    harmonic_oscillator_OK = 0, harmonic_oscillator_NO_CONVERGENCE, harmonic_oscillator_SINGULAR,
-        harmonic_oscillator_NOT_FINITE, harmonic_oscillator_BAD_ARGUMENT
-} harmonic_oscillator_status;
+typedef enum { harmonic_oscillator_OK = 0, harmonic_oscillator_NO_CONVERGENCE, harmonic_oscillator_SINGULAR,
+    harmonic_oscillator_NOT_FINITE, harmonic_oscillator_BAD_ARGUMENT } harmonic_oscillator_status;
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status);
 
 enum { harmonic_oscillator_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

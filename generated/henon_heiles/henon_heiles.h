@@ -2,7 +2,7 @@
  * henon_heiles.h: the declarations; henon_heiles.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 81e47ada21fd48a12568ec0addd554ad6e4bab79ecdd08929a8c3b9c13083ea7
+ * body-sha256: 7c0433f2345fc4bc3492c7d1f11ce858e80c34136c2954de710b6a18d29b48de
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define henon_heiles_DIM 4
 #define henon_heiles_ORDER 6
 #define henon_heiles_CASIMIRS 0
@@ -25,10 +24,8 @@ typedef struct {
 extern const henon_heiles_params henon_heiles_default_params;
 
 /* How a step ends; henon_heiles_status_string says it in words. */
-typedef enum {
-    henon_heiles_OK = 0, henon_heiles_NO_CONVERGENCE, henon_heiles_SINGULAR, henon_heiles_NOT_FINITE,
-        henon_heiles_BAD_ARGUMENT
-} henon_heiles_status;
+typedef enum { henon_heiles_OK = 0, henon_heiles_NO_CONVERGENCE, henon_heiles_SINGULAR,
+    henon_heiles_NOT_FINITE, henon_heiles_BAD_ARGUMENT } henon_heiles_status;
 const char *henon_heiles_status_string(henon_heiles_status status);
 
 enum { henon_heiles_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

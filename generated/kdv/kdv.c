@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: c10d0389f5f27a5c56be4da0df0be7e5569761a3e4fd18a8ce3b74f66fbd07ee
+ * body-sha256: 5a7ad9b1168f6c2a10274f9e2a94a9ea3ec22bd25d1bf648d3b9337af91b93c9
  */
 #include "kdv.h"
 #include <float.h>
@@ -52,7 +52,7 @@ static int kdv_allowed(const kdv_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a stage only */
+/* Everything that depends on parameters and the time of a stage only. */
 static void kdv_prepare(const kdv_params *params, double h, double coef[restrict 7])
 {
     const double t1 = 1.0 / params->d, t2 = t1 * (params->delta * params->delta), t3 = t1 * t1;
@@ -510,9 +510,8 @@ static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
     {
         kdv_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = kdv_share(units, &first);
-        const int measured = coef != NULL;
-        if (measured) kdv_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; !measured && unit < end; ++unit) {
+        if (coef != NULL) kdv_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
             const kdv_piece at = kdv_piece_of(s, unit);
             kdv_measure(s->y[now], s->y[1 - now], &at, &own);
         }
@@ -560,7 +559,7 @@ static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *no
 }
 
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void kdv_predict(const kdv_solver *s, double *const *x)
+static void kdv_predict(const kdv_solver *s)
 {
     kdv_PARALLEL
     {
@@ -569,7 +568,7 @@ static void kdv_predict(const kdv_solver *s, double *const *x)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
                     end = first + s->length + 2 * kdv_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
                 for (int d = 0; d < s->guess.order; ++d) {
                     const double *difference = s->guess.difference[d][k];
                     for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
@@ -580,7 +579,7 @@ static void kdv_predict(const kdv_solver *s, double *const *x)
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
    order. */
-static void kdv_remember(kdv_solver *s, double *const *from, int now)
+static void kdv_remember(kdv_solver *s, int now)
 {
     kdv_guess *guess = &s->guess;
     double size[kdv_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
@@ -592,7 +591,7 @@ static void kdv_remember(kdv_solver *s, double *const *from, int now)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
                     end = first + s->length + 2 * kdv_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = from[k];
+                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
                 for (ptrdiff_t i = first; i < end; ++i) {
                     double next = y[i] - x[i];
                     for (int d = 0; d < guess->count; ++d) {
@@ -745,28 +744,21 @@ static int kdv_factorise(kdv_solver *s, const double *coef, int now)
     return kdv_decompose(m.d, border, border, -1, border, m.pivots + inner);
 }
 
-/* Solve the equation of the matrix, in place. */
-static void kdv_solve(const kdv_matrix *m)
-{
-    const ptrdiff_t inner = m->inner, border = m->border;
-    double *lower = m->side + inner;
-    kdv_substitute(m->a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m->pivots, m->side);
-    for (ptrdiff_t k = 0; k < inner; ++k)
-        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m->c[k * border + i] * m->side[k];
-    kdv_substitute(m->d, border, border, -1, border, m->pivots + inner, lower);
-    for (ptrdiff_t j = 0; j < border; ++j)
-        for (ptrdiff_t i = 0; i < inner; ++i) m->side[i] -= m->b[j * inner + i] * lower[j];
-}
-
 /* s->y[now] with the correction by a sweep to the other, in place of what the sweep has made. */
 static void kdv_eliminate(kdv_solver *s, int now)
 {
     kdv_matrix m;
     kdv_matrix_of(s->sites, s->matrix, &m);
-    const ptrdiff_t sites = s->length;
+    const ptrdiff_t sites = s->length, inner = m.inner, border = m.border;
+    double *lower = m.side + inner;
     for (ptrdiff_t i = 0; i < sites; ++i)
         for (int k = 0; k < kdv_DIM; ++k) m.side[i * kdv_DIM + k] = s->y[1 - now][k][i] - s->y[now][k][i];
-    kdv_solve(&m);
+    kdv_substitute(m.a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m.pivots, m.side);
+    for (ptrdiff_t k = 0; k < inner; ++k)
+        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m.c[k * border + i] * m.side[k];
+    kdv_substitute(m.d, border, border, -1, border, m.pivots + inner, lower);
+    for (ptrdiff_t j = 0; j < border; ++j)
+        for (ptrdiff_t i = 0; i < inner; ++i) m.side[i] -= m.b[j * inner + i] * lower[j];
     for (int k = 0; k < kdv_DIM; ++k) {
         for (ptrdiff_t i = 0; i < sites; ++i) s->y[1 - now][k][i] = s->y[now][k][i] + m.side[i * kdv_DIM + k];
         kdv_ends(s->y[1 - now][k], sites, 0, sites);
@@ -832,17 +824,17 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     const size_t units = kdv_units(s);
     const double *coef = s->coef;
     int now = 0;
-    kdv_predict(s, s->x);
+    kdv_predict(s);
     kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, &now);
     if (status != kdv_OK && (far || status != kdv_NOT_FINITE)) {
         s->stiff = 1;
         now = 0;
         const double range = kdv_range(s, coef);
-        kdv_predict(s, s->x);
+        kdv_predict(s);
         status = kdv_newton(s, coef, range, &now);
     }
     if (status != kdv_OK) return status;
-    kdv_remember(s, s->x, now);
+    kdv_remember(s, now);
     kdv_PARALLEL
     {
         size_t first, end = kdv_share(units, &first);

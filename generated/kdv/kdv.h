@@ -2,7 +2,7 @@
  * kdv.h: the declarations; kdv.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aa04f0fe8de3c20ab12d73878b2288cab921cfd9f478cc9da2308225af91a99b
+ * body-sha256: e8486dd2c2188cf80a695ede0365de10151d6ae192a1ef7a5e1cffc5c4ce73e1
  */
 #ifndef KDV_H
 #define KDV_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define kdv_AXES 1
 #define kdv_DIM 1
 #define kdv_ORDER 2
@@ -31,9 +30,7 @@ enum { kdv_COEFFICIENTS = 7 }; /* numbers that depend on params and h only */
 enum { kdv_DIFFERENCES = 4 };  /* that a guess is extrapolated from */
 
 /* How a step ends; kdv_status_string says it in words. */
-typedef enum {
-    kdv_OK = 0, kdv_NO_CONVERGENCE, kdv_SINGULAR, kdv_NOT_FINITE, kdv_BAD_ARGUMENT
-} kdv_status;
+typedef enum { kdv_OK = 0, kdv_NO_CONVERGENCE, kdv_SINGULAR, kdv_NOT_FINITE, kdv_BAD_ARGUMENT } kdv_status;
 
 /* What guesses for the y of a stage are extrapolated from: differences of the last values of y - x. */
 typedef struct {

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 62ed549d343a957abec163c66a40fe9a758d8f84dbe29240116fc59322af6a50
+ * body-sha256: 6b578e2288a33aa6a6227bdc5bd36203e15f27a0936b5f218002e2ad72da4ace
  */
 #include "kepler.h"
 #include <float.h>
@@ -38,7 +38,7 @@ static int kepler_allowed(const kepler_params *params)
 #define kepler_APART
 #endif
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void kepler_prepare(const kepler_params *params, double h, double coef[118])
 {
     const double t1 = h * params->mu, t2 = h * h, t3 = h * t2, t4 = params->mu * t3, t5 = (-0.125) * t4;
@@ -176,8 +176,7 @@ static void kepler_prepare(const kepler_params *params, double h, double coef[11
     coef[117] = (-3.0 / 80.0) * t11;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 2) */
+/* kepler_linearise, part 1 of 2. */
 kepler_APART static void kepler_linearise_part1(const double coef[118], const double y[4],
     double displacement[4], double increment[4], double jacobian[16], double increment_jacobian[16],
     double work[36])
@@ -385,8 +384,7 @@ kepler_APART static void kepler_linearise_part1(const double coef[118], const do
     jacobian[9] = work[0];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 2) */
+/* kepler_linearise, part 2 of 2. */
 kepler_APART static void kepler_linearise_part2(const double coef[118], const double y[4],
     double displacement[4], double increment[4], double jacobian[16], double increment_jacobian[16],
     double work[36])
@@ -414,8 +412,8 @@ kepler_APART static void kepler_linearise_part2(const double coef[118], const do
     increment_jacobian[13] = -t6;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void kepler_linearise(const double coef[118], const double y[4], double displacement[4],
     double increment[4], double jacobian[16], double increment_jacobian[16])
 {
@@ -621,7 +619,8 @@ static kepler_status kepler_attempt(kepler_solver *s)
 kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[kepler_DIM])
 {
     if (s == NULL || x0 == NULL) return kepler_BAD_ARGUMENT;
-    kepler_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params : kepler_default_params };
+    if (params == NULL) params = &kepler_default_params;
+    kepler_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     kepler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!kepler_finite(fresh.x, kepler_DIM) || !kepler_allowed(&fresh.params) || !kepler_finite(fresh.coef,
@@ -707,16 +706,16 @@ size_t kepler_solver_steps_done(const kepler_solver *s) { return s->steps; }
 kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status)
 {
-    kepler_status worst = isfinite(h) ? kepler_OK : kepler_BAD_ARGUMENT;
+    kepler_status result = isfinite(h) ? kepler_OK : kepler_BAD_ARGUMENT;
     if (x == NULL && members > 0) return kepler_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         kepler_solver s;
         for (size_t i = 0; i < kepler_DIM; ++i) s.x[i] = x[i * members + m];
-        kepler_status member = kepler_init(&s, params, s.x);
-        if (member == kepler_OK) member = kepler_integrate(&s, h, steps);
+        kepler_status ended = kepler_init(&s, params, s.x);
+        if (ended == kepler_OK) ended = kepler_integrate(&s, h, steps);
         for (size_t i = 0; i < kepler_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == kepler_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == kepler_OK) result = ended;
     }
-    return worst;
+    return result;
 }

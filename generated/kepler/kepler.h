@@ -2,7 +2,7 @@
  * kepler.h: the declarations; kepler.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1be841482b18632a61a1d3a0b4ab897ede83d43028248a4930f66cc5e50e7562
+ * body-sha256: ba84a1bde924945da5f975888e3d99f10ca4baea31be81efc3576274cbc83281
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define kepler_DIM 4
 #define kepler_ORDER 6
 #define kepler_CASIMIRS 0
@@ -25,9 +24,8 @@ typedef struct {
 extern const kepler_params kepler_default_params;
 
 /* How a step ends; kepler_status_string says it in words. */
-typedef enum {
-    kepler_OK = 0, kepler_NO_CONVERGENCE, kepler_SINGULAR, kepler_NOT_FINITE, kepler_BAD_ARGUMENT
-} kepler_status;
+typedef enum { kepler_OK = 0, kepler_NO_CONVERGENCE, kepler_SINGULAR, kepler_NOT_FINITE,
+    kepler_BAD_ARGUMENT } kepler_status;
 const char *kepler_status_string(kepler_status status);
 
 enum { kepler_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

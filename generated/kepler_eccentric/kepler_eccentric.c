@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
  *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: 2aeefb3efeafa0ddaa3839ea2304068bc648d626e42e2361f0721924fbe68ffc
+ * body-sha256: 0e021d406cdefd9e4597b37b9abf25bf8fd749268a1f9dab19c77c19fc72ed42
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -134,7 +134,7 @@ static void kepler_eccentric_settle(double x[kepler_eccentric_DIM], double carry
     }
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, const double gauge[1],
     double h, double coef[4])
 {
@@ -144,7 +144,7 @@ static void kepler_eccentric_prepare_row(const kepler_eccentric_params *params, 
     coef[3] = 7.5 * (h * params->oblateness);
 }
 
-/* the flow of H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted */
+/* The flow of H_1 = 1/2*p2**2 + 1/2*p1**2: q1, q2 shifted. */
 static void kepler_eccentric_change1(const double coef[2], const double state[4], double change[4])
 {
     const double p1 = state[2], p2 = state[3];
@@ -167,8 +167,8 @@ static inline void kepler_eccentric_flow1(const double *coef, double x[6], doubl
     kepler_eccentric_add(x, moved, start, 5, change[3]);
 }
 
-/* the flow of H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 + q1**2)))) - (q2**2 +
-   q1**2)**(-1/2): p1, p2 shifted */
+/* The flow of H_2 = (-1/2)*(oblateness*(q2**2 + q1**2)**(-3/2)*(1 - 3*(q2**2/(q2**2 + q1**2)))) - (q2**2 +
+   q1**2)**(-1/2): p1, p2 shifted. */
 static void kepler_eccentric_change2(const double coef[4], const double state[4], double change[3])
 {
     const double q1 = state[0], q2 = state[1];
@@ -248,8 +248,8 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     const double gauge[kepler_eccentric_GAUGES])
 {
     if (s == NULL || x0 == NULL) return kepler_eccentric_BAD_ARGUMENT;
-    kepler_eccentric_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : kepler_eccentric_default_params };
+    if (params == NULL) params = &kepler_eccentric_default_params;
+    kepler_eccentric_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     /* so short a step does not matter */
     kepler_eccentric_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
@@ -362,16 +362,16 @@ double kepler_eccentric_solver_time(const kepler_eccentric_solver *s) { return s
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    kepler_eccentric_status worst = isfinite(h) ? kepler_eccentric_OK : kepler_eccentric_BAD_ARGUMENT;
+    kepler_eccentric_status result = isfinite(h) ? kepler_eccentric_OK : kepler_eccentric_BAD_ARGUMENT;
     if (x == NULL && members > 0) return kepler_eccentric_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         kepler_eccentric_solver s;
         for (size_t i = 0; i < kepler_eccentric_DIM; ++i) s.x[i] = x[i * members + m];
-        kepler_eccentric_status member = kepler_eccentric_init(&s, params, s.x);
-        if (member == kepler_eccentric_OK) member = kepler_eccentric_integrate(&s, h, steps);
+        kepler_eccentric_status ended = kepler_eccentric_init(&s, params, s.x);
+        if (ended == kepler_eccentric_OK) ended = kepler_eccentric_integrate(&s, h, steps);
         for (size_t i = 0; i < kepler_eccentric_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == kepler_eccentric_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == kepler_eccentric_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * kepler_eccentric.h: the declarations; kepler_eccentric.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 07af6591c11117aa443cd855868e71ce6652fcd9027e99de3f8286ad2f5a17df
+ * body-sha256: 4538ba0ba047742f0f9eece7634f5f7d7cd0a1aaa33ad1e270b05a81f54d5838
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define kepler_eccentric_DIM 4
 #define kepler_eccentric_ORDER 8
 #define kepler_eccentric_CASIMIRS 0
@@ -26,10 +25,8 @@ typedef struct {
 extern const kepler_eccentric_params kepler_eccentric_default_params;
 
 /* How a step ends; kepler_eccentric_status_string says it in words. */
-typedef enum {
-    kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_eccentric_SINGULAR,
-        kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT
-} kepler_eccentric_status;
+typedef enum { kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_eccentric_SINGULAR,
+    kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT } kepler_eccentric_status;
 const char *kepler_eccentric_status_string(kepler_eccentric_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 67ca1d69ef9f71faa7529e57fe1dce1a335797bcfffdf3cdff23ab6616407622
+ * body-sha256: 061fde9303e204b25aab6e701caedecfc6b12af10b2039a019b5d77628bc934a
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -59,7 +59,7 @@ static int klein_gordon_allowed(const klein_gordon_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void klein_gordon_prepare(const klein_gordon_params *params, double h, double coef[restrict 2])
 {
     const double t1 = 1.0 / params->d;

@@ -2,7 +2,7 @@
  * klein_gordon.h: the declarations; klein_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0806487fc09a56056055e06ef498730b7a1d0cebcaa4f754ac91034ff3b94a4b
+ * body-sha256: 873b98d736d9b895e57ecde3ac1b1266d63e900b00bf438862b0486678537a17
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define klein_gordon_AXES 1
 #define klein_gordon_DIM 2
 #define klein_gordon_ORDER 4
@@ -29,10 +28,8 @@ enum { klein_gordon_ARRAYS = 2 };        /* arrays over the sites: fields, then 
 enum { klein_gordon_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
 
 /* How a step ends; klein_gordon_status_string says it in words. */
-typedef enum {
-    klein_gordon_OK = 0, klein_gordon_NO_CONVERGENCE, klein_gordon_SINGULAR, klein_gordon_NOT_FINITE,
-        klein_gordon_BAD_ARGUMENT
-} klein_gordon_status;
+typedef enum { klein_gordon_OK = 0, klein_gordon_NO_CONVERGENCE, klein_gordon_SINGULAR,
+    klein_gordon_NOT_FINITE, klein_gordon_BAD_ARGUMENT } klein_gordon_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with klein_gordon_init; a copy of the struct is the same

@@ -11,10 +11,10 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
- *   Starting guesses; The implicit step, by Newton's method; Several steps or members at once; The
- *   solver; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
+ *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
+ *   once; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
  *   Ensembles
- * body-sha256: 95ebb67bc5c37238de0f0d90308b20dbe21787e9132868fa31c150fc39208182
+ * body-sha256: 17500411498493de0102af15f86a0f5b8cd786ffd51fefe436e2877fafdeaa9d
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -116,7 +116,7 @@ static double kowalevski_top_phi2(double s)
     return (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void kowalevski_top_prepare(const kowalevski_top_params *params, double h, double coef[restrict 172])
 {
     (void)params;
@@ -295,8 +295,7 @@ static void kowalevski_top_prepare(const kowalevski_top_params *params, double h
     coef[171] = (-1.0 / 7680.0) * t3;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
+/* kowalevski_top_linearise, part 1 of 3. */
 kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coef[172], const double y[6],
     double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
     double increment_jacobian[restrict 36], double work[restrict 274])
@@ -529,8 +528,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_part1(const double coe
     increment[0] = work[16];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
+/* kowalevski_top_linearise, part 2 of 3. */
 kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coef[172], const double y[6],
     double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
     double increment_jacobian[restrict 36], double work[restrict 274])
@@ -771,8 +769,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_part2(const double coe
     increment_jacobian[15] = work[0] + (G1 * work[154] + (P1 * work[160] - P2 * work[158] - G2 * work[162]));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
+/* kowalevski_top_linearise, part 3 of 3. */
 kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coef[172], const double y[6],
     double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
     double increment_jacobian[restrict 36], double work[restrict 274])
@@ -1001,8 +998,8 @@ kowalevski_top_APART static void kowalevski_top_linearise_part3(const double coe
     increment_jacobian[32] = t137 - t135;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void kowalevski_top_linearise(const double coef[172], const double y[6],
     double displacement[restrict 6], double increment[restrict 6], double jacobian[restrict 36],
     double increment_jacobian[restrict 36])
@@ -1399,37 +1396,14 @@ static kowalevski_top_status kowalevski_top_attempt(kowalevski_top_solver *s)
     return kowalevski_top_NO_CONVERGENCE;
 }
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
-   at once. Compilers make vector instructions of the loops over lanes. */
-enum { kowalevski_top_LANES = 8 }; /* what one vector of AVX-512 holds */
-
-#if defined(__GNUC__)
-/* a value in each lane */
-typedef double kowalevski_top_lanes[kowalevski_top_LANES] __attribute__((aligned(64)));
-#else
-typedef double kowalevski_top_lanes[kowalevski_top_LANES];
-#endif
-
-/* Before a loop over lanes: tells compilers that they are independent. */
-#if defined(__clang__)
-#define kowalevski_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define kowalevski_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define kowalevski_top_EACH_LANE
-#endif
-
 /* ---- The solver ---- */
 /* The arguments may be parts of *s, which is therefore written last. */
 kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
     const double x0[kowalevski_top_DIM])
 {
     if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
-    kowalevski_top_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : kowalevski_top_default_params };
+    if (params == NULL) params = &kowalevski_top_default_params;
+    kowalevski_top_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!kowalevski_top_finite(fresh.x, kowalevski_top_DIM)) return kowalevski_top_BAD_ARGUMENT;
     *s = fresh;
@@ -1445,7 +1419,7 @@ static kowalevski_top_status kowalevski_top_set_step(kowalevski_top_solver *s, d
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = kowalevski_top_REPAY;
     memset(&s->blocks, 0, sizeof s->blocks);
-    s->blocks.single_steps = 2 * kowalevski_top_LANES;
+    s->blocks.single_steps = 2 * kowalevski_top_AHEAD;
     s->blocks.passes_without_recurrences = INT_MAX;
     s->h = h;
     s->t_before_h = s->t;
@@ -1537,6 +1511,29 @@ const char *kowalevski_top_status_string(kowalevski_top_status status)
 size_t kowalevski_top_solver_size(void) { return sizeof(kowalevski_top_solver); }
 size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s) { return s->steps; }
 
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { kowalevski_top_LANES = 8 }; /* what one vector of AVX-512 holds */
+
+#if defined(__GNUC__)
+/* a value in each lane */
+typedef double kowalevski_top_lanes[kowalevski_top_LANES] __attribute__((aligned(64)));
+#else
+typedef double kowalevski_top_lanes[kowalevski_top_LANES];
+#endif
+
+/* Before a loop over lanes: tells compilers that they are independent. */
+#if defined(__clang__)
+#define kowalevski_top_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define kowalevski_top_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define kowalevski_top_EACH_LANE
+#endif
+
 /* kowalevski_top_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double kowalevski_top_phi0_lane(double s)
 {
@@ -1609,7 +1606,7 @@ static inline double kowalevski_top_phi2_lane(double s)
     return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* kowalevski_top_linearise in all lanes (part 1 of 3) */
+/* kowalevski_top_linearise in all lanes, part 1 of 3. */
 kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski_top_lanes coef[restrict 172],
     kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
     kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
@@ -1873,7 +1870,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part1(kowalevski
     }
 }
 
-/* kowalevski_top_linearise in all lanes (part 2 of 3) */
+/* kowalevski_top_linearise in all lanes, part 2 of 3. */
 kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski_top_lanes coef[restrict 172],
     kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
     kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
@@ -2178,7 +2175,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part2(kowalevski
     }
 }
 
-/* kowalevski_top_linearise in all lanes (part 3 of 3) */
+/* kowalevski_top_linearise in all lanes, part 3 of 3. */
 kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski_top_lanes coef[restrict 172],
     kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
     kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
@@ -2483,7 +2480,7 @@ kowalevski_top_APART static void kowalevski_top_linearise_lanes_part3(kowalevski
     }
 }
 
-/* kowalevski_top_linearise in all lanes */
+/* kowalevski_top_linearise in all lanes. */
 static void kowalevski_top_linearise_lanes(kowalevski_top_lanes coef[restrict 172],
     kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
     kowalevski_top_lanes increment[restrict 6], kowalevski_top_lanes jacobian[restrict 36],
@@ -2498,7 +2495,7 @@ static void kowalevski_top_linearise_lanes(kowalevski_top_lanes coef[restrict 17
         work);
 }
 
-/* kowalevski_top_evaluate in all lanes */
+/* kowalevski_top_evaluate in all lanes. */
 static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172],
     kowalevski_top_lanes y[restrict 6], kowalevski_top_lanes displacement[restrict 6],
     kowalevski_top_lanes increment[restrict 6])
@@ -2677,7 +2674,7 @@ static double kowalevski_top_largest(const kowalevski_top_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
 {
     kowalevski_top_lanes delta[kowalevski_top_DIM];
@@ -2735,8 +2732,8 @@ static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict kowalevsk
     }
 }
 
-/* Everything about a stage at the points y. */
-static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
+/* Linearise a stage around the points y. */
+static void kowalevski_top_linearise_stage(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
 {
     kowalevski_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse,
         model->slope);
@@ -2747,19 +2744,19 @@ static void kowalevski_top_tabulate(kowalevski_top_lanes coef[restrict], kowalev
             for (int k = 0; k < kowalevski_top_DIM; ++k) {
                 kowalevski_top_EACH_LANE
                 for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                    sum[lane] += model->slope[i * kowalevski_top_DIM + k][lane] * model->inverse[k
-                        * kowalevski_top_DIM + j][lane];
+                    sum[lane] += model->slope[i * kowalevski_top_DIM + k][lane]
+                        * model->inverse[k * kowalevski_top_DIM + j][lane];
             }
             memcpy(model->gain[i * kowalevski_top_DIM + j], sum, sizeof sum);
         }
 }
 
-/* The table of a stage, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model,
     int matrices)
 {
     if (matrices)
-        kowalevski_top_tabulate(coef, model);
+        kowalevski_top_linearise_stage(coef, model);
     else
         kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
@@ -2771,11 +2768,6 @@ typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     kowalevski_top_lanes coef[kowalevski_top_COEFFICIENTS], weight[kowalevski_top_WINDOW][kowalevski_top_DIM];
 } kowalevski_top_table;
-
-/* The stages of a step. */
-typedef struct {
-    kowalevski_top_model stage;
-} kowalevski_top_models;
 
 /* kowalevski_top_near for the guesses of all lanes, seen from one value. */
 static int kowalevski_top_near_lanes(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
@@ -2794,31 +2786,30 @@ static int kowalevski_top_near_lanes(kowalevski_top_lanes y[restrict kowalevski_
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void kowalevski_top_chain(kowalevski_top_models *models, double x[kowalevski_top_DIM],
+static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevski_top_DIM],
     double carry[kowalevski_top_DIM])
 {
     double residual[kowalevski_top_DIM], sum[kowalevski_top_DIM], small[kowalevski_top_DIM];
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
-        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
         const int after = (lane + 1) % kowalevski_top_LANES;
-        kowalevski_top_model *at = &models->stage, *next = &models->stage;
         /* two sums, so that no long chain of additions is waited for */
         double even[kowalevski_top_DIM] = { 0.0 }, odd[kowalevski_top_DIM] = { 0.0 };
         for (int i = 0; i < kowalevski_top_DIM; ++i) {
-            at->residual[i][lane] = residual[i];
+            model->residual[i][lane] = residual[i];
             for (int j = 0; j < kowalevski_top_DIM; j += 2)
-                even[i] += at->gain[i * kowalevski_top_DIM + j][lane] * residual[j];
+                even[i] += model->gain[i * kowalevski_top_DIM + j][lane] * residual[j];
             for (int j = 1; j < kowalevski_top_DIM; j += 2)
-                odd[i] += at->gain[i * kowalevski_top_DIM + j][lane] * residual[j];
+                odd[i] += model->gain[i * kowalevski_top_DIM + j][lane] * residual[j];
         }
         for (int i = 0; i < kowalevski_top_DIM; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            const double change = model->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (model->displacement[i][after] - model->displacement[i][lane]) - change;
+            const double moved = (model->y[i][after] - model->y[i][lane]) + turn;
             residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
@@ -2831,7 +2822,7 @@ static void kowalevski_top_chain(kowalevski_top_models *models, double x[kowalev
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
-static void kowalevski_top_refresh_stage(const kowalevski_top_solver *s, kowalevski_top_table *table)
+static void kowalevski_top_refresh(const kowalevski_top_solver *s, kowalevski_top_table *table)
 {
     if (table->fits == s->history.fits) return;
     table->fits = s->history.fits;
@@ -2839,11 +2830,6 @@ static void kowalevski_top_refresh_stage(const kowalevski_top_solver *s, kowalev
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) table->coef[k][lane] = s->coef[k];
     memcpy(table->weight, s->history.weight,
         (size_t)s->history.recurrence_terms * kowalevski_top_DIM * sizeof(kowalevski_top_lanes));
-}
-
-static void kowalevski_top_refresh(const kowalevski_top_solver *s, kowalevski_top_table *table)
-{
-    kowalevski_top_refresh_stage(s, table);
 }
 
 /* Guesses for the next kowalevski_top_LANES values of a stage, by its recurrences. */
@@ -2877,9 +2863,8 @@ static void kowalevski_top_record_lanes(kowalevski_top_history *history,
     history->count += kowalevski_top_LANES;
 }
 
-/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
-   mean the mean slope. */
-static void kowalevski_top_stride(const kowalevski_top_solver *s, double h, double x[kowalevski_top_DIM],
+/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+static void kowalevski_top_runge_kutta(const kowalevski_top_solver *s, double h, double x[kowalevski_top_DIM],
     double mean[kowalevski_top_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
@@ -2910,38 +2895,28 @@ static void kowalevski_top_from_means(kowalevski_top_lanes coef[restrict], kowal
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void kowalevski_top_march(const kowalevski_top_solver *s, kowalevski_top_table *table,
-    kowalevski_top_models *models)
+static void kowalevski_top_guess_by_runge_kutta(const kowalevski_top_solver *s, kowalevski_top_table *table,
+    kowalevski_top_model *model)
 {
     double x[kowalevski_top_DIM], mean[kowalevski_top_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
-    kowalevski_top_model *at = &models->stage;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        for (int i = 0; i < kowalevski_top_DIM; ++i) at->y[i][lane] = x[i];
-        kowalevski_top_stride(s, h, x, mean);
-        for (int i = 0; i < kowalevski_top_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i) model->y[i][lane] = x[i];
+        kowalevski_top_runge_kutta(s, h, x, mean);
+        for (int i = 0; i < kowalevski_top_DIM; ++i) model->y[i][lane] += 0.5 * h * mean[i];
     }
-    kowalevski_top_from_means(table->coef, &models->stage);
+    kowalevski_top_from_means(table->coef, model);
 }
 
 /* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
    near the state. */
 static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *table,
-    kowalevski_top_models *models)
+    kowalevski_top_model *model)
 {
-    if (!s->blocks.use_recurrences) kowalevski_top_march(s, table, models);
-    if (s->blocks.use_recurrences) kowalevski_top_foresee(&s->history, table->weight, models->stage.y);
-    if (!kowalevski_top_near_lanes(models->stage.y, s->x)) return 0;
-    return 1;
-}
-
-/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
-static double kowalevski_top_correct_stage(kowalevski_top_model *model)
-{
-    kowalevski_top_lanes sizes;
-    kowalevski_top_correct(model, sizes);
-    return kowalevski_top_largest(sizes);
+    if (s->blocks.use_recurrences) kowalevski_top_foresee(&s->history, table->weight, model->y);
+    else kowalevski_top_guess_by_runge_kutta(s, table, model);
+    return kowalevski_top_near_lanes(model->y, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -2956,20 +2931,20 @@ static double kowalevski_top_correct_stage(kowalevski_top_model *model)
    it takes more than most. */
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
-    kowalevski_top_models models;
+    kowalevski_top_model model;
+    kowalevski_top_lanes sizes;
     double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!kowalevski_top_guess(s, table, &models)) return 0;
+    if (!kowalevski_top_guess(s, table, &model)) return 0;
     while (!solved) {
-        double size = 0.0;
         const int matrices = previous > kowalevski_top_FROZEN;
-        kowalevski_top_update(table->coef, &models.stage, matrices);
+        kowalevski_top_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        kowalevski_top_chain(&models, x, carry);
-        const double largest = kowalevski_top_correct_stage(&models.stage);
-        size = largest > size ? largest : size;
+        kowalevski_top_chain(&model, x, carry);
+        kowalevski_top_correct(&model, sizes);
+        const double size = kowalevski_top_largest(sizes);
         s->evaluations += kowalevski_top_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = kowalevski_top_remaining(size, bend, bound);
@@ -2978,14 +2953,14 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!kowalevski_top_near_lanes(models.stage.y, s->x)) return 0;
+    if (!kowalevski_top_near_lanes(model.y, s->x)) return 0;
     for (int i = 0; i < kowalevski_top_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     kowalevski_top_count(s, kowalevski_top_LANES);
     kowalevski_top_history *history = &s->history;
-    kowalevski_top_record_lanes(history, models.stage.y);
+    kowalevski_top_record_lanes(history, model.y);
     history->slow_steps = passes > 1 ? history->slow_steps + kowalevski_top_LANES : 0;
     if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
         kowalevski_top_fit(history);
@@ -2995,8 +2970,10 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
 enum {
     /* steps that fits for whole blocks are saved in */
     kowalevski_top_REPAY_BLOCKS = 4 * kowalevski_top_REPAY,
-    kowalevski_top_MOST_SINGLE_STEPS = 1000 /* before blocks are tried again */
+    kowalevski_top_MOST_SINGLE_STEPS = 1000,           /* before blocks are tried again */
+    kowalevski_top_TOO_MANY = 5 * kowalevski_top_LANES /* of these: recurrences are to blame */
 };
+#define kowalevski_top_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void kowalevski_top_give_up(kowalevski_top_solver *s)
@@ -3024,8 +3001,7 @@ static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < kowalevski_top_REPAY_BLOCKS && s->steps < kowalevski_top_REPAY) return;
-    s->blocks.use_recurrences = 1;
-    s->blocks.use_recurrences = s->blocks.use_recurrences && kowalevski_top_fitted(&s->history);
+    s->blocks.use_recurrences = kowalevski_top_fitted(&s->history);
     s->blocks.single_steps = kowalevski_top_LANES;
     if (!s->blocks.use_recurrences) kowalevski_top_give_up(s);
 }
@@ -3045,7 +3021,7 @@ static void kowalevski_top_learn_from(kowalevski_top_solver *s, int passes)
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
-        > 5 * kowalevski_top_LANES) {
+        > kowalevski_top_TOO_MANY) {
         kowalevski_top_give_up(s);
     }
 }
@@ -3056,7 +3032,8 @@ static kowalevski_top_status kowalevski_top_single(kowalevski_top_solver *s)
     const size_t before = s->evaluations;
     const kowalevski_top_status status = kowalevski_top_step(s, s->h);
     const double evaluations = (double)(s->evaluations - before);
-    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
+    s->blocks.evaluations_per_stage +=
+        kowalevski_top_LATEST * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
@@ -3093,7 +3070,7 @@ typedef struct {
     size_t members, steps, own;
     const kowalevski_top_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;         /* 0 where there are no frames */
+    size_t stride;
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } kowalevski_top_members;
@@ -3119,7 +3096,7 @@ static kowalevski_top_status kowalevski_top_take_member(const kowalevski_top_mem
 static size_t kowalevski_top_to_frame(const kowalevski_top_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -3430,18 +3407,18 @@ static int kowalevski_top_group_step(kowalevski_top_group *group, size_t remaini
     kowalevski_top_lanes x[kowalevski_top_DIM], carry[kowalevski_top_DIM];
     kowalevski_top_model model;
     const int next = (group->latest > 0 ? group->latest : kowalevski_top_REMEMBERED) - 1;
-    int most = 0;
+    int slow = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     const int iterations = kowalevski_top_group_solve(group, &model);
     kowalevski_top_group_advance(group->x, group->carry, &model);
-    if (iterations > most) most = iterations;
+    slow = slow || iterations > 1;
     if ((iterations > 1 && next % kowalevski_top_HISTORY == 0) || group->count < kowalevski_top_HISTORY)
         kowalevski_top_group_judge(group, model.y);
     memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
     if (group->count < kowalevski_top_REMEMBERED) ++group->count;
-    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    group->slow_steps = slow ? group->slow_steps + 1 : 0;
     if (group->slow_steps > group->slow_steps_allowed && group->count == kowalevski_top_REMEMBERED
         && remaining >= kowalevski_top_GROUP_REPAY)
         kowalevski_top_group_fit(group);
@@ -3497,13 +3474,13 @@ static kowalevski_top_status kowalevski_top_group_end(const kowalevski_top_group
 static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_members *all, size_t first)
 {
     kowalevski_top_group group;
-    kowalevski_top_status worst = kowalevski_top_OK, member[kowalevski_top_LANES];
+    kowalevski_top_status result = kowalevski_top_OK, begun[kowalevski_top_LANES];
     const int count = all->members - first < kowalevski_top_LANES ? (int)(all->members - first)
         : kowalevski_top_LANES;
     size_t left = all->steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane)
-        member[lane] = kowalevski_top_group_join(&group, lane, all, first + (size_t)lane);
+        begun[lane] = kowalevski_top_group_join(&group, lane, all, first + (size_t)lane);
     for (int active = count; left > 0 && active >= kowalevski_top_FEWEST;) {
         active = kowalevski_top_group_step(&group, left--);
         if (all->frames != NULL) kowalevski_top_group_frame(&group, all, first, all->steps - left);
@@ -3511,17 +3488,17 @@ static kowalevski_top_status kowalevski_top_group_run(const kowalevski_top_membe
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
         const kowalevski_top_status status = kowalevski_top_group_end(&group, lane, all, first + (size_t)lane,
-            member[lane]);
-        if (worst == kowalevski_top_OK) worst = status;
+            begun[lane]);
+        if (result == kowalevski_top_OK) result = status;
     }
-    return worst;
+    return result;
 }
 
 /* ---- Ensembles ---- */
 /* All members. The first status that is not OK. */
 static kowalevski_top_status kowalevski_top_run(const kowalevski_top_members *all)
 {
-    kowalevski_top_status worst = kowalevski_top_OK;
+    kowalevski_top_status result = kowalevski_top_OK;
     size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
@@ -3534,10 +3511,10 @@ static kowalevski_top_status kowalevski_top_run(const kowalevski_top_members *al
 #endif
         if (first < earliest) {
             earliest = first;
-            worst = group;
+            result = group;
         }
     }
-    return worst;
+    return result;
 }
 
 kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *params, double *x, size_t members,
@@ -3547,8 +3524,8 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
     kowalevski_top_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
         .status = status };
     if (x == NULL && members > 0) return kowalevski_top_BAD_ARGUMENT;
-    const kowalevski_top_status worst = kowalevski_top_run(&all);
-    return isfinite(h) ? worst : kowalevski_top_BAD_ARGUMENT;
+    const kowalevski_top_status result = kowalevski_top_run(&all);
+    return isfinite(h) ? result : kowalevski_top_BAD_ARGUMENT;
 }
 
 kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *params, double *x,
@@ -3558,7 +3535,7 @@ kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return kowalevski_top_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return kowalevski_top_BAD_ARGUMENT;
-    all.stride = frames != NULL ? stride : 0;
+    all.stride = stride;
     all.frames = frames;
     all.status = status;
     return kowalevski_top_run(&all);

@@ -2,7 +2,7 @@
  * kowalevski_top.h: the declarations; kowalevski_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4f660b3f5ddf33daac81ba1efe214ba5a9ff1130f35453fc53e3fdf4c2fadc64
+ * body-sha256: 8f5fd42831ad1930c645d4b445607f9c1135d49283d24c07df5383c8e4353140
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define kowalevski_top_DIM 6
 #define kowalevski_top_ORDER 8
 #define kowalevski_top_CASIMIRS 2
@@ -28,10 +27,8 @@ typedef struct {
 extern const kowalevski_top_params kowalevski_top_default_params;
 
 /* How a step ends; kowalevski_top_status_string says it in words. */
-typedef enum {
-    kowalevski_top_OK = 0, kowalevski_top_NO_CONVERGENCE, kowalevski_top_SINGULAR, kowalevski_top_NOT_FINITE,
-        kowalevski_top_BAD_ARGUMENT
-} kowalevski_top_status;
+typedef enum { kowalevski_top_OK = 0, kowalevski_top_NO_CONVERGENCE, kowalevski_top_SINGULAR,
+    kowalevski_top_NOT_FINITE, kowalevski_top_BAD_ARGUMENT } kowalevski_top_status;
 const char *kowalevski_top_status_string(kowalevski_top_status status);
 
 enum { kowalevski_top_KEPT = 2 * kowalevski_top_REMEMBERED };

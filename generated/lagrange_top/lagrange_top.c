@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 5e13b6269a7e42ab7c03697fc2438d5d9a4448d0354ef5bf3c3638203cdf8335
+ * body-sha256: 417555711e3186bad3590227c0715aebbdb362e496e7730276fd450e95b8000b
  */
 #include "lagrange_top.h"
 #include <float.h>
@@ -113,7 +113,7 @@ static double lagrange_top_phi2(double s)
     return (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void lagrange_top_prepare(const lagrange_top_params *params, double h, double coef[8])
 {
     const double t1 = 1.0 / params->I3, t2 = 1.0 / params->I1, t3 = 1.0 / 12.0 * t2, t4 = h * (h * h);
@@ -129,8 +129,7 @@ static void lagrange_top_prepare(const lagrange_top_params *params, double h, do
     coef[7] = 0.5 * t6;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 2) */
+/* lagrange_top_linearise, part 1 of 2. */
 lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[113])
@@ -318,8 +317,7 @@ lagrange_top_APART static void lagrange_top_linearise_part1(const double coef[8]
     jacobian[1] = work[105] + (work[17] * work[4] + (work[2] * work[6] + work[63] * work[9]));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 2) */
+/* lagrange_top_linearise, part 2 of 2. */
 lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[113])
@@ -510,8 +508,8 @@ lagrange_top_APART static void lagrange_top_linearise_part2(const double coef[8]
     increment_jacobian[32] = t119 - t117;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void lagrange_top_linearise(const double coef[8], const double y[6], double displacement[6],
     double increment[6], double jacobian[36], double increment_jacobian[36])
 {
@@ -729,8 +727,8 @@ lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top
     const double x0[lagrange_top_DIM])
 {
     if (s == NULL || x0 == NULL) return lagrange_top_BAD_ARGUMENT;
-    lagrange_top_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : lagrange_top_default_params };
+    if (params == NULL) params = &lagrange_top_default_params;
+    lagrange_top_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     lagrange_top_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!lagrange_top_finite(fresh.x, lagrange_top_DIM) || !lagrange_top_allowed(&fresh.params)
@@ -819,16 +817,16 @@ size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s) { return s->
 lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    lagrange_top_status worst = isfinite(h) ? lagrange_top_OK : lagrange_top_BAD_ARGUMENT;
+    lagrange_top_status result = isfinite(h) ? lagrange_top_OK : lagrange_top_BAD_ARGUMENT;
     if (x == NULL && members > 0) return lagrange_top_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         lagrange_top_solver s;
         for (size_t i = 0; i < lagrange_top_DIM; ++i) s.x[i] = x[i * members + m];
-        lagrange_top_status member = lagrange_top_init(&s, params, s.x);
-        if (member == lagrange_top_OK) member = lagrange_top_integrate(&s, h, steps);
+        lagrange_top_status ended = lagrange_top_init(&s, params, s.x);
+        if (ended == lagrange_top_OK) ended = lagrange_top_integrate(&s, h, steps);
         for (size_t i = 0; i < lagrange_top_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == lagrange_top_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == lagrange_top_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * lagrange_top.h: the declarations; lagrange_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3266e6bf6f0c1fc174a40f604307bf413b00bb486b968809ed6dbcca64806ccf
+ * body-sha256: eab01b53398f6144790f5d09dc9faa39d8eab39c7f37c679f87799cf2482cb95
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define lagrange_top_DIM 6
 #define lagrange_top_ORDER 4
 #define lagrange_top_CASIMIRS 2
@@ -27,10 +26,8 @@ typedef struct {
 extern const lagrange_top_params lagrange_top_default_params;
 
 /* How a step ends; lagrange_top_status_string says it in words. */
-typedef enum {
-    lagrange_top_OK = 0, lagrange_top_NO_CONVERGENCE, lagrange_top_SINGULAR, lagrange_top_NOT_FINITE,
-        lagrange_top_BAD_ARGUMENT
-} lagrange_top_status;
+typedef enum { lagrange_top_OK = 0, lagrange_top_NO_CONVERGENCE, lagrange_top_SINGULAR,
+    lagrange_top_NOT_FINITE, lagrange_top_BAD_ARGUMENT } lagrange_top_status;
 const char *lagrange_top_status_string(lagrange_top_status status);
 
 enum { lagrange_top_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -15,7 +15,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: af9d9ea085ec7eb6d8f03c73daabdde7f35e5cb119d3fc92869ed1fa641d0ad9
+ * body-sha256: df5b763e0a3e8ee0440f9448710f9dcb62fce2fdf0d8b5b45670f4e69e77824b
  */
 #include "landau_lifshitz.h"
 #include <float.h>
@@ -90,7 +90,7 @@ static double landau_lifshitz_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void landau_lifshitz_prepare(const landau_lifshitz_params *params, double h, double coef[6])
 {
     coef[0] = params->B * h;
@@ -101,8 +101,8 @@ static void landau_lifshitz_prepare(const landau_lifshitz_params *params, double
     coef[5] = h;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void landau_lifshitz_linearise(const double coef[6], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -375,8 +375,8 @@ landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const lan
     const double x0[landau_lifshitz_DIM])
 {
     if (s == NULL || x0 == NULL) return landau_lifshitz_BAD_ARGUMENT;
-    landau_lifshitz_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : landau_lifshitz_default_params };
+    if (params == NULL) params = &landau_lifshitz_default_params;
+    landau_lifshitz_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     landau_lifshitz_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!landau_lifshitz_finite(fresh.x, landau_lifshitz_DIM) || !landau_lifshitz_allowed(&fresh.params)
@@ -487,16 +487,16 @@ size_t landau_lifshitz_solver_steps_done(const landau_lifshitz_solver *s) { retu
 landau_lifshitz_status landau_lifshitz_ensemble(const landau_lifshitz_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    landau_lifshitz_status worst = isfinite(h) ? landau_lifshitz_OK : landau_lifshitz_BAD_ARGUMENT;
+    landau_lifshitz_status result = isfinite(h) ? landau_lifshitz_OK : landau_lifshitz_BAD_ARGUMENT;
     if (x == NULL && members > 0) return landau_lifshitz_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         landau_lifshitz_solver s;
         for (size_t i = 0; i < landau_lifshitz_DIM; ++i) s.x[i] = x[i * members + m];
-        landau_lifshitz_status member = landau_lifshitz_init(&s, params, s.x);
-        if (member == landau_lifshitz_OK) member = landau_lifshitz_integrate(&s, h, steps);
+        landau_lifshitz_status ended = landau_lifshitz_init(&s, params, s.x);
+        if (ended == landau_lifshitz_OK) ended = landau_lifshitz_integrate(&s, h, steps);
         for (size_t i = 0; i < landau_lifshitz_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == landau_lifshitz_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == landau_lifshitz_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * landau_lifshitz.h: the declarations; landau_lifshitz.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 93d63f4f58f91998f0214f4243fa371cca8aea04ca7cdcd6753ac27aa64d6e1a
+ * body-sha256: 9ee13a9964b0e04662212b605fea397c5712e459ad089cd08a1b15f91a039573
  */
 #ifndef LANDAU_LIFSHITZ_H
 #define LANDAU_LIFSHITZ_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define landau_lifshitz_DIM 3
 #define landau_lifshitz_ORDER 4
 #define landau_lifshitz_CASIMIRS 1
@@ -28,10 +27,8 @@ typedef struct {
 extern const landau_lifshitz_params landau_lifshitz_default_params;
 
 /* How a step ends; landau_lifshitz_status_string says it in words. */
-typedef enum {
-    landau_lifshitz_OK = 0, landau_lifshitz_NO_CONVERGENCE, landau_lifshitz_SINGULAR,
-        landau_lifshitz_NOT_FINITE, landau_lifshitz_BAD_ARGUMENT
-} landau_lifshitz_status;
+typedef enum { landau_lifshitz_OK = 0, landau_lifshitz_NO_CONVERGENCE, landau_lifshitz_SINGULAR,
+    landau_lifshitz_NOT_FINITE, landau_lifshitz_BAD_ARGUMENT } landau_lifshitz_status;
 const char *landau_lifshitz_status_string(landau_lifshitz_status status);
 
 enum { landau_lifshitz_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

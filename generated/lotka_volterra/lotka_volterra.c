@@ -11,10 +11,10 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
- *   Starting guesses; The implicit step, by Newton's method; Several steps or members at once; The
- *   solver; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
+ *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
+ *   once; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
  *   Ensembles
- * body-sha256: 9a4dcd5ef68c8dd375838dcb8bf5f996285d1a163d9512d701cbb2917d22f686
+ * body-sha256: 73cce72c4ce489726f9042088b8b9c5ba647e10862b64745ed97121af188a4ec
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -35,15 +35,15 @@ enum { lotka_volterra_CHECKS = 8 }; /* values that a recurrence is not fitted to
 enum { lotka_volterra_PASSES = 2 }; /* over a block, that cost per step what an evaluation costs */
 #define lotka_volterra_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void lotka_volterra_prepare(const lotka_volterra_params *params, double h, double coef[restrict 1])
 {
     (void)params;
     coef[0] = h;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void lotka_volterra_linearise(const double coef[1], const double y[3], double displacement[restrict 3],
     double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
 {
@@ -88,7 +88,7 @@ static void lotka_volterra_linearise(const double coef[1], const double y[3], do
     increment_jacobian[8] = -t18;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
+/* Elimination without pivoting: the solution, and the reciprocals of the pivots. */
 static void lotka_volterra_eliminate(const double matrix[9], const double side[3],
     double solution[restrict 3], double reciprocal[restrict 3])
 {
@@ -501,74 +501,14 @@ static lotka_volterra_status lotka_volterra_attempt(lotka_volterra_solver *s)
     return lotka_volterra_NO_CONVERGENCE;
 }
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
-   at once. Compilers make vector instructions of the loops over lanes. */
-enum { lotka_volterra_LANES = 8 }; /* what one vector of AVX-512 holds */
-
-#if defined(__GNUC__)
-/* a value in each lane */
-typedef double lotka_volterra_lanes[lotka_volterra_LANES] __attribute__((aligned(64)));
-#else
-typedef double lotka_volterra_lanes[lotka_volterra_LANES];
-#endif
-
-/* Before a loop over lanes: tells compilers that they are independent. */
-#if defined(__clang__)
-#define lotka_volterra_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define lotka_volterra_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define lotka_volterra_EACH_LANE
-#endif
-
-/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
-#define lotka_volterra_ROUNDER 6755399441055744.0
-
-/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
-static inline double lotka_volterra_exp_parts(double u, double *power)
-{
-    const double shifted = u * 1.4426950408889634 + lotka_volterra_ROUNDER,
-        k = shifted - lotka_volterra_ROUNDER;
-    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
-    uint64_t bits; /* the last bits of shifted are k */
-    double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
-    memcpy(&bits, &shifted, sizeof bits);
-    bits = (bits + 1023) << 52;
-    memcpy(power, &bits, sizeof *power);
-    sum = sum * rr + 2.08767569878681e-09;
-    other = other * rr + 2.505210838544172e-08;
-    sum = sum * rr + 2.755731922398589e-07;
-    other = other * rr + 2.7557319223985893e-06;
-    sum = sum * rr + 2.48015873015873e-05;
-    other = other * rr + 0.0001984126984126984;
-    sum = sum * rr + 0.001388888888888889;
-    other = other * rr + 0.008333333333333333;
-    sum = sum * rr + 0.041666666666666664;
-    other = other * rr + 0.16666666666666666;
-    sum = (sum * r + other) * r + 0.5;
-    sum = sum * rr + r;
-    return *power * sum;
-}
-
-/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
-static inline double lotka_volterra_expm1_lane(double u)
-{
-    double power;
-    const double rest = lotka_volterra_exp_parts(u, &power);
-    return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
-}
-
 /* ---- The solver ---- */
 /* The arguments may be parts of *s, which is therefore written last. */
 lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
     const double x0[lotka_volterra_DIM])
 {
     if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
-    lotka_volterra_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : lotka_volterra_default_params };
+    if (params == NULL) params = &lotka_volterra_default_params;
+    lotka_volterra_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!lotka_volterra_finite(fresh.x, lotka_volterra_DIM)) return lotka_volterra_BAD_ARGUMENT;
     *s = fresh;
@@ -584,7 +524,7 @@ static lotka_volterra_status lotka_volterra_set_step(lotka_volterra_solver *s, d
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = lotka_volterra_REPAY;
     memset(&s->blocks, 0, sizeof s->blocks);
-    s->blocks.single_steps = 2 * lotka_volterra_LANES;
+    s->blocks.single_steps = 2 * lotka_volterra_AHEAD;
     s->blocks.passes_without_recurrences = INT_MAX;
     s->h = h;
     s->t_before_h = s->t;
@@ -676,7 +616,67 @@ const char *lotka_volterra_status_string(lotka_volterra_status status)
 size_t lotka_volterra_solver_size(void) { return sizeof(lotka_volterra_solver); }
 size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s) { return s->steps; }
 
-/* lotka_volterra_linearise in all lanes */
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { lotka_volterra_LANES = 8 }; /* what one vector of AVX-512 holds */
+
+#if defined(__GNUC__)
+/* a value in each lane */
+typedef double lotka_volterra_lanes[lotka_volterra_LANES] __attribute__((aligned(64)));
+#else
+typedef double lotka_volterra_lanes[lotka_volterra_LANES];
+#endif
+
+/* Before a loop over lanes: tells compilers that they are independent. */
+#if defined(__clang__)
+#define lotka_volterra_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define lotka_volterra_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define lotka_volterra_EACH_LANE
+#endif
+
+/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
+#define lotka_volterra_ROUNDER 6755399441055744.0
+
+/* exp(u) - 2^k, and 2^k, where u = k log 2 + r: no branches. */
+static inline double lotka_volterra_exp_parts(double u, double *power)
+{
+    const double shifted = u * 1.4426950408889634 + lotka_volterra_ROUNDER,
+        k = shifted - lotka_volterra_ROUNDER;
+    const double r = (u - k * 0.6931471803691238) - k * 1.9082149292705877e-10, rr = r * r;
+    uint64_t bits; /* the last bits of shifted are k */
+    double sum = 1.1470745597729725e-11, other = 1.6059043836821613e-10;
+    memcpy(&bits, &shifted, sizeof bits);
+    bits = (bits + 1023) << 52;
+    memcpy(power, &bits, sizeof *power);
+    sum = sum * rr + 2.08767569878681e-09;
+    other = other * rr + 2.505210838544172e-08;
+    sum = sum * rr + 2.755731922398589e-07;
+    other = other * rr + 2.7557319223985893e-06;
+    sum = sum * rr + 2.48015873015873e-05;
+    other = other * rr + 0.0001984126984126984;
+    sum = sum * rr + 0.001388888888888889;
+    other = other * rr + 0.008333333333333333;
+    sum = sum * rr + 0.041666666666666664;
+    other = other * rr + 0.16666666666666666;
+    sum = (sum * r + other) * r + 0.5;
+    sum = sum * rr + r;
+    return *power * sum;
+}
+
+/* exp(u) - 1 for the loops over lanes. No number beyond |u| = 700. */
+static inline double lotka_volterra_expm1_lane(double u)
+{
+    double power;
+    const double rest = lotka_volterra_exp_parts(u, &power);
+    return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
+}
+
+/* lotka_volterra_linearise in all lanes. */
 static void lotka_volterra_linearise_lanes(lotka_volterra_lanes coef[restrict 1],
     lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes displacement[restrict 3],
     lotka_volterra_lanes increment[restrict 3], lotka_volterra_lanes jacobian[restrict 9],
@@ -723,7 +723,7 @@ static void lotka_volterra_linearise_lanes(lotka_volterra_lanes coef[restrict 1]
     }
 }
 
-/* lotka_volterra_evaluate in all lanes */
+/* lotka_volterra_evaluate in all lanes. */
 static void lotka_volterra_evaluate_lanes(lotka_volterra_lanes coef[restrict 1],
     lotka_volterra_lanes y[restrict 3], lotka_volterra_lanes displacement[restrict 3],
     lotka_volterra_lanes increment[restrict 3])
@@ -744,7 +744,7 @@ static void lotka_volterra_evaluate_lanes(lotka_volterra_lanes coef[restrict 1],
     }
 }
 
-/* lotka_volterra_invert in all lanes */
+/* lotka_volterra_invert in all lanes. */
 static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
     lotka_volterra_lanes slope[restrict 9], lotka_volterra_lanes inverse[restrict 9],
     lotka_volterra_lanes gain[restrict 9], lotka_volterra_lanes reciprocal[restrict 3])
@@ -825,7 +825,7 @@ static double lotka_volterra_largest(const lotka_volterra_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
 {
     lotka_volterra_lanes delta[lotka_volterra_DIM];
@@ -850,9 +850,9 @@ static double lotka_volterra_remaining(double size, double bend, double bound)
     return growth > 1.0 ? growth * left : left;
 }
 
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is
+/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is
    infinite. */
-static void lotka_volterra_tabulate(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
+static void lotka_volterra_linearise_stage(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
 {
     lotka_volterra_lanes jacobian[lotka_volterra_DIM * lotka_volterra_DIM], reciprocal[lotka_volterra_DIM];
     lotka_volterra_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian,
@@ -866,12 +866,12 @@ static void lotka_volterra_tabulate(lotka_volterra_lanes coef[restrict], lotka_v
     }
 }
 
-/* The table of a stage, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model,
     int matrices)
 {
     if (matrices)
-        lotka_volterra_tabulate(coef, model);
+        lotka_volterra_linearise_stage(coef, model);
     else
         lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
@@ -883,11 +883,6 @@ typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     lotka_volterra_lanes coef[lotka_volterra_COEFFICIENTS], weight[lotka_volterra_WINDOW][lotka_volterra_DIM];
 } lotka_volterra_table;
-
-/* The stages of a step. */
-typedef struct {
-    lotka_volterra_model stage;
-} lotka_volterra_models;
 
 /* lotka_volterra_near for the guesses of all lanes, seen from one value. */
 static int lotka_volterra_near_lanes(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
@@ -906,31 +901,30 @@ static int lotka_volterra_near_lanes(lotka_volterra_lanes y[restrict lotka_volte
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void lotka_volterra_chain(lotka_volterra_models *models, double x[lotka_volterra_DIM],
+static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_volterra_DIM],
     double carry[lotka_volterra_DIM])
 {
     double residual[lotka_volterra_DIM], sum[lotka_volterra_DIM], small[lotka_volterra_DIM];
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
-        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
         const int after = (lane + 1) % lotka_volterra_LANES;
-        lotka_volterra_model *at = &models->stage, *next = &models->stage;
         /* two sums, so that no long chain of additions is waited for */
         double even[lotka_volterra_DIM] = { 0.0 }, odd[lotka_volterra_DIM] = { 0.0 };
         for (int i = 0; i < lotka_volterra_DIM; ++i) {
-            at->residual[i][lane] = residual[i];
+            model->residual[i][lane] = residual[i];
             for (int j = 0; j < lotka_volterra_DIM; j += 2)
-                even[i] += at->gain[i * lotka_volterra_DIM + j][lane] * residual[j];
+                even[i] += model->gain[i * lotka_volterra_DIM + j][lane] * residual[j];
             for (int j = 1; j < lotka_volterra_DIM; j += 2)
-                odd[i] += at->gain[i * lotka_volterra_DIM + j][lane] * residual[j];
+                odd[i] += model->gain[i * lotka_volterra_DIM + j][lane] * residual[j];
         }
         for (int i = 0; i < lotka_volterra_DIM; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            const double change = model->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (model->displacement[i][after] - model->displacement[i][lane]) - change;
+            const double moved = (model->y[i][after] - model->y[i][lane]) + turn;
             residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
@@ -943,7 +937,7 @@ static void lotka_volterra_chain(lotka_volterra_models *models, double x[lotka_v
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
-static void lotka_volterra_refresh_stage(const lotka_volterra_solver *s, lotka_volterra_table *table)
+static void lotka_volterra_refresh(const lotka_volterra_solver *s, lotka_volterra_table *table)
 {
     if (table->fits == s->history.fits) return;
     table->fits = s->history.fits;
@@ -951,11 +945,6 @@ static void lotka_volterra_refresh_stage(const lotka_volterra_solver *s, lotka_v
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) table->coef[k][lane] = s->coef[k];
     memcpy(table->weight, s->history.weight,
         (size_t)s->history.recurrence_terms * lotka_volterra_DIM * sizeof(lotka_volterra_lanes));
-}
-
-static void lotka_volterra_refresh(const lotka_volterra_solver *s, lotka_volterra_table *table)
-{
-    lotka_volterra_refresh_stage(s, table);
 }
 
 /* Guesses for the next lotka_volterra_LANES values of a stage, by its recurrences. */
@@ -989,9 +978,8 @@ static void lotka_volterra_record_lanes(lotka_volterra_history *history,
     history->count += lotka_volterra_LANES;
 }
 
-/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
-   mean the mean slope. */
-static void lotka_volterra_stride(const lotka_volterra_solver *s, double h, double x[lotka_volterra_DIM],
+/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+static void lotka_volterra_runge_kutta(const lotka_volterra_solver *s, double h, double x[lotka_volterra_DIM],
     double mean[lotka_volterra_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
@@ -1022,38 +1010,28 @@ static void lotka_volterra_from_means(lotka_volterra_lanes coef[restrict], lotka
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void lotka_volterra_march(const lotka_volterra_solver *s, lotka_volterra_table *table,
-    lotka_volterra_models *models)
+static void lotka_volterra_guess_by_runge_kutta(const lotka_volterra_solver *s, lotka_volterra_table *table,
+    lotka_volterra_model *model)
 {
     double x[lotka_volterra_DIM], mean[lotka_volterra_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
-    lotka_volterra_model *at = &models->stage;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        for (int i = 0; i < lotka_volterra_DIM; ++i) at->y[i][lane] = x[i];
-        lotka_volterra_stride(s, h, x, mean);
-        for (int i = 0; i < lotka_volterra_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i) model->y[i][lane] = x[i];
+        lotka_volterra_runge_kutta(s, h, x, mean);
+        for (int i = 0; i < lotka_volterra_DIM; ++i) model->y[i][lane] += 0.5 * h * mean[i];
     }
-    lotka_volterra_from_means(table->coef, &models->stage);
+    lotka_volterra_from_means(table->coef, model);
 }
 
 /* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
    near the state. */
 static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *table,
-    lotka_volterra_models *models)
+    lotka_volterra_model *model)
 {
-    if (!s->blocks.use_recurrences) lotka_volterra_march(s, table, models);
-    if (s->blocks.use_recurrences) lotka_volterra_foresee(&s->history, table->weight, models->stage.y);
-    if (!lotka_volterra_near_lanes(models->stage.y, s->x)) return 0;
-    return 1;
-}
-
-/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
-static double lotka_volterra_correct_stage(lotka_volterra_model *model)
-{
-    lotka_volterra_lanes sizes;
-    lotka_volterra_correct(model, sizes);
-    return lotka_volterra_largest(sizes);
+    if (s->blocks.use_recurrences) lotka_volterra_foresee(&s->history, table->weight, model->y);
+    else lotka_volterra_guess_by_runge_kutta(s, table, model);
+    return lotka_volterra_near_lanes(model->y, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -1068,20 +1046,20 @@ static double lotka_volterra_correct_stage(lotka_volterra_model *model)
    it takes more than most. */
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
-    lotka_volterra_models models;
+    lotka_volterra_model model;
+    lotka_volterra_lanes sizes;
     double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!lotka_volterra_guess(s, table, &models)) return 0;
+    if (!lotka_volterra_guess(s, table, &model)) return 0;
     while (!solved) {
-        double size = 0.0;
         const int matrices = previous > lotka_volterra_FROZEN;
-        lotka_volterra_update(table->coef, &models.stage, matrices);
+        lotka_volterra_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        lotka_volterra_chain(&models, x, carry);
-        const double largest = lotka_volterra_correct_stage(&models.stage);
-        size = largest > size ? largest : size;
+        lotka_volterra_chain(&model, x, carry);
+        lotka_volterra_correct(&model, sizes);
+        const double size = lotka_volterra_largest(sizes);
         s->evaluations += lotka_volterra_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = lotka_volterra_remaining(size, bend, bound);
@@ -1090,14 +1068,14 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!lotka_volterra_near_lanes(models.stage.y, s->x)) return 0;
+    if (!lotka_volterra_near_lanes(model.y, s->x)) return 0;
     for (int i = 0; i < lotka_volterra_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     lotka_volterra_count(s, lotka_volterra_LANES);
     lotka_volterra_history *history = &s->history;
-    lotka_volterra_record_lanes(history, models.stage.y);
+    lotka_volterra_record_lanes(history, model.y);
     history->slow_steps = passes > 1 ? history->slow_steps + lotka_volterra_LANES : 0;
     if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
         lotka_volterra_fit(history);
@@ -1107,8 +1085,10 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
 enum {
     /* steps that fits for whole blocks are saved in */
     lotka_volterra_REPAY_BLOCKS = 4 * lotka_volterra_REPAY,
-    lotka_volterra_MOST_SINGLE_STEPS = 1000 /* before blocks are tried again */
+    lotka_volterra_MOST_SINGLE_STEPS = 1000,           /* before blocks are tried again */
+    lotka_volterra_TOO_MANY = 5 * lotka_volterra_LANES /* of these: recurrences are to blame */
 };
+#define lotka_volterra_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void lotka_volterra_give_up(lotka_volterra_solver *s)
@@ -1136,8 +1116,7 @@ static void lotka_volterra_choose_guess(lotka_volterra_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < lotka_volterra_REPAY_BLOCKS && s->steps < lotka_volterra_REPAY) return;
-    s->blocks.use_recurrences = 1;
-    s->blocks.use_recurrences = s->blocks.use_recurrences && lotka_volterra_fitted(&s->history);
+    s->blocks.use_recurrences = lotka_volterra_fitted(&s->history);
     s->blocks.single_steps = lotka_volterra_LANES;
     if (!s->blocks.use_recurrences) lotka_volterra_give_up(s);
 }
@@ -1157,7 +1136,7 @@ static void lotka_volterra_learn_from(lotka_volterra_solver *s, int passes)
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
-        > 5 * lotka_volterra_LANES) {
+        > lotka_volterra_TOO_MANY) {
         lotka_volterra_give_up(s);
     }
 }
@@ -1168,7 +1147,8 @@ static lotka_volterra_status lotka_volterra_single(lotka_volterra_solver *s)
     const size_t before = s->evaluations;
     const lotka_volterra_status status = lotka_volterra_step(s, s->h);
     const double evaluations = (double)(s->evaluations - before);
-    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
+    s->blocks.evaluations_per_stage +=
+        lotka_volterra_LATEST * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
@@ -1205,7 +1185,7 @@ typedef struct {
     size_t members, steps, own;
     const lotka_volterra_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;         /* 0 where there are no frames */
+    size_t stride;
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } lotka_volterra_members;
@@ -1231,7 +1211,7 @@ static lotka_volterra_status lotka_volterra_take_member(const lotka_volterra_mem
 static size_t lotka_volterra_to_frame(const lotka_volterra_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -1542,18 +1522,18 @@ static int lotka_volterra_group_step(lotka_volterra_group *group, size_t remaini
     lotka_volterra_lanes x[lotka_volterra_DIM], carry[lotka_volterra_DIM];
     lotka_volterra_model model;
     const int next = (group->latest > 0 ? group->latest : lotka_volterra_REMEMBERED) - 1;
-    int most = 0;
+    int slow = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     const int iterations = lotka_volterra_group_solve(group, &model);
     lotka_volterra_group_advance(group->x, group->carry, &model);
-    if (iterations > most) most = iterations;
+    slow = slow || iterations > 1;
     if ((iterations > 1 && next % lotka_volterra_HISTORY == 0) || group->count < lotka_volterra_HISTORY)
         lotka_volterra_group_judge(group, model.y);
     memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
     if (group->count < lotka_volterra_REMEMBERED) ++group->count;
-    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    group->slow_steps = slow ? group->slow_steps + 1 : 0;
     if (group->slow_steps > group->slow_steps_allowed && group->count == lotka_volterra_REMEMBERED
         && remaining >= lotka_volterra_GROUP_REPAY)
         lotka_volterra_group_fit(group);
@@ -1609,13 +1589,13 @@ static lotka_volterra_status lotka_volterra_group_end(const lotka_volterra_group
 static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_members *all, size_t first)
 {
     lotka_volterra_group group;
-    lotka_volterra_status worst = lotka_volterra_OK, member[lotka_volterra_LANES];
+    lotka_volterra_status result = lotka_volterra_OK, begun[lotka_volterra_LANES];
     const int count = all->members - first < lotka_volterra_LANES ? (int)(all->members - first)
         : lotka_volterra_LANES;
     size_t left = all->steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane)
-        member[lane] = lotka_volterra_group_join(&group, lane, all, first + (size_t)lane);
+        begun[lane] = lotka_volterra_group_join(&group, lane, all, first + (size_t)lane);
     for (int active = count; left > 0 && active >= lotka_volterra_FEWEST;) {
         active = lotka_volterra_group_step(&group, left--);
         if (all->frames != NULL) lotka_volterra_group_frame(&group, all, first, all->steps - left);
@@ -1623,17 +1603,17 @@ static lotka_volterra_status lotka_volterra_group_run(const lotka_volterra_membe
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
         const lotka_volterra_status status = lotka_volterra_group_end(&group, lane, all, first + (size_t)lane,
-            member[lane]);
-        if (worst == lotka_volterra_OK) worst = status;
+            begun[lane]);
+        if (result == lotka_volterra_OK) result = status;
     }
-    return worst;
+    return result;
 }
 
 /* ---- Ensembles ---- */
 /* All members. The first status that is not OK. */
 static lotka_volterra_status lotka_volterra_run(const lotka_volterra_members *all)
 {
-    lotka_volterra_status worst = lotka_volterra_OK;
+    lotka_volterra_status result = lotka_volterra_OK;
     size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
@@ -1646,10 +1626,10 @@ static lotka_volterra_status lotka_volterra_run(const lotka_volterra_members *al
 #endif
         if (first < earliest) {
             earliest = first;
-            worst = group;
+            result = group;
         }
     }
-    return worst;
+    return result;
 }
 
 lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *params, double *x, size_t members,
@@ -1659,8 +1639,8 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
     lotka_volterra_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
         .status = status };
     if (x == NULL && members > 0) return lotka_volterra_BAD_ARGUMENT;
-    const lotka_volterra_status worst = lotka_volterra_run(&all);
-    return isfinite(h) ? worst : lotka_volterra_BAD_ARGUMENT;
+    const lotka_volterra_status result = lotka_volterra_run(&all);
+    return isfinite(h) ? result : lotka_volterra_BAD_ARGUMENT;
 }
 
 lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *params, double *x,
@@ -1670,7 +1650,7 @@ lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return lotka_volterra_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return lotka_volterra_BAD_ARGUMENT;
-    all.stride = frames != NULL ? stride : 0;
+    all.stride = stride;
     all.frames = frames;
     all.status = status;
     return lotka_volterra_run(&all);

@@ -2,7 +2,7 @@
  * lotka_volterra.h: the declarations; lotka_volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5dfde5b4dfff6f8403d2ac0695f9ec7ece6f8057990acd669a36b3cdd08c3129
+ * body-sha256: 9994bdbec9ce2d28d95bfa531d87eace25d2a274359377fe9e8da9f5ad86473c
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define lotka_volterra_DIM 3
 #define lotka_volterra_ORDER 2
 #define lotka_volterra_CASIMIRS 1
@@ -28,10 +27,8 @@ typedef struct {
 extern const lotka_volterra_params lotka_volterra_default_params;
 
 /* How a step ends; lotka_volterra_status_string says it in words. */
-typedef enum {
-    lotka_volterra_OK = 0, lotka_volterra_NO_CONVERGENCE, lotka_volterra_SINGULAR, lotka_volterra_NOT_FINITE,
-        lotka_volterra_BAD_ARGUMENT
-} lotka_volterra_status;
+typedef enum { lotka_volterra_OK = 0, lotka_volterra_NO_CONVERGENCE, lotka_volterra_SINGULAR,
+    lotka_volterra_NOT_FINITE, lotka_volterra_BAD_ARGUMENT } lotka_volterra_status;
 const char *lotka_volterra_status_string(lotka_volterra_status status);
 
 enum { lotka_volterra_KEPT = 2 * lotka_volterra_REMEMBERED };

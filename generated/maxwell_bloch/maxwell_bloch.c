@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 9f98b294e0b39753988947b9a1d77827f111a18318dce5f0f930f9f5711ef3c4
+ * body-sha256: ac717d0fa5d5b598439ff76dd708095743ecb4436760d8c34812e7e4051f2307
  */
 #include "maxwell_bloch.h"
 #include <float.h>
@@ -25,7 +25,7 @@ const maxwell_bloch_params maxwell_bloch_default_params = { 0 };
 enum { maxwell_bloch_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define maxwell_bloch_TOLERANCE 1e-20 /* the error that an accepted correction may leave, as estimated */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void maxwell_bloch_prepare(const maxwell_bloch_params *params, double h, double coef[3])
 {
     (void)params;
@@ -35,8 +35,8 @@ static void maxwell_bloch_prepare(const maxwell_bloch_params *params, double h, 
     coef[2] = 1.0 / 6.0 * t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void maxwell_bloch_linearise(const double coef[3], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -284,8 +284,8 @@ maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_b
     const double x0[maxwell_bloch_DIM])
 {
     if (s == NULL || x0 == NULL) return maxwell_bloch_BAD_ARGUMENT;
-    maxwell_bloch_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : maxwell_bloch_default_params };
+    if (params == NULL) params = &maxwell_bloch_default_params;
+    maxwell_bloch_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!maxwell_bloch_finite(fresh.x, maxwell_bloch_DIM)) return maxwell_bloch_BAD_ARGUMENT;
     *s = fresh;
@@ -372,16 +372,16 @@ size_t maxwell_bloch_solver_steps_done(const maxwell_bloch_solver *s) { return s
 maxwell_bloch_status maxwell_bloch_ensemble(const maxwell_bloch_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    maxwell_bloch_status worst = isfinite(h) ? maxwell_bloch_OK : maxwell_bloch_BAD_ARGUMENT;
+    maxwell_bloch_status result = isfinite(h) ? maxwell_bloch_OK : maxwell_bloch_BAD_ARGUMENT;
     if (x == NULL && members > 0) return maxwell_bloch_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         maxwell_bloch_solver s;
         for (size_t i = 0; i < maxwell_bloch_DIM; ++i) s.x[i] = x[i * members + m];
-        maxwell_bloch_status member = maxwell_bloch_init(&s, params, s.x);
-        if (member == maxwell_bloch_OK) member = maxwell_bloch_integrate(&s, h, steps);
+        maxwell_bloch_status ended = maxwell_bloch_init(&s, params, s.x);
+        if (ended == maxwell_bloch_OK) ended = maxwell_bloch_integrate(&s, h, steps);
         for (size_t i = 0; i < maxwell_bloch_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == maxwell_bloch_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == maxwell_bloch_OK) result = ended;
     }
-    return worst;
+    return result;
 }

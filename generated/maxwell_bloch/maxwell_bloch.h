@@ -2,7 +2,7 @@
  * maxwell_bloch.h: the declarations; maxwell_bloch.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 949fd9bc22505dd705e6dec9cdb474ed63924b063f6777dace61269c6982aa2a
+ * body-sha256: 4c6e175fedb6b03a8490d96a031feb64b3b08b78929033a40f6cb4af1184bd3c
  */
 #ifndef MAXWELL_BLOCH_H
 #define MAXWELL_BLOCH_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define maxwell_bloch_DIM 3
 #define maxwell_bloch_ORDER 4
 #define maxwell_bloch_CASIMIRS 1
@@ -25,10 +24,8 @@ typedef struct {
 extern const maxwell_bloch_params maxwell_bloch_default_params;
 
 /* How a step ends; maxwell_bloch_status_string says it in words. */
-typedef enum {
-    maxwell_bloch_OK = 0, maxwell_bloch_NO_CONVERGENCE, maxwell_bloch_SINGULAR, maxwell_bloch_NOT_FINITE,
-        maxwell_bloch_BAD_ARGUMENT
-} maxwell_bloch_status;
+typedef enum { maxwell_bloch_OK = 0, maxwell_bloch_NO_CONVERGENCE, maxwell_bloch_SINGULAR,
+    maxwell_bloch_NOT_FINITE, maxwell_bloch_BAD_ARGUMENT } maxwell_bloch_status;
 const char *maxwell_bloch_status_string(maxwell_bloch_status status);
 
 enum { maxwell_bloch_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

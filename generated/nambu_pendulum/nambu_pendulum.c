@@ -11,10 +11,10 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
- *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; Several steps or members at
- *   once; The solver; Newton's method in lanes; Paths in lanes; Blocks along paths; Blocks of steps;
+ *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
+ *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; Blocks of steps;
  *   Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 7d2a556bd1e3561e179ed818c74892561c9a32fc6610d4809739ebc7f1b714c1
+ * body-sha256: 564add0e54f5e90b8bb468bf7b2a604e343dd1447f1045e47ab348e74fc5ac37
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -45,7 +45,7 @@ enum { nambu_pendulum_SLOPE_FIXED = 1 };  /* further values that are constant al
 /* The series of dm_i/dt along a path, for each i. */
 static const int nambu_pendulum_path_slopes[nambu_pendulum_DIM] = { 10, 6, 7 };
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void nambu_pendulum_prepare(const nambu_pendulum_params *params, double h, double coef[restrict 3])
 {
     (void)params;
@@ -54,7 +54,8 @@ static void nambu_pendulum_prepare(const nambu_pendulum_params *params, double h
     coef[2] = 0.5 * h;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void nambu_pendulum_generate(const double coef[3], const double y[3], double slope[restrict 3],
     double jacobian[restrict 9])
 {
@@ -76,7 +77,7 @@ static void nambu_pendulum_generate(const double coef[3], const double y[3], dou
     jacobian[8] = 1.0;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
+/* Elimination without pivoting: the solution, and the reciprocals of the pivots. */
 static void nambu_pendulum_eliminate(const double matrix[9], const double side[3],
     double solution[restrict 3], double reciprocal[restrict 3])
 {
@@ -669,73 +670,14 @@ static nambu_pendulum_status nambu_pendulum_attempt(nambu_pendulum_solver *s)
     return nambu_pendulum_NO_CONVERGENCE;
 }
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
-   at once. Compilers make vector instructions of the loops over lanes. */
-enum { nambu_pendulum_LANES = 8 }; /* what one vector of AVX-512 holds */
-
-#if defined(__GNUC__)
-/* a value in each lane */
-typedef double nambu_pendulum_lanes[nambu_pendulum_LANES] __attribute__((aligned(64)));
-#else
-typedef double nambu_pendulum_lanes[nambu_pendulum_LANES];
-#endif
-
-/* Before a loop over lanes: tells compilers that they are independent. */
-#if defined(__clang__)
-#define nambu_pendulum_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define nambu_pendulum_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define nambu_pendulum_EACH_LANE
-#endif
-
-/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
-#define nambu_pendulum_ROUNDER 6755399441055744.0
-
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double nambu_pendulum_turned_sin(double u, double offset)
-{
-    const double shifted = (u * 0.3183098861837907 + offset) + nambu_pendulum_ROUNDER,
-        k = (shifted - nambu_pendulum_ROUNDER) - offset;
-    const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
-    const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
-    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
-    sum = sum * qq + -8.22063524662433e-18;
-    other = other * qq + 2.8114572543455206e-15;
-    sum = sum * qq + -7.647163731819816e-13;
-    other = other * qq + 1.6059043836821613e-10;
-    sum = sum * qq + -2.505210838544172e-08;
-    other = other * qq + 2.7557319223985893e-06;
-    sum = sum * qq + -0.0001984126984126984;
-    other = other * qq + 0.008333333333333333;
-    sum = (sum * q + other) * q + -0.16666666666666666;
-    value = r + r * q * sum;
-    memcpy(&parity, &shifted, sizeof parity);
-    memcpy(&bits, &value, sizeof bits);
-    bits ^= parity << 63;
-    memcpy(&value, &bits, sizeof bits);
-    return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
-}
-
-/* sin u for the loops over lanes. */
-static inline double nambu_pendulum_sin_lane(double u) { return nambu_pendulum_turned_sin(u, 0.0); }
-
-/* cos u for the loops over lanes. */
-static inline double nambu_pendulum_cos_lane(double u) { return nambu_pendulum_turned_sin(u, 0.5); }
-
 /* ---- The solver ---- */
 /* The arguments may be parts of *s, which is therefore written last. */
 nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
     const double x0[nambu_pendulum_DIM])
 {
     if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
-    nambu_pendulum_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : nambu_pendulum_default_params };
+    if (params == NULL) params = &nambu_pendulum_default_params;
+    nambu_pendulum_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!nambu_pendulum_finite(fresh.x, nambu_pendulum_DIM)) return nambu_pendulum_BAD_ARGUMENT;
     *s = fresh;
@@ -751,7 +693,7 @@ static nambu_pendulum_status nambu_pendulum_set_step(nambu_pendulum_solver *s, d
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = nambu_pendulum_REPAY;
     memset(&s->blocks, 0, sizeof s->blocks);
-    s->blocks.single_steps = 2 * nambu_pendulum_LANES;
+    s->blocks.single_steps = 2 * nambu_pendulum_AHEAD;
     s->blocks.passes_without_recurrences = INT_MAX;
     s->h = h;
     s->t_before_h = s->t;
@@ -843,7 +785,66 @@ const char *nambu_pendulum_status_string(nambu_pendulum_status status)
 size_t nambu_pendulum_solver_size(void) { return sizeof(nambu_pendulum_solver); }
 size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s) { return s->steps; }
 
-/* nambu_pendulum_curvature in all lanes */
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { nambu_pendulum_LANES = 8 }; /* what one vector of AVX-512 holds */
+
+#if defined(__GNUC__)
+/* a value in each lane */
+typedef double nambu_pendulum_lanes[nambu_pendulum_LANES] __attribute__((aligned(64)));
+#else
+typedef double nambu_pendulum_lanes[nambu_pendulum_LANES];
+#endif
+
+/* Before a loop over lanes: tells compilers that they are independent. */
+#if defined(__clang__)
+#define nambu_pendulum_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define nambu_pendulum_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define nambu_pendulum_EACH_LANE
+#endif
+
+/* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
+#define nambu_pendulum_ROUNDER 6755399441055744.0
+
+/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
+   beyond |u| = 10^6. */
+static inline double nambu_pendulum_turned_sin(double u, double offset)
+{
+    const double shifted = (u * 0.3183098861837907 + offset) + nambu_pendulum_ROUNDER,
+        k = (shifted - nambu_pendulum_ROUNDER) - offset;
+    const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
+    const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
+    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
+    sum = sum * qq + -8.22063524662433e-18;
+    other = other * qq + 2.8114572543455206e-15;
+    sum = sum * qq + -7.647163731819816e-13;
+    other = other * qq + 1.6059043836821613e-10;
+    sum = sum * qq + -2.505210838544172e-08;
+    other = other * qq + 2.7557319223985893e-06;
+    sum = sum * qq + -0.0001984126984126984;
+    other = other * qq + 0.008333333333333333;
+    sum = (sum * q + other) * q + -0.16666666666666666;
+    value = r + r * q * sum;
+    memcpy(&parity, &shifted, sizeof parity);
+    memcpy(&bits, &value, sizeof bits);
+    bits ^= parity << 63;
+    memcpy(&value, &bits, sizeof bits);
+    return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
+}
+
+/* sin u for the loops over lanes. */
+static inline double nambu_pendulum_sin_lane(double u) { return nambu_pendulum_turned_sin(u, 0.0); }
+
+/* cos u for the loops over lanes. */
+static inline double nambu_pendulum_cos_lane(double u) { return nambu_pendulum_turned_sin(u, 0.5); }
+
+/* nambu_pendulum_curvature in all lanes. */
 static void nambu_pendulum_curvature_lanes(nambu_pendulum_lanes coef[restrict 3],
     nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes slope[restrict 3],
     nambu_pendulum_lanes slope_jacobian[restrict 9])
@@ -867,7 +868,7 @@ static void nambu_pendulum_curvature_lanes(nambu_pendulum_lanes coef[restrict 3]
     }
 }
 
-/* nambu_pendulum_momentum in all lanes */
+/* nambu_pendulum_momentum in all lanes. */
 static void nambu_pendulum_momentum_lanes(nambu_pendulum_lanes coef[restrict 3],
     nambu_pendulum_lanes y[restrict 3], nambu_pendulum_lanes slope[restrict 3])
 {
@@ -880,7 +881,7 @@ static void nambu_pendulum_momentum_lanes(nambu_pendulum_lanes coef[restrict 3],
     }
 }
 
-/* nambu_pendulum_values in all lanes */
+/* nambu_pendulum_values in all lanes. */
 static void nambu_pendulum_values_lanes(nambu_pendulum_lanes coef[restrict 3],
     nambu_pendulum_lanes p[restrict 3], nambu_pendulum_lanes m[restrict 3],
     nambu_pendulum_lanes value[restrict 11], nambu_pendulum_lanes fixed[restrict 1])
@@ -904,7 +905,7 @@ static void nambu_pendulum_values_lanes(nambu_pendulum_lanes coef[restrict 3],
     }
 }
 
-/* nambu_pendulum_slope_values in all lanes */
+/* nambu_pendulum_slope_values in all lanes. */
 static void nambu_pendulum_slope_values_lanes(nambu_pendulum_lanes coef[restrict 3],
     nambu_pendulum_lanes p[restrict 3], nambu_pendulum_lanes value[restrict 11],
     nambu_pendulum_lanes fixed[restrict 1], nambu_pendulum_lanes slope[restrict 5],
@@ -922,7 +923,7 @@ static void nambu_pendulum_slope_values_lanes(nambu_pendulum_lanes coef[restrict
     }
 }
 
-/* nambu_pendulum_along_mean in all lanes */
+/* nambu_pendulum_along_mean in all lanes. */
 static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 18],
     nambu_pendulum_lanes odd[restrict 18], nambu_pendulum_lanes mean[restrict 18],
     nambu_pendulum_lanes hessian[restrict 9], nambu_pendulum_lanes alpha_y[restrict 9],
@@ -1058,7 +1059,7 @@ static void nambu_pendulum_along_mean_lanes(nambu_pendulum_lanes even[restrict 1
     }
 }
 
-/* nambu_pendulum_invert in all lanes */
+/* nambu_pendulum_invert in all lanes. */
 static void nambu_pendulum_invert_lanes(nambu_pendulum_lanes matrix[restrict 9],
     nambu_pendulum_lanes slope[restrict 9], nambu_pendulum_lanes inverse[restrict 9],
     nambu_pendulum_lanes gain[restrict 9], nambu_pendulum_lanes reciprocal[restrict 3])
@@ -1143,7 +1144,7 @@ static double nambu_pendulum_largest(const nambu_pendulum_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes delta[nambu_pendulum_DIM];
@@ -1605,7 +1606,7 @@ static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], 
     }
 }
 
-/* The table of a stage, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pendulum_model *model,
     int matrices)
 {
@@ -1630,11 +1631,6 @@ typedef struct {
     nambu_pendulum_lanes coef[nambu_pendulum_COEFFICIENTS], weight[nambu_pendulum_WINDOW][nambu_pendulum_DIM];
 } nambu_pendulum_table;
 
-/* The stages of a step. */
-typedef struct {
-    nambu_pendulum_model stage;
-} nambu_pendulum_models;
-
 /* nambu_pendulum_near for the guesses of all lanes, seen from one value. */
 static int nambu_pendulum_near_lanes(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
     const double last[nambu_pendulum_DIM])
@@ -1652,31 +1648,30 @@ static int nambu_pendulum_near_lanes(nambu_pendulum_lanes y[restrict nambu_pendu
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void nambu_pendulum_chain(nambu_pendulum_models *models, double x[nambu_pendulum_DIM],
+static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pendulum_DIM],
     double carry[nambu_pendulum_DIM])
 {
     double residual[nambu_pendulum_DIM], sum[nambu_pendulum_DIM], small[nambu_pendulum_DIM];
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
         const int after = (lane + 1) % nambu_pendulum_LANES;
-        nambu_pendulum_model *at = &models->stage, *next = &models->stage;
         /* two sums, so that no long chain of additions is waited for */
         double even[nambu_pendulum_DIM] = { 0.0 }, odd[nambu_pendulum_DIM] = { 0.0 };
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-            at->residual[i][lane] = residual[i];
+            model->residual[i][lane] = residual[i];
             for (int j = 0; j < nambu_pendulum_DIM; j += 2)
-                even[i] += at->gain[i * nambu_pendulum_DIM + j][lane] * residual[j];
+                even[i] += model->gain[i * nambu_pendulum_DIM + j][lane] * residual[j];
             for (int j = 1; j < nambu_pendulum_DIM; j += 2)
-                odd[i] += at->gain[i * nambu_pendulum_DIM + j][lane] * residual[j];
+                odd[i] += model->gain[i * nambu_pendulum_DIM + j][lane] * residual[j];
         }
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            const double change = model->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (model->displacement[i][after] - model->displacement[i][lane]) - change;
+            const double moved = (model->y[i][after] - model->y[i][lane]) + turn;
             residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
@@ -1689,7 +1684,7 @@ static void nambu_pendulum_chain(nambu_pendulum_models *models, double x[nambu_p
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
-static void nambu_pendulum_refresh_stage(const nambu_pendulum_solver *s, nambu_pendulum_table *table)
+static void nambu_pendulum_refresh(const nambu_pendulum_solver *s, nambu_pendulum_table *table)
 {
     if (table->fits == s->history.fits) return;
     table->fits = s->history.fits;
@@ -1697,11 +1692,6 @@ static void nambu_pendulum_refresh_stage(const nambu_pendulum_solver *s, nambu_p
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) table->coef[k][lane] = s->coef[k];
     memcpy(table->weight, s->history.weight,
         (size_t)s->history.recurrence_terms * nambu_pendulum_DIM * sizeof(nambu_pendulum_lanes));
-}
-
-static void nambu_pendulum_refresh(const nambu_pendulum_solver *s, nambu_pendulum_table *table)
-{
-    nambu_pendulum_refresh_stage(s, table);
 }
 
 /* Guesses for the next nambu_pendulum_LANES values of a stage, by its recurrences. */
@@ -1735,9 +1725,8 @@ static void nambu_pendulum_record_lanes(nambu_pendulum_history *history,
     history->count += nambu_pendulum_LANES;
 }
 
-/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
-   mean the mean slope. */
-static void nambu_pendulum_stride(const nambu_pendulum_solver *s, double h, double x[nambu_pendulum_DIM],
+/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+static void nambu_pendulum_runge_kutta(const nambu_pendulum_solver *s, double h, double x[nambu_pendulum_DIM],
     double mean[nambu_pendulum_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
@@ -1768,38 +1757,28 @@ static void nambu_pendulum_from_means(nambu_pendulum_lanes coef[restrict], nambu
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void nambu_pendulum_march(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
-    nambu_pendulum_models *models)
+static void nambu_pendulum_guess_by_runge_kutta(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
+    nambu_pendulum_model *model)
 {
     double x[nambu_pendulum_DIM], mean[nambu_pendulum_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
-    nambu_pendulum_model *at = &models->stage;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        for (int i = 0; i < nambu_pendulum_DIM; ++i) at->y[i][lane] = x[i];
-        nambu_pendulum_stride(s, h, x, mean);
-        for (int i = 0; i < nambu_pendulum_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) model->y[i][lane] = x[i];
+        nambu_pendulum_runge_kutta(s, h, x, mean);
+        for (int i = 0; i < nambu_pendulum_DIM; ++i) model->y[i][lane] += 0.5 * h * mean[i];
     }
-    nambu_pendulum_from_means(table->coef, &models->stage);
+    nambu_pendulum_from_means(table->coef, model);
 }
 
 /* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
    near the state. */
 static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *table,
-    nambu_pendulum_models *models)
+    nambu_pendulum_model *model)
 {
-    if (!s->blocks.use_recurrences) nambu_pendulum_march(s, table, models);
-    if (s->blocks.use_recurrences) nambu_pendulum_foresee(&s->history, table->weight, models->stage.y);
-    if (!nambu_pendulum_near_lanes(models->stage.y, s->x)) return 0;
-    return 1;
-}
-
-/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
-static double nambu_pendulum_correct_stage(nambu_pendulum_model *model)
-{
-    nambu_pendulum_lanes sizes;
-    nambu_pendulum_correct(model, sizes);
-    return nambu_pendulum_largest(sizes);
+    if (s->blocks.use_recurrences) nambu_pendulum_foresee(&s->history, table->weight, model->y);
+    else nambu_pendulum_guess_by_runge_kutta(s, table, model);
+    return nambu_pendulum_near_lanes(model->y, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -1814,20 +1793,20 @@ static double nambu_pendulum_correct_stage(nambu_pendulum_model *model)
    it takes more than most. */
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
-    nambu_pendulum_models models;
+    nambu_pendulum_model model;
+    nambu_pendulum_lanes sizes;
     double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!nambu_pendulum_guess(s, table, &models)) return 0;
+    if (!nambu_pendulum_guess(s, table, &model)) return 0;
     while (!solved) {
-        double size = 0.0;
         const int matrices = previous > nambu_pendulum_FROZEN;
-        nambu_pendulum_update(table->coef, &models.stage, matrices);
+        nambu_pendulum_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        nambu_pendulum_chain(&models, x, carry);
-        const double largest = nambu_pendulum_correct_stage(&models.stage);
-        size = largest > size ? largest : size;
+        nambu_pendulum_chain(&model, x, carry);
+        nambu_pendulum_correct(&model, sizes);
+        const double size = nambu_pendulum_largest(sizes);
         s->evaluations += nambu_pendulum_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = nambu_pendulum_remaining(size, bend, bound);
@@ -1836,14 +1815,14 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!nambu_pendulum_near_lanes(models.stage.y, s->x)) return 0;
+    if (!nambu_pendulum_near_lanes(model.y, s->x)) return 0;
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     nambu_pendulum_count(s, nambu_pendulum_LANES);
     nambu_pendulum_history *history = &s->history;
-    nambu_pendulum_record_lanes(history, models.stage.y);
+    nambu_pendulum_record_lanes(history, model.y);
     history->slow_steps = passes > 1 ? history->slow_steps + nambu_pendulum_LANES : 0;
     if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
         nambu_pendulum_fit(history);
@@ -1853,8 +1832,10 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
 enum {
     /* steps that fits for whole blocks are saved in */
     nambu_pendulum_REPAY_BLOCKS = 4 * nambu_pendulum_REPAY,
-    nambu_pendulum_MOST_SINGLE_STEPS = 1000 /* before blocks are tried again */
+    nambu_pendulum_MOST_SINGLE_STEPS = 1000,           /* before blocks are tried again */
+    nambu_pendulum_TOO_MANY = 5 * nambu_pendulum_LANES /* of these: recurrences are to blame */
 };
+#define nambu_pendulum_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void nambu_pendulum_give_up(nambu_pendulum_solver *s)
@@ -1882,8 +1863,7 @@ static void nambu_pendulum_choose_guess(nambu_pendulum_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < nambu_pendulum_REPAY_BLOCKS && s->steps < nambu_pendulum_REPAY) return;
-    s->blocks.use_recurrences = 1;
-    s->blocks.use_recurrences = s->blocks.use_recurrences && nambu_pendulum_fitted(&s->history);
+    s->blocks.use_recurrences = nambu_pendulum_fitted(&s->history);
     s->blocks.single_steps = nambu_pendulum_LANES;
     if (!s->blocks.use_recurrences) nambu_pendulum_give_up(s);
 }
@@ -1903,7 +1883,7 @@ static void nambu_pendulum_learn_from(nambu_pendulum_solver *s, int passes)
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
-        > 5 * nambu_pendulum_LANES) {
+        > nambu_pendulum_TOO_MANY) {
         nambu_pendulum_give_up(s);
     }
 }
@@ -1914,7 +1894,8 @@ static nambu_pendulum_status nambu_pendulum_single(nambu_pendulum_solver *s)
     const size_t before = s->evaluations;
     const nambu_pendulum_status status = nambu_pendulum_step(s, s->h);
     const double evaluations = (double)(s->evaluations - before);
-    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
+    s->blocks.evaluations_per_stage +=
+        nambu_pendulum_LATEST * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
@@ -1951,7 +1932,7 @@ typedef struct {
     size_t members, steps, own;
     const nambu_pendulum_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;         /* 0 where there are no frames */
+    size_t stride;
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } nambu_pendulum_members;
@@ -1977,7 +1958,7 @@ static nambu_pendulum_status nambu_pendulum_take_member(const nambu_pendulum_mem
 static size_t nambu_pendulum_to_frame(const nambu_pendulum_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -2288,18 +2269,18 @@ static int nambu_pendulum_group_step(nambu_pendulum_group *group, size_t remaini
     nambu_pendulum_lanes x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM];
     nambu_pendulum_model model;
     const int next = (group->latest > 0 ? group->latest : nambu_pendulum_REMEMBERED) - 1;
-    int most = 0;
+    int slow = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     const int iterations = nambu_pendulum_group_solve(group, &model);
     nambu_pendulum_group_advance(group->x, group->carry, &model);
-    if (iterations > most) most = iterations;
+    slow = slow || iterations > 1;
     if ((iterations > 1 && next % nambu_pendulum_HISTORY == 0) || group->count < nambu_pendulum_HISTORY)
         nambu_pendulum_group_judge(group, model.y);
     memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
     if (group->count < nambu_pendulum_REMEMBERED) ++group->count;
-    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    group->slow_steps = slow ? group->slow_steps + 1 : 0;
     if (group->slow_steps > group->slow_steps_allowed && group->count == nambu_pendulum_REMEMBERED
         && remaining >= nambu_pendulum_GROUP_REPAY)
         nambu_pendulum_group_fit(group);
@@ -2355,13 +2336,13 @@ static nambu_pendulum_status nambu_pendulum_group_end(const nambu_pendulum_group
 static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_members *all, size_t first)
 {
     nambu_pendulum_group group;
-    nambu_pendulum_status worst = nambu_pendulum_OK, member[nambu_pendulum_LANES];
+    nambu_pendulum_status result = nambu_pendulum_OK, begun[nambu_pendulum_LANES];
     const int count = all->members - first < nambu_pendulum_LANES ? (int)(all->members - first)
         : nambu_pendulum_LANES;
     size_t left = all->steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane)
-        member[lane] = nambu_pendulum_group_join(&group, lane, all, first + (size_t)lane);
+        begun[lane] = nambu_pendulum_group_join(&group, lane, all, first + (size_t)lane);
     for (int active = count; left > 0 && active >= nambu_pendulum_FEWEST;) {
         active = nambu_pendulum_group_step(&group, left--);
         if (all->frames != NULL) nambu_pendulum_group_frame(&group, all, first, all->steps - left);
@@ -2369,17 +2350,17 @@ static nambu_pendulum_status nambu_pendulum_group_run(const nambu_pendulum_membe
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
         const nambu_pendulum_status status = nambu_pendulum_group_end(&group, lane, all, first + (size_t)lane,
-            member[lane]);
-        if (worst == nambu_pendulum_OK) worst = status;
+            begun[lane]);
+        if (result == nambu_pendulum_OK) result = status;
     }
-    return worst;
+    return result;
 }
 
 /* ---- Ensembles ---- */
 /* All members. The first status that is not OK. */
 static nambu_pendulum_status nambu_pendulum_run(const nambu_pendulum_members *all)
 {
-    nambu_pendulum_status worst = nambu_pendulum_OK;
+    nambu_pendulum_status result = nambu_pendulum_OK;
     size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
@@ -2392,10 +2373,10 @@ static nambu_pendulum_status nambu_pendulum_run(const nambu_pendulum_members *al
 #endif
         if (first < earliest) {
             earliest = first;
-            worst = group;
+            result = group;
         }
     }
-    return worst;
+    return result;
 }
 
 nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *params, double *x, size_t members,
@@ -2405,8 +2386,8 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
     nambu_pendulum_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
         .status = status };
     if (x == NULL && members > 0) return nambu_pendulum_BAD_ARGUMENT;
-    const nambu_pendulum_status worst = nambu_pendulum_run(&all);
-    return isfinite(h) ? worst : nambu_pendulum_BAD_ARGUMENT;
+    const nambu_pendulum_status result = nambu_pendulum_run(&all);
+    return isfinite(h) ? result : nambu_pendulum_BAD_ARGUMENT;
 }
 
 nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *params, double *x,
@@ -2416,7 +2397,7 @@ nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return nambu_pendulum_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return nambu_pendulum_BAD_ARGUMENT;
-    all.stride = frames != NULL ? stride : 0;
+    all.stride = stride;
     all.frames = frames;
     all.status = status;
     return nambu_pendulum_run(&all);

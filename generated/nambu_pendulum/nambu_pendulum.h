@@ -2,7 +2,7 @@
  * nambu_pendulum.h: the declarations; nambu_pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c4e8a9df97c9eb1f66b3b12195b21d843ee431226daa8e00894b9a0af6b0e617
+ * body-sha256: 59a5e80f50437fa39d1288e4d6c36353ff33b1b90647ec5ad38d44c0fca904e7
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define nambu_pendulum_DIM 3
 #define nambu_pendulum_ORDER 4
 #define nambu_pendulum_CASIMIRS 1
@@ -28,10 +27,8 @@ typedef struct {
 extern const nambu_pendulum_params nambu_pendulum_default_params;
 
 /* How a step ends; nambu_pendulum_status_string says it in words. */
-typedef enum {
-    nambu_pendulum_OK = 0, nambu_pendulum_NO_CONVERGENCE, nambu_pendulum_SINGULAR, nambu_pendulum_NOT_FINITE,
-        nambu_pendulum_BAD_ARGUMENT
-} nambu_pendulum_status;
+typedef enum { nambu_pendulum_OK = 0, nambu_pendulum_NO_CONVERGENCE, nambu_pendulum_SINGULAR,
+    nambu_pendulum_NOT_FINITE, nambu_pendulum_BAD_ARGUMENT } nambu_pendulum_status;
 const char *nambu_pendulum_status_string(nambu_pendulum_status status);
 
 enum { nambu_pendulum_KEPT = 2 * nambu_pendulum_REMEMBERED };

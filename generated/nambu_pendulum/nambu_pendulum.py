@@ -9,7 +9,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 223ecca07c914a4f1eec5ab4bddf19362860f979834123fe6bd4c3eab7595143
+# body-sha256: 69003b7e553c092a786a1ea91b4f63e438c42bd9e2f4e42974e08d3cb668f93a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -116,8 +116,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     theta = y[..., 0]
     p = y[..., 1]
     t1 = np.sin(theta)

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 27fb9e096510855ec1d13a99f22e4bdf9d0b144cf24cadf4bc4d94fbd64976f3
+ * body-sha256: 435314c7e38c2511acc6933f420edc52c8c4f8e1e2cade6f38bae0abecbba0a3
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -60,7 +60,7 @@ static int nonlinear_wave_allowed(const nonlinear_wave_params *params, size_t si
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void nonlinear_wave_prepare(const nonlinear_wave_params *params, double h, double coef[restrict 4])
 {
     const double t1 = 1.0 / params->d, t2 = h * (t1 * t1);

@@ -2,7 +2,7 @@
  * nonlinear_wave.h: the declarations; nonlinear_wave.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aa53af7521fc728354254ff82291b155aded72ad3eecd51309e02f0c43ca39ee
+ * body-sha256: 8428a0c3fc48e7b27f4c8f02df37322c4380cee12b5d0ef6b56ded3c18acf7ac
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define nonlinear_wave_AXES 1
 #define nonlinear_wave_DIM 2
 #define nonlinear_wave_ORDER 4
@@ -30,10 +29,8 @@ enum { nonlinear_wave_ARRAYS = 2 };        /* arrays over the sites: fields, the
 enum { nonlinear_wave_COEFFICIENTS = 56 }; /* numbers that depend on params and h only */
 
 /* How a step ends; nonlinear_wave_status_string says it in words. */
-typedef enum {
-    nonlinear_wave_OK = 0, nonlinear_wave_NO_CONVERGENCE, nonlinear_wave_SINGULAR, nonlinear_wave_NOT_FINITE,
-        nonlinear_wave_BAD_ARGUMENT
-} nonlinear_wave_status;
+typedef enum { nonlinear_wave_OK = 0, nonlinear_wave_NO_CONVERGENCE, nonlinear_wave_SINGULAR,
+    nonlinear_wave_NOT_FINITE, nonlinear_wave_BAD_ARGUMENT } nonlinear_wave_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with nonlinear_wave_init; a copy of the struct is the

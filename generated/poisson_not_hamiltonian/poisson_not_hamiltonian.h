@@ -2,7 +2,7 @@
  * poisson_not_hamiltonian.h: the declarations; poisson_not_hamiltonian.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b2618f50837ab59ae39a72772c0607c4991a1ab514c6a2b899709be794a3d1dc
+ * body-sha256: 2dc70251cb9a0d361dbf0bc773a93da509886ffabc35979ca0b0706749d0b2b3
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define poisson_not_hamiltonian_DIM 3
 #define poisson_not_hamiltonian_ORDER 4
 #define poisson_not_hamiltonian_CASIMIRS 1
@@ -25,10 +24,9 @@ typedef struct {
 extern const poisson_not_hamiltonian_params poisson_not_hamiltonian_default_params;
 
 /* How a step ends; poisson_not_hamiltonian_status_string says it in words. */
-typedef enum {
-    poisson_not_hamiltonian_OK = 0, poisson_not_hamiltonian_NO_CONVERGENCE, poisson_not_hamiltonian_SINGULAR,
-        poisson_not_hamiltonian_NOT_FINITE, poisson_not_hamiltonian_BAD_ARGUMENT
-} poisson_not_hamiltonian_status;
+typedef enum { poisson_not_hamiltonian_OK = 0, poisson_not_hamiltonian_NO_CONVERGENCE,
+    poisson_not_hamiltonian_SINGULAR, poisson_not_hamiltonian_NOT_FINITE,
+    poisson_not_hamiltonian_BAD_ARGUMENT } poisson_not_hamiltonian_status;
 const char *poisson_not_hamiltonian_status_string(poisson_not_hamiltonian_status status);
 
 /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 0fa2ca4c593a6c0198347a1582a1c53d633bf826195e2db667f2878dc3dca748
+ * body-sha256: 062d098e57f89332fe390735b6acdc7a345e3e35fbd2da8004a76652fd26cc7b
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -33,7 +33,7 @@ static int predator_prey_allowed(const predator_prey_params *params)
         && params->death > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void predator_prey_prepare(const predator_prey_params *params, double h, double coef[11])
 {
     const double t1 = params->death * h, t2 = h * h, t3 = h * t2;
@@ -52,8 +52,8 @@ static void predator_prey_prepare(const predator_prey_params *params, double h, 
     coef[10] = -t6;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void predator_prey_linearise(const double coef[11], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
@@ -293,8 +293,8 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     const double x0[predator_prey_DIM])
 {
     if (s == NULL || x0 == NULL) return predator_prey_BAD_ARGUMENT;
-    predator_prey_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : predator_prey_default_params };
+    if (params == NULL) params = &predator_prey_default_params;
+    predator_prey_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!predator_prey_finite(fresh.x, predator_prey_DIM) || !predator_prey_allowed(&fresh.params)
@@ -384,16 +384,16 @@ size_t predator_prey_solver_steps_done(const predator_prey_solver *s) { return s
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    predator_prey_status worst = isfinite(h) ? predator_prey_OK : predator_prey_BAD_ARGUMENT;
+    predator_prey_status result = isfinite(h) ? predator_prey_OK : predator_prey_BAD_ARGUMENT;
     if (x == NULL && members > 0) return predator_prey_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         predator_prey_solver s;
         for (size_t i = 0; i < predator_prey_DIM; ++i) s.x[i] = x[i * members + m];
-        predator_prey_status member = predator_prey_init(&s, params, s.x);
-        if (member == predator_prey_OK) member = predator_prey_integrate(&s, h, steps);
+        predator_prey_status ended = predator_prey_init(&s, params, s.x);
+        if (ended == predator_prey_OK) ended = predator_prey_integrate(&s, h, steps);
         for (size_t i = 0; i < predator_prey_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == predator_prey_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == predator_prey_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * predator_prey.h: the declarations; predator_prey.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ff12303eb55d5f0fd38b4ed9373c10efc1e2a3e08e30946fccb7170100cb33b1
+ * body-sha256: 8519fc42cd79a20e95e492d7332158c6d706ab1e525bf5f78bb4e5a48a4ed28a
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define predator_prey_DIM 2
 #define predator_prey_ORDER 4
 #define predator_prey_CASIMIRS 0
@@ -28,10 +27,8 @@ typedef struct {
 extern const predator_prey_params predator_prey_default_params;
 
 /* How a step ends; predator_prey_status_string says it in words. */
-typedef enum {
-    predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR, predator_prey_NOT_FINITE,
-        predator_prey_BAD_ARGUMENT
-} predator_prey_status;
+typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR,
+    predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
 const char *predator_prey_status_string(predator_prey_status status);
 
 enum { predator_prey_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: c7edf92260a8abd38efb0344ffe257f368560b68fdcb5c2f85df18e1c5234c79
+ * body-sha256: 2f2efb60838374f72eef8695e8973948d35f79a26f86173445101fab05c1fb55
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -36,7 +36,7 @@ static int quaternion_top_allowed(const quaternion_top_params *params)
         && isfinite(params->I3) && params->I3 > 0.0 && isfinite(params->weight) && isfinite(params->spring);
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void quaternion_top_prepare(const quaternion_top_params *params, const double gauge[1], double h,
     double coef[47])
 {
@@ -109,7 +109,8 @@ static void quaternion_top_prepare(const quaternion_top_params *params, const do
     coef[46] = 2.0 / 3.0 * t50;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void quaternion_top_generate(const double coef[47], const double y[7], double slope[7],
     double jacobian[49])
 {
@@ -236,7 +237,7 @@ static void quaternion_top_generate(const double coef[47], const double y[7], do
     jacobian[48] = 1.0 - 0.5 * (t71 - t97 - t123);
 }
 
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 static void quaternion_top_products(const quaternion_top_params *params, const double x[7], double out[3])
 {
     const double m1 = x[0], m2 = x[1], m3 = x[2], w = x[3], x_ = x[4], y = x[5], z = x[6];
@@ -867,8 +868,8 @@ quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const 
     const double x0[quaternion_top_DIM], const double gauge[quaternion_top_GAUGES])
 {
     if (s == NULL || x0 == NULL) return quaternion_top_BAD_ARGUMENT;
-    quaternion_top_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : quaternion_top_default_params };
+    if (params == NULL) params = &quaternion_top_default_params;
+    quaternion_top_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     /* so short a step does not matter */
     quaternion_top_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
@@ -968,16 +969,16 @@ size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s) { return
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    quaternion_top_status worst = isfinite(h) ? quaternion_top_OK : quaternion_top_BAD_ARGUMENT;
+    quaternion_top_status result = isfinite(h) ? quaternion_top_OK : quaternion_top_BAD_ARGUMENT;
     if (x == NULL && members > 0) return quaternion_top_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         quaternion_top_solver s;
         for (size_t i = 0; i < quaternion_top_DIM; ++i) s.x[i] = x[i * members + m];
-        quaternion_top_status member = quaternion_top_init(&s, params, s.x);
-        if (member == quaternion_top_OK) member = quaternion_top_integrate(&s, h, steps);
+        quaternion_top_status ended = quaternion_top_init(&s, params, s.x);
+        if (ended == quaternion_top_OK) ended = quaternion_top_integrate(&s, h, steps);
         for (size_t i = 0; i < quaternion_top_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == quaternion_top_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == quaternion_top_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * quaternion_top.h: the declarations; quaternion_top.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1c3713800fcf73acb0773c1edeae28078ef52841fed30a46009abcac04e5c487
+ * body-sha256: db4dc9e74868099f541c5226dfa8698ca6b483c0589b3a385c57a8c2eb643309
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define quaternion_top_DIM 7
 #define quaternion_top_ORDER 4
 #define quaternion_top_CASIMIRS 1
@@ -30,10 +29,8 @@ typedef struct {
 extern const quaternion_top_params quaternion_top_default_params;
 
 /* How a step ends; quaternion_top_status_string says it in words. */
-typedef enum {
-    quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR, quaternion_top_NOT_FINITE,
-        quaternion_top_BAD_ARGUMENT
-} quaternion_top_status;
+typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR,
+    quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
 const char *quaternion_top_status_string(quaternion_top_status status);
 
 enum { quaternion_top_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

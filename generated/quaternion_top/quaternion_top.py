@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: f01782410b0a72d25c19544c225dc9e5510c52538e8ca474569aab2a205768ae
+# body-sha256: 2bfd70cfec44994e6a593bb80c8a7a0e7aa39ddc2b6366c8770f41ecac328117
 import numpy as np
 
 VERSION = "0.1.0"
@@ -225,8 +225,8 @@ def _prepare(parameters, gauge, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     m1 = y[..., 0]
     m2 = y[..., 1]
     m3 = y[..., 2]
@@ -884,7 +884,8 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

@@ -13,9 +13,9 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
- *   Casimirs taken from H; Several steps or members at once; The solver; Newton's method in lanes;
+ *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes;
  *   Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: a09cb947c71046f02288f1afddaef0e7a3ce368a3ad2d09fbcd371a38cdeb77c
+ * body-sha256: 7aeac0ad1628f4014295a663c48e5d8d34ec568e2bc37269b28eabd8ed509409
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -94,7 +94,7 @@ static double rigid_body_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void rigid_body_prepare(const rigid_body_params *params, const double gauge[1], double h,
     double coef[restrict 35])
 {
@@ -200,8 +200,8 @@ static void rigid_body_prepare(const rigid_body_params *params, const double gau
     coef[34] = 12.0 * t41;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void rigid_body_linearise(const double coef[35], const double y[3], double displacement[restrict 3],
     double increment[restrict 3], double jacobian[restrict 9], double increment_jacobian[restrict 9])
 {
@@ -272,7 +272,7 @@ static void rigid_body_linearise(const double coef[35], const double y[3], doubl
     increment_jacobian[8] = t63 - t61;
 }
 
-/* elimination without pivoting: the solution, and the reciprocals of the pivots */
+/* Elimination without pivoting: the solution, and the reciprocals of the pivots. */
 static void rigid_body_eliminate(const double matrix[9], const double side[3], double solution[restrict 3],
     double reciprocal[restrict 3])
 {
@@ -291,7 +291,7 @@ static void rigid_body_eliminate(const double matrix[9], const double side[3], d
     reciprocal[2] = t8;
 }
 
-/* the leading error vector pi grad S_3, as a function of the gauge */
+/* The leading error vector pi grad S_3, as a function of the gauge. */
 static void rigid_body_guide(const rigid_body_params *params, const double gauge[1], const double x[3],
     double error[restrict 3])
 {
@@ -316,7 +316,7 @@ static void rigid_body_guide(const rigid_body_params *params, const double gauge
     error[2] = x1 * t24 - x2 * t27;
 }
 
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 static void rigid_body_products(const rigid_body_params *params, const double x[3], double out[restrict 3])
 {
     const double x1 = x[0], x2 = x[1], x3 = x[2];
@@ -833,36 +833,14 @@ static void rigid_body_choose_gauge(const rigid_body_params *params, const doubl
         memset(gauge, 0, rigid_body_GAUGES * sizeof gauge[0]);
 }
 
-/* ---- Several steps or members at once ---- */
-/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
-   at once. Compilers make vector instructions of the loops over lanes. */
-enum { rigid_body_LANES = 8 }; /* what one vector of AVX-512 holds */
-
-#if defined(__GNUC__)
-typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); /* a value in each lane */
-#else
-typedef double rigid_body_lanes[rigid_body_LANES];
-#endif
-
-/* Before a loop over lanes: tells compilers that they are independent. */
-#if defined(__clang__)
-#define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
-#pragma clang diagnostic ignored "-Wpass-failed"
-#elif defined(__GNUC__)
-#define rigid_body_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
-#else
-#define rigid_body_EACH_LANE
-#endif
-
 /* ---- The solver ---- */
 /* The arguments may be parts of *s, which is therefore written last. */
 rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM], const double gauge[rigid_body_GAUGES])
 {
     if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
-    rigid_body_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : rigid_body_default_params };
+    if (params == NULL) params = &rigid_body_default_params;
+    rigid_body_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     rigid_body_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params)
@@ -890,7 +868,7 @@ static rigid_body_status rigid_body_set_step(rigid_body_solver *s, double h)
     memset(&s->history, 0, sizeof s->history);
     s->history.slow_steps_allowed = rigid_body_REPAY;
     memset(&s->blocks, 0, sizeof s->blocks);
-    s->blocks.single_steps = 2 * rigid_body_LANES;
+    s->blocks.single_steps = 2 * rigid_body_AHEAD;
     s->blocks.passes_without_recurrences = INT_MAX;
     s->h = h;
     s->t_before_h = s->t;
@@ -981,6 +959,28 @@ const char *rigid_body_status_string(rigid_body_status status)
 size_t rigid_body_solver_size(void) { return sizeof(rigid_body_solver); }
 size_t rigid_body_solver_steps_done(const rigid_body_solver *s) { return s->steps; }
 
+/* ---- Several steps or members at once ---- */
+/* Below, the formulas of a step are evaluated for several steps of a trajectory, or members of an ensemble,
+   at once. Compilers make vector instructions of the loops over lanes. */
+enum { rigid_body_LANES = 8 }; /* what one vector of AVX-512 holds */
+
+#if defined(__GNUC__)
+typedef double rigid_body_lanes[rigid_body_LANES] __attribute__((aligned(64))); /* a value in each lane */
+#else
+typedef double rigid_body_lanes[rigid_body_LANES];
+#endif
+
+/* Before a loop over lanes: tells compilers that they are independent. */
+#if defined(__clang__)
+#define rigid_body_EACH_LANE _Pragma("clang loop vectorize(assume_safety)")
+#pragma clang diagnostic push
+#pragma clang diagnostic ignored "-Wpass-failed"
+#elif defined(__GNUC__)
+#define rigid_body_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define rigid_body_EACH_LANE
+#endif
+
 /* rigid_body_phi0 for the loops over lanes: no branches. No number beyond |s| = 4.0. */
 static inline double rigid_body_phi0_lane(double s)
 {
@@ -1029,7 +1029,7 @@ static inline double rigid_body_phi1_lane(double s)
     return sum + (fabs(s) <= 4.0 ? 0.0 : (double)NAN);
 }
 
-/* rigid_body_linearise in all lanes */
+/* rigid_body_linearise in all lanes. */
 static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid_body_lanes y[restrict 3],
     rigid_body_lanes displacement[restrict 3], rigid_body_lanes increment[restrict 3],
     rigid_body_lanes jacobian[restrict 9], rigid_body_lanes increment_jacobian[restrict 9])
@@ -1105,7 +1105,7 @@ static void rigid_body_linearise_lanes(rigid_body_lanes coef[restrict 35], rigid
     }
 }
 
-/* rigid_body_evaluate in all lanes */
+/* rigid_body_evaluate in all lanes. */
 static void rigid_body_evaluate_lanes(rigid_body_lanes coef[restrict 35], rigid_body_lanes y[restrict 3],
     rigid_body_lanes displacement[restrict 3], rigid_body_lanes increment[restrict 3])
 {
@@ -1134,7 +1134,7 @@ static void rigid_body_evaluate_lanes(rigid_body_lanes coef[restrict 35], rigid_
     }
 }
 
-/* rigid_body_invert in all lanes */
+/* rigid_body_invert in all lanes. */
 static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_body_lanes slope[restrict 9],
     rigid_body_lanes inverse[restrict 9], rigid_body_lanes gain[restrict 9],
     rigid_body_lanes reciprocal[restrict 3])
@@ -1215,7 +1215,7 @@ static double rigid_body_largest(const rigid_body_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
 {
     rigid_body_lanes delta[rigid_body_DIM];
@@ -1240,9 +1240,9 @@ static double rigid_body_remaining(double size, double bend, double bound)
     return growth > 1.0 ? growth * left : left;
 }
 
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is
+/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is
    infinite. */
-static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_model *model)
+static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_lanes jacobian[rigid_body_DIM * rigid_body_DIM], reciprocal[rigid_body_DIM];
     rigid_body_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
@@ -1255,11 +1255,11 @@ static void rigid_body_tabulate(rigid_body_lanes coef[restrict], rigid_body_mode
     }
 }
 
-/* The table of a stage, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model *model, int matrices)
 {
     if (matrices)
-        rigid_body_tabulate(coef, model);
+        rigid_body_linearise_stage(coef, model);
     else
         rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
@@ -1271,11 +1271,6 @@ typedef struct {
     int fits; /* the fit that weight is of; -1 for none */
     rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
 } rigid_body_table;
-
-/* The stages of a step. */
-typedef struct {
-    rigid_body_model stage;
-} rigid_body_models;
 
 /* rigid_body_near for the guesses of all lanes, seen from one value. */
 static int rigid_body_near_lanes(rigid_body_lanes y[restrict rigid_body_DIM],
@@ -1294,31 +1289,29 @@ static int rigid_body_near_lanes(rigid_body_lanes y[restrict rigid_body_DIM],
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void rigid_body_chain(rigid_body_models *models, double x[rigid_body_DIM],
-    double carry[rigid_body_DIM])
+static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], double carry[rigid_body_DIM])
 {
     double residual[rigid_body_DIM], sum[rigid_body_DIM], small[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
-        residual[i] = ((models->stage.y[i][0] - x[i]) + models->stage.displacement[i][0]) - carry[i];
+        residual[i] = ((model->y[i][0] - x[i]) + model->displacement[i][0]) - carry[i];
         sum[i] = x[i];
         small[i] = carry[i];
     }
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const int after = (lane + 1) % rigid_body_LANES;
-        rigid_body_model *at = &models->stage, *next = &models->stage;
         /* two sums, so that no long chain of additions is waited for */
         double even[rigid_body_DIM] = { 0.0 }, odd[rigid_body_DIM] = { 0.0 };
         for (int i = 0; i < rigid_body_DIM; ++i) {
-            at->residual[i][lane] = residual[i];
+            model->residual[i][lane] = residual[i];
             for (int j = 0; j < rigid_body_DIM; j += 2)
-                even[i] += at->gain[i * rigid_body_DIM + j][lane] * residual[j];
+                even[i] += model->gain[i * rigid_body_DIM + j][lane] * residual[j];
             for (int j = 1; j < rigid_body_DIM; j += 2)
-                odd[i] += at->gain[i * rigid_body_DIM + j][lane] * residual[j];
+                odd[i] += model->gain[i * rigid_body_DIM + j][lane] * residual[j];
         }
         for (int i = 0; i < rigid_body_DIM; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            const double change = model->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (model->displacement[i][after] - model->displacement[i][lane]) - change;
+            const double moved = (model->y[i][after] - model->y[i][lane]) + turn;
             residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
@@ -1331,7 +1324,7 @@ static void rigid_body_chain(rigid_body_models *models, double x[rigid_body_DIM]
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
-static void rigid_body_refresh_stage(const rigid_body_solver *s, rigid_body_table *table)
+static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
 {
     if (table->fits == s->history.fits) return;
     table->fits = s->history.fits;
@@ -1339,11 +1332,6 @@ static void rigid_body_refresh_stage(const rigid_body_solver *s, rigid_body_tabl
         for (int lane = 0; lane < rigid_body_LANES; ++lane) table->coef[k][lane] = s->coef[k];
     memcpy(table->weight, s->history.weight,
         (size_t)s->history.recurrence_terms * rigid_body_DIM * sizeof(rigid_body_lanes));
-}
-
-static void rigid_body_refresh(const rigid_body_solver *s, rigid_body_table *table)
-{
-    rigid_body_refresh_stage(s, table);
 }
 
 /* Guesses for the next rigid_body_LANES values of a stage, by its recurrences. */
@@ -1374,9 +1362,8 @@ static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lane
     history->count += rigid_body_LANES;
 }
 
-/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end,
-   mean the mean slope. */
-static void rigid_body_stride(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
+/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
     double mean[rigid_body_DIM])
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0,
@@ -1407,36 +1394,27 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void rigid_body_march(const rigid_body_solver *s, rigid_body_table *table, rigid_body_models *models)
+static void rigid_body_guess_by_runge_kutta(const rigid_body_solver *s, rigid_body_table *table,
+    rigid_body_model *model)
 {
     double x[rigid_body_DIM], mean[rigid_body_DIM];
     memcpy(x, s->x, sizeof x);
     const double h = s->h;
-    rigid_body_model *at = &models->stage;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        for (int i = 0; i < rigid_body_DIM; ++i) at->y[i][lane] = x[i];
-        rigid_body_stride(s, h, x, mean);
-        for (int i = 0; i < rigid_body_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
+        for (int i = 0; i < rigid_body_DIM; ++i) model->y[i][lane] = x[i];
+        rigid_body_runge_kutta(s, h, x, mean);
+        for (int i = 0; i < rigid_body_DIM; ++i) model->y[i][lane] += 0.5 * h * mean[i];
     }
-    rigid_body_from_means(table->coef, &models->stage);
+    rigid_body_from_means(table->coef, model);
 }
 
 /* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
    near the state. */
-static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_models *models)
+static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
 {
-    if (!s->blocks.use_recurrences) rigid_body_march(s, table, models);
-    if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, models->stage.y);
-    if (!rigid_body_near_lanes(models->stage.y, s->x)) return 0;
-    return 1;
-}
-
-/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
-static double rigid_body_correct_stage(rigid_body_model *model)
-{
-    rigid_body_lanes sizes;
-    rigid_body_correct(model, sizes);
-    return rigid_body_largest(sizes);
+    if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, model->y);
+    else rigid_body_guess_by_runge_kutta(s, table, model);
+    return rigid_body_near_lanes(model->y, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -1451,19 +1429,19 @@ static double rigid_body_correct_stage(rigid_body_model *model)
    it takes more than most. */
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
-    rigid_body_models models;
+    rigid_body_model model;
+    rigid_body_lanes sizes;
     double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!rigid_body_guess(s, table, &models)) return 0;
+    if (!rigid_body_guess(s, table, &model)) return 0;
     while (!solved) {
-        double size = 0.0;
         const int matrices = previous > rigid_body_FROZEN;
-        rigid_body_update(table->coef, &models.stage, matrices);
+        rigid_body_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        rigid_body_chain(&models, x, carry);
-        const double largest = rigid_body_correct_stage(&models.stage);
-        size = largest > size ? largest : size;
+        rigid_body_chain(&model, x, carry);
+        rigid_body_correct(&model, sizes);
+        const double size = rigid_body_largest(sizes);
         s->evaluations += rigid_body_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = rigid_body_remaining(size, bend, bound);
@@ -1471,14 +1449,14 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!rigid_body_near_lanes(models.stage.y, s->x)) return 0;
+    if (!rigid_body_near_lanes(model.y, s->x)) return 0;
     for (int i = 0; i < rigid_body_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
     rigid_body_count(s, rigid_body_LANES);
     rigid_body_history *history = &s->history;
-    rigid_body_record_lanes(history, models.stage.y);
+    rigid_body_record_lanes(history, model.y);
     history->slow_steps = passes > 1 ? history->slow_steps + rigid_body_LANES : 0;
     if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences)
         rigid_body_fit(history);
@@ -1487,8 +1465,10 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
 
 enum {
     rigid_body_REPAY_BLOCKS = 4 * rigid_body_REPAY, /* steps that fits for whole blocks are saved in */
-    rigid_body_MOST_SINGLE_STEPS = 1000             /* before blocks are tried again */
+    rigid_body_MOST_SINGLE_STEPS = 1000,            /* before blocks are tried again */
+    rigid_body_TOO_MANY = 5 * rigid_body_LANES      /* of these: recurrences are to blame */
 };
+#define rigid_body_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void rigid_body_give_up(rigid_body_solver *s)
@@ -1515,8 +1495,7 @@ static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < rigid_body_REPAY_BLOCKS && s->steps < rigid_body_REPAY) return;
-    s->blocks.use_recurrences = 1;
-    s->blocks.use_recurrences = s->blocks.use_recurrences && rigid_body_fitted(&s->history);
+    s->blocks.use_recurrences = rigid_body_fitted(&s->history);
     s->blocks.single_steps = rigid_body_LANES;
     if (!s->blocks.use_recurrences) rigid_body_give_up(s);
 }
@@ -1536,7 +1515,7 @@ static void rigid_body_learn_from(rigid_body_solver *s, int passes)
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
     } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps
-        > 5 * rigid_body_LANES) {
+        > rigid_body_TOO_MANY) {
         rigid_body_give_up(s);
     }
 }
@@ -1547,7 +1526,7 @@ static rigid_body_status rigid_body_single(rigid_body_solver *s)
     const size_t before = s->evaluations;
     const rigid_body_status status = rigid_body_step(s, s->h);
     const double evaluations = (double)(s->evaluations - before);
-    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
+    s->blocks.evaluations_per_stage += rigid_body_LATEST * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
@@ -1583,8 +1562,8 @@ typedef struct {
     size_t members, steps, own;
     const rigid_body_params *params; /* NULL for the defaults */
     const double *h;
-    const double *gauge;   /* NULL to choose it */
-    size_t stride;         /* 0 where there are no frames */
+    const double *gauge; /* NULL to choose it */
+    size_t stride;
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } rigid_body_members;
@@ -1611,7 +1590,7 @@ static rigid_body_status rigid_body_take_member(const rigid_body_members *all, s
 static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -1913,18 +1892,18 @@ static int rigid_body_group_step(rigid_body_group *group, size_t remaining)
     rigid_body_lanes x[rigid_body_DIM], carry[rigid_body_DIM];
     rigid_body_model model;
     const int next = (group->latest > 0 ? group->latest : rigid_body_REMEMBERED) - 1;
-    int most = 0;
+    int slow = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     const int iterations = rigid_body_group_solve(group, &model);
     rigid_body_group_advance(group->x, group->carry, &model);
-    if (iterations > most) most = iterations;
+    slow = slow || iterations > 1;
     if ((iterations > 1 && next % rigid_body_HISTORY == 0) || group->count < rigid_body_HISTORY)
         rigid_body_group_judge(group, model.y);
     memcpy(group->past[next], model.y, sizeof model.y);
     group->latest = next;
     if (group->count < rigid_body_REMEMBERED) ++group->count;
-    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    group->slow_steps = slow ? group->slow_steps + 1 : 0;
     if (group->slow_steps > group->slow_steps_allowed && group->count == rigid_body_REMEMBERED
         && remaining >= rigid_body_GROUP_REPAY)
         rigid_body_group_fit(group);
@@ -1980,13 +1959,13 @@ static rigid_body_status rigid_body_group_end(const rigid_body_group *group, int
 static rigid_body_status rigid_body_group_run(const rigid_body_members *all, size_t first)
 {
     rigid_body_group group;
-    rigid_body_status worst = rigid_body_OK, member[rigid_body_LANES];
+    rigid_body_status result = rigid_body_OK, begun[rigid_body_LANES];
     const int count = all->members - first < rigid_body_LANES ? (int)(all->members - first)
         : rigid_body_LANES;
     size_t left = all->steps;
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < count; ++lane)
-        member[lane] = rigid_body_group_join(&group, lane, all, first + (size_t)lane);
+        begun[lane] = rigid_body_group_join(&group, lane, all, first + (size_t)lane);
     for (int active = count; left > 0 && active >= rigid_body_FEWEST;) {
         active = rigid_body_group_step(&group, left--);
         if (all->frames != NULL) rigid_body_group_frame(&group, all, first, all->steps - left);
@@ -1994,17 +1973,17 @@ static rigid_body_status rigid_body_group_run(const rigid_body_members *all, siz
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
         const rigid_body_status status = rigid_body_group_end(&group, lane, all, first + (size_t)lane,
-            member[lane]);
-        if (worst == rigid_body_OK) worst = status;
+            begun[lane]);
+        if (result == rigid_body_OK) result = status;
     }
-    return worst;
+    return result;
 }
 
 /* ---- Ensembles ---- */
 /* All members. The first status that is not OK. */
 static rigid_body_status rigid_body_run(const rigid_body_members *all)
 {
-    rigid_body_status worst = rigid_body_OK;
+    rigid_body_status result = rigid_body_OK;
     size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
@@ -2017,10 +1996,10 @@ static rigid_body_status rigid_body_run(const rigid_body_members *all)
 #endif
         if (first < earliest) {
             earliest = first;
-            worst = group;
+            result = group;
         }
     }
-    return worst;
+    return result;
 }
 
 rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x, size_t members, double h,
@@ -2030,8 +2009,8 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
     rigid_body_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
         .status = status };
     if (x == NULL && members > 0) return rigid_body_BAD_ARGUMENT;
-    const rigid_body_status worst = rigid_body_run(&all);
-    return isfinite(h) ? worst : rigid_body_BAD_ARGUMENT;
+    const rigid_body_status result = rigid_body_run(&all);
+    return isfinite(h) ? result : rigid_body_BAD_ARGUMENT;
 }
 
 rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
@@ -2042,7 +2021,7 @@ rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, doub
     if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
     all.gauge = gauge;
-    all.stride = frames != NULL ? stride : 0;
+    all.stride = stride;
     all.frames = frames;
     all.status = status;
     return rigid_body_run(&all);

@@ -2,7 +2,7 @@
  * rigid_body.h: the declarations; rigid_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 747209065f580104d7dfcc0c66e6470831eb0eb27ec4361fa5dcbfef41526706
+ * body-sha256: f2fe950ec2980979b6110beeb83193490d0b96240adc3e6fc2881c0053bb86b7
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define rigid_body_DIM 3
 #define rigid_body_ORDER 6
 #define rigid_body_CASIMIRS 1
@@ -31,10 +30,8 @@ typedef struct {
 extern const rigid_body_params rigid_body_default_params;
 
 /* How a step ends; rigid_body_status_string says it in words. */
-typedef enum {
-    rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR, rigid_body_NOT_FINITE,
-        rigid_body_BAD_ARGUMENT
-} rigid_body_status;
+typedef enum { rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR, rigid_body_NOT_FINITE,
+    rigid_body_BAD_ARGUMENT } rigid_body_status;
 const char *rigid_body_status_string(rigid_body_status status);
 
 enum { rigid_body_KEPT = 2 * rigid_body_REMEMBERED };

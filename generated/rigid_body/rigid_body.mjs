@@ -11,7 +11,7 @@
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 6dd1dbe9b525968ff6f5db65e0b6a85810e657f1e5a64a4ffd82cde45300f517
+ * body-sha256: 0b493cbab9fdf15b78e3f2339a4c5995f7424db2c5ee484cf1f365bd4ea75980
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -416,7 +416,7 @@ function guide(params, gauge, x, error) {
   error[2] = x1 * t24 - x2 * t27;
 }
 
-/** Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
+/** The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 function products(params, x, out) {
   const x1 = x[0];
   const x2 = x[1];

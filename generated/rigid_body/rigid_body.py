@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 6714e49e638823828a994207735654b1487fed8f270560981ac0c68ae03cdbf2
+# body-sha256: 302c39950c9f46054d8585b2e3ed30154911b41b4788982380db75f66a8c473a
 import numpy as np
 
 VERSION = "0.1.0"
@@ -645,7 +645,8 @@ def _guide(parameters, gauge, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 215628d91bf509e17ea4aae589308cb199dbec765042ac7ec5a77d1000fa0cef
+ * body-sha256: af29e738abcf4323aa3ace3e1fc2e64a409979f4ca60c97f6a9ed518c8ba4d1e
  */
 #include "rigid_body_dual.h"
 #include <float.h>
@@ -84,7 +84,7 @@ static double rigid_body_dual_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void rigid_body_dual_prepare(const rigid_body_dual_params *params, const double gauge[1], double h,
     double coef[12])
 {
@@ -110,8 +110,8 @@ static void rigid_body_dual_prepare(const rigid_body_dual_params *params, const 
     coef[11] = t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void rigid_body_dual_linearise(const double coef[12], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -173,7 +173,7 @@ static void rigid_body_dual_linearise(const double coef[12], const double y[3], 
     increment_jacobian[8] = t54 - t52;
 }
 
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 static void rigid_body_dual_products(const rigid_body_dual_params *params, const double x[3], double out[3])
 {
     const double x1 = x[0], x2 = x[1], x3 = x[2];
@@ -411,8 +411,8 @@ rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
     const double gauge[rigid_body_dual_GAUGES])
 {
     if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
-    rigid_body_dual_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : rigid_body_dual_default_params };
+    if (params == NULL) params = &rigid_body_dual_default_params;
+    rigid_body_dual_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     /* so short a step does not matter */
     rigid_body_dual_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
@@ -514,16 +514,16 @@ size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s) { retu
 rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    rigid_body_dual_status worst = isfinite(h) ? rigid_body_dual_OK : rigid_body_dual_BAD_ARGUMENT;
+    rigid_body_dual_status result = isfinite(h) ? rigid_body_dual_OK : rigid_body_dual_BAD_ARGUMENT;
     if (x == NULL && members > 0) return rigid_body_dual_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         rigid_body_dual_solver s;
         for (size_t i = 0; i < rigid_body_dual_DIM; ++i) s.x[i] = x[i * members + m];
-        rigid_body_dual_status member = rigid_body_dual_init(&s, params, s.x);
-        if (member == rigid_body_dual_OK) member = rigid_body_dual_integrate(&s, h, steps);
+        rigid_body_dual_status ended = rigid_body_dual_init(&s, params, s.x);
+        if (ended == rigid_body_dual_OK) ended = rigid_body_dual_integrate(&s, h, steps);
         for (size_t i = 0; i < rigid_body_dual_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == rigid_body_dual_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == rigid_body_dual_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * rigid_body_dual.h: the declarations; rigid_body_dual.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 09c0a499af354d3655d7acdd6779b3fdd9fa7d62645ef67ee39bfc1630c6ff0a
+ * body-sha256: 648d86584094463a7033b7a1a14ce5507815c348ff8b1f8ef1fb87435bff2e21
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define rigid_body_dual_DIM 3
 #define rigid_body_dual_ORDER 4
 #define rigid_body_dual_CASIMIRS 1
@@ -28,10 +27,8 @@ typedef struct {
 extern const rigid_body_dual_params rigid_body_dual_default_params;
 
 /* How a step ends; rigid_body_dual_status_string says it in words. */
-typedef enum {
-    rigid_body_dual_OK = 0, rigid_body_dual_NO_CONVERGENCE, rigid_body_dual_SINGULAR,
-        rigid_body_dual_NOT_FINITE, rigid_body_dual_BAD_ARGUMENT
-} rigid_body_dual_status;
+typedef enum { rigid_body_dual_OK = 0, rigid_body_dual_NO_CONVERGENCE, rigid_body_dual_SINGULAR,
+    rigid_body_dual_NOT_FINITE, rigid_body_dual_BAD_ARGUMENT } rigid_body_dual_status;
 const char *rigid_body_dual_status_string(rigid_body_dual_status status);
 
 enum { rigid_body_dual_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

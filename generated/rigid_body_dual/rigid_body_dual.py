@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c73aa0f0050cd0e03c5c799f9f199abcc73df894acc1db3a0c2e92777a20ab75
+# body-sha256: 265f23e0dd95f642f76a8112d5dfb651933f2f5b90e3acb68c26bb89e4bc96b4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -431,7 +431,8 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     I1 = parameters["I1"]
     I2 = parameters["I2"]
     I3 = parameters["I3"]

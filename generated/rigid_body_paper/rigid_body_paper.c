@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 61fc02f817dd15493221eb89b9dfbdfd031e7ecafbadd97fce5a08d93e0e3508
+ * body-sha256: 14cb8fe3248b995c3d715d24023a88808ee56e65f57b18a15bcc515401c83748
  */
 #include "rigid_body_paper.h"
 #include <float.h>
@@ -83,7 +83,7 @@ static double rigid_body_paper_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void rigid_body_paper_prepare(const rigid_body_paper_params *params, double h, double coef[3])
 {
     const double t1 = 0.5 * params->J2, t2 = 0.5 * params->J3, t3 = 0.5 * params->J1;
@@ -92,8 +92,8 @@ static void rigid_body_paper_prepare(const rigid_body_paper_params *params, doub
     coef[2] = 2.0 * (h * (t1 + t3));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void rigid_body_paper_linearise(const double coef[3], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -354,8 +354,8 @@ rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     const rigid_body_paper_params *params, const double x0[rigid_body_paper_DIM])
 {
     if (s == NULL || x0 == NULL) return rigid_body_paper_BAD_ARGUMENT;
-    rigid_body_paper_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : rigid_body_paper_default_params };
+    if (params == NULL) params = &rigid_body_paper_default_params;
+    rigid_body_paper_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     rigid_body_paper_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!rigid_body_paper_finite(fresh.x, rigid_body_paper_DIM) || !rigid_body_paper_allowed(&fresh.params)
@@ -447,16 +447,16 @@ size_t rigid_body_paper_solver_steps_done(const rigid_body_paper_solver *s) { re
 rigid_body_paper_status rigid_body_paper_ensemble(const rigid_body_paper_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    rigid_body_paper_status worst = isfinite(h) ? rigid_body_paper_OK : rigid_body_paper_BAD_ARGUMENT;
+    rigid_body_paper_status result = isfinite(h) ? rigid_body_paper_OK : rigid_body_paper_BAD_ARGUMENT;
     if (x == NULL && members > 0) return rigid_body_paper_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         rigid_body_paper_solver s;
         for (size_t i = 0; i < rigid_body_paper_DIM; ++i) s.x[i] = x[i * members + m];
-        rigid_body_paper_status member = rigid_body_paper_init(&s, params, s.x);
-        if (member == rigid_body_paper_OK) member = rigid_body_paper_integrate(&s, h, steps);
+        rigid_body_paper_status ended = rigid_body_paper_init(&s, params, s.x);
+        if (ended == rigid_body_paper_OK) ended = rigid_body_paper_integrate(&s, h, steps);
         for (size_t i = 0; i < rigid_body_paper_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == rigid_body_paper_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == rigid_body_paper_OK) result = ended;
     }
-    return worst;
+    return result;
 }

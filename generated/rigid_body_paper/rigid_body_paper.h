@@ -2,7 +2,7 @@
  * rigid_body_paper.h: the declarations; rigid_body_paper.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: efeb565b3ef81a4587d4c50d13b6d4f6ac9100e61153bc3362d01eb909540202
+ * body-sha256: 1620db202d51d63c82a25048b88438142f0db461861e8b9b44877df2b2d9cab9
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define rigid_body_paper_DIM 3
 #define rigid_body_paper_ORDER 2
 #define rigid_body_paper_CASIMIRS 1
@@ -27,10 +26,8 @@ typedef struct {
 extern const rigid_body_paper_params rigid_body_paper_default_params;
 
 /* How a step ends; rigid_body_paper_status_string says it in words. */
-typedef enum {
-    rigid_body_paper_OK = 0, rigid_body_paper_NO_CONVERGENCE, rigid_body_paper_SINGULAR,
-        rigid_body_paper_NOT_FINITE, rigid_body_paper_BAD_ARGUMENT
-} rigid_body_paper_status;
+typedef enum { rigid_body_paper_OK = 0, rigid_body_paper_NO_CONVERGENCE, rigid_body_paper_SINGULAR,
+    rigid_body_paper_NOT_FINITE, rigid_body_paper_BAD_ARGUMENT } rigid_body_paper_status;
 const char *rigid_body_paper_status_string(rigid_body_paper_status status);
 
 enum { rigid_body_paper_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

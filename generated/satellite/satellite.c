@@ -12,8 +12,8 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
- *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: ea02cdbfc8a6656adb4dd6ea06f0d949308678dba948dcbc8354e012d30f39a0
+ *   step, by Newton's method; The solver
+ * body-sha256: 132fc12544020f74e746e342256c1ec8d925e77cc6d2b858d33cad6e4acc0305
  */
 #include "satellite.h"
 #include <float.h>
@@ -118,7 +118,7 @@ static double satellite_phi2(double s)
     return (0.5 * phi0 * phi0 - 2.5 * phi1 + s * phi0 * phi1) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void satellite_prepare(const satellite_params *params, double h, double coef[7])
 {
     const double t1 = params->n * params->n;
@@ -131,8 +131,7 @@ static void satellite_prepare(const satellite_params *params, double h, double c
     coef[6] = 3.0 * (h * (params->I3 * t1));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
+/* satellite_linearise, part 1 of 3. */
 satellite_APART static void satellite_linearise_part1(const double coef[7], const double y[9],
     double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
     double work[263])
@@ -350,8 +349,7 @@ satellite_APART static void satellite_linearise_part1(const double coef[7], cons
     displacement[8] = work[35] * work[97] - work[37] * work[262] - 0.5 * work[56];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
+/* satellite_linearise, part 2 of 3. */
 satellite_APART static void satellite_linearise_part2(const double coef[7], const double y[9],
     double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
     double work[263])
@@ -583,8 +581,7 @@ satellite_APART static void satellite_linearise_part2(const double coef[7], cons
     jacobian[69] = work[120];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
+/* satellite_linearise, part 3 of 3. */
 satellite_APART static void satellite_linearise_part3(const double coef[7], const double y[9],
     double displacement[9], double increment[9], double jacobian[81], double increment_jacobian[81],
     double work[263])
@@ -830,8 +827,8 @@ satellite_APART static void satellite_linearise_part3(const double coef[7], cons
     increment_jacobian[76] = t109;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void satellite_linearise(const double coef[7], const double y[9], double displacement[9],
     double increment[9], double jacobian[81], double increment_jacobian[81])
 {
@@ -843,7 +840,7 @@ static void satellite_linearise(const double coef[7], const double y[9], double 
     satellite_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* what p = grad S_h(y) turns by, a quaternion less 1 */
+/* What p = grad S_h(y) turns by, a quaternion less 1. */
 static void satellite_turn(const double coef[7], const double y[9], double turn[4])
 {
     const double m1 = y[0], m2 = y[1], m3 = y[2], N1 = y[3], N2 = y[4], N3 = y[5];
@@ -1095,15 +1092,11 @@ satellite_status satellite_set_attitude(satellite_solver *s, const double attitu
     for (int i = 0; i < satellite_ATTITUDE_SIZE; ++i) size = fabs(first[i]) > size ? fabs(first[i]) : size;
     if (!(size > 0.0)) return satellite_BAD_ARGUMENT;
     double square = 0.0;
-    for (int i = 0; i < 4; ++i) square += first[i] * first[i];
-    if (!(fabs(square - 1.0) <= 4.0 * DBL_EPSILON)) { /* else it has been divided by its length before */
-        square = 0.0;
-        for (int i = 0; i < 4; ++i) {
-            first[i] /= size;
-            square += first[i] * first[i];
-        }
-        for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
+    for (int i = 0; i < 4; ++i) {
+        first[i] /= size;
+        square += first[i] * first[i];
     }
+    for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
     satellite_begin_attitude(s, first);
     return satellite_OK;
 }
@@ -1173,8 +1166,8 @@ satellite_status satellite_init(satellite_solver *s, const satellite_params *par
     const double x0[satellite_DIM])
 {
     if (s == NULL || x0 == NULL) return satellite_BAD_ARGUMENT;
-    satellite_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : satellite_default_params };
+    if (params == NULL) params = &satellite_default_params;
+    satellite_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     satellite_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!satellite_finite(fresh.x, satellite_DIM) || !satellite_allowed(&fresh.params)
@@ -1284,160 +1277,19 @@ const char *satellite_status_string(satellite_status status)
 size_t satellite_solver_size(void) { return sizeof(satellite_solver); }
 size_t satellite_solver_steps_done(const satellite_solver *s) { return s->steps; }
 
-/* ---- Members of an ensemble ---- */
-/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
-   where it is 0, all have the first. */
-typedef struct {
-    double *x;
-    size_t members, steps, own;
-    const satellite_params *params; /* NULL for the defaults */
-    const double *h;
-    double *attitude;      /* as x is given; NULL where nobody asks for it */
-    double *attitudes;     /* NULL for none */
-    size_t stride;         /* 0 where there are no frames */
-    double *frames;        /* NULL for none */
-    unsigned char *status; /* NULL for none */
-} satellite_members;
-
-/* Start a member at a state, with what is its own. */
-static satellite_status satellite_begin_member(const satellite_members *all, size_t m,
-    const double x[satellite_DIM], satellite_solver *s)
-{
-    const satellite_params *params = all->params != NULL ? all->params + m * all->own : NULL;
-    const satellite_status status = satellite_init(s, params, x);
-    return status == satellite_OK ? satellite_set_step(s, all->h[m * all->own]) : status;
-}
-
-/* The same at the state that the ensemble has for it, which is x then. */
-static satellite_status satellite_take_member(const satellite_members *all, size_t m, double x[satellite_DIM],
-    satellite_solver *s)
-{
-    for (size_t i = 0; i < satellite_DIM; ++i) x[i] = all->x[i * all->members + m];
-    return satellite_begin_member(all, m, x, s);
-}
-
-/* How many steps there are to the next frame, or to the end. */
-static size_t satellite_to_frame(const satellite_members *all, size_t done)
-{
-    const size_t left = all->steps - done;
-    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
-        : left;
-}
-
-/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
-static void satellite_put_frame(const satellite_members *all, size_t m, size_t done, const double *x)
-{
-    for (size_t i = 0; i < satellite_DIM && all->frames != NULL && done % all->stride == 0; ++i)
-        all->frames[((done / all->stride - 1) * satellite_DIM + i) * all->members + m] = x != NULL ? x[i]
-            : (double)NAN;
-}
-
-/* The same for its attitude. */
-static void satellite_put_attitude(const satellite_members *all, size_t m, size_t done,
-    const satellite_solver *s)
-{
-    double element[satellite_ELEMENT];
-    if (all->attitudes == NULL || done % all->stride != 0) return;
-    if (s != NULL) satellite_attitude(s, element);
-    for (size_t i = 0; i < satellite_ELEMENT; ++i)
-        all->attitudes[((done / all->stride - 1) * satellite_ELEMENT + i) * all->members + m] = s != NULL
-            ? element[i] : (double)NAN;
-}
-
-/* The steps of a member after so many, by itself. */
-static satellite_status satellite_end_member(const satellite_members *all, size_t m, size_t done,
-    satellite_solver *s, satellite_status status)
-{
-    while (done < all->steps) {
-        const size_t steps = satellite_to_frame(all, done);
-        if (status == satellite_OK) status = satellite_integrate(s, s->h, steps);
-        done += steps;
-        satellite_put_frame(all, m, done, status == satellite_OK ? s->x : NULL);
-        satellite_put_attitude(all, m, done, status == satellite_OK ? s : NULL);
-    }
-    return status;
-}
-
-/* Where a member ends. */
-static void satellite_put_member(const satellite_members *all, size_t m, const double x[satellite_DIM],
-    satellite_status status)
-{
-    for (size_t i = 0; i < satellite_DIM; ++i) all->x[i * all->members + m] = x[i];
-    if (all->status != NULL) all->status[m] = (unsigned char)status;
-}
-
-/* ---- Members with attitudes ---- */
-/* Start a member with the attitude and the random numbers that the ensemble has for it. */
-static satellite_status satellite_take_turned(const satellite_members *all, size_t m, double x[satellite_DIM],
-    satellite_solver *s)
-{
-    double element[satellite_ELEMENT];
-    satellite_status status = satellite_take_member(all, m, x, s);
-    for (size_t i = 0; i < satellite_ELEMENT; ++i) element[i] = all->attitude[i * all->members + m];
-    if (status == satellite_OK) status = satellite_set_attitude(s, element);
-    return status;
-}
-
-/* One member, from its start to its end. */
-static satellite_status satellite_turn_member(const satellite_members *all, size_t m)
-{
-    satellite_solver s;
-    double x[satellite_DIM], element[satellite_ELEMENT];
-    const satellite_status begun = satellite_take_turned(all, m, x, &s);
-    const satellite_status status = satellite_end_member(all, m, 0, &s, begun);
-    satellite_put_member(all, m, begun == satellite_OK ? s.x : x, status);
-    if (begun != satellite_OK) return status;
-    satellite_attitude(&s, element);
-    for (size_t i = 0; i < satellite_ELEMENT; ++i) all->attitude[i * all->members + m] = element[i];
-    return status;
-}
-
-/* The arguments are in the order of satellite_ensemble_each and satellite_ensemble_of. */
-satellite_status satellite_ensemble_attitudes(const satellite_params *params, double *x, double *attitude,
-    size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
-    unsigned char *status)
-{
-    satellite_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1,
-        .params = params };
-    satellite_status worst = satellite_OK;
-    size_t earliest = members;
-    if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return satellite_BAD_ARGUMENT;
-    if ((frames != NULL || attitudes != NULL) && stride == 0) return satellite_BAD_ARGUMENT;
-    all.h = h;
-    all.stride = frames != NULL || attitudes != NULL ? stride : 0;
-    all.frames = frames;
-    all.attitudes = attitudes;
-    all.status = status;
-#ifdef _OPENMP
-#pragma omp parallel for schedule(dynamic, 16)
-#endif
-    for (size_t m = 0; m < members; ++m) {
-        const satellite_status member = satellite_turn_member(&all, m);
-        if (member == satellite_OK) continue;
-#ifdef _OPENMP
-#pragma omp critical
-#endif
-        if (m < earliest) {
-            earliest = m;
-            worst = member;
-        }
-    }
-    return worst;
-}
-
 satellite_status satellite_ensemble(const satellite_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    satellite_status worst = isfinite(h) ? satellite_OK : satellite_BAD_ARGUMENT;
+    satellite_status result = isfinite(h) ? satellite_OK : satellite_BAD_ARGUMENT;
     if (x == NULL && members > 0) return satellite_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         satellite_solver s;
         for (size_t i = 0; i < satellite_DIM; ++i) s.x[i] = x[i * members + m];
-        satellite_status member = satellite_init(&s, params, s.x);
-        if (member == satellite_OK) member = satellite_integrate(&s, h, steps);
+        satellite_status ended = satellite_init(&s, params, s.x);
+        if (ended == satellite_OK) ended = satellite_integrate(&s, h, steps);
         for (size_t i = 0; i < satellite_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == satellite_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == satellite_OK) result = ended;
     }
-    return worst;
+    return result;
 }

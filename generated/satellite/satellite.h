@@ -2,7 +2,7 @@
  * satellite.h: the declarations; satellite.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aa9c7be555f8bdc0126b4d244297289fbe86369fe9dd52c1e1fe3d2f7fb33b5c
+ * body-sha256: 530a72e7b12358a67c46dfc2f6fe501bf37113ddf4b13bab314e725345a471c5
  */
 #ifndef SATELLITE_H
 #define SATELLITE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define satellite_DIM 9
 #define satellite_ORDER 4
 #define satellite_CASIMIRS 3
@@ -31,10 +30,8 @@ typedef struct {
 extern const satellite_params satellite_default_params;
 
 /* How a step ends; satellite_status_string says it in words. */
-typedef enum {
-    satellite_OK = 0, satellite_NO_CONVERGENCE, satellite_SINGULAR, satellite_NOT_FINITE,
-        satellite_BAD_ARGUMENT
-} satellite_status;
+typedef enum { satellite_OK = 0, satellite_NO_CONVERGENCE, satellite_SINGULAR, satellite_NOT_FINITE,
+    satellite_BAD_ARGUMENT } satellite_status;
 const char *satellite_status_string(satellite_status status);
 
 enum { satellite_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
@@ -88,16 +85,6 @@ satellite_status satellite_kick(satellite_solver *s, const double change[satelli
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 satellite_status satellite_ensemble(const satellite_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* Many members with attitudes, in place, each by itself as satellite_integrate makes it; with OpenMP, members
-   in parallel: x[i * members + m] is coordinate i of member m, attitude[i * members + m] number i of its
-   attitude in the order of satellite_attitude, at its start, then at its end. What differs from member to
-   member is given as for a single one, params may be NULL for the defaults. frames and attitudes (or NULL)
-   receive what x and attitude are after every stride-th step, those after (k + 1) * stride steps as row k,
-   NaN where a member failed before. Arrays must not overlap. */
-satellite_status satellite_ensemble_attitudes(const satellite_params *params, double *x, double *attitude,
-    size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
-    unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double satellite_hamiltonian(const satellite_params *params, const double x[satellite_DIM]);

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6dd2fe8c49fbcfc7c4231180b2b50cad614a39c82b479da8a2071466e85a0ae2
+ * body-sha256: 60a89627bb6125eaa5b89dae12513a658947ba169a024b45f54afbf4aa14648e
  */
 #include "seasonal_predator_prey.h"
 #include <float.h>
@@ -39,7 +39,7 @@ static int seasonal_predator_prey_allowed(const seasonal_predator_prey_params *p
         && isfinite(params->epsilon) && isfinite(params->omega);
 }
 
-/* everything that depends on the time, but not on the state */
+/* Everything that depends on the time, but not on the state. */
 static void seasonal_predator_prey_at_time(const double coef[16], double t, double now[4])
 {
     const double t1 = coef[7] * t, t2 = cos(t1), t3 = coef[15] + coef[14] * t2;
@@ -49,7 +49,7 @@ static void seasonal_predator_prey_at_time(const double coef[16], double t, doub
     now[3] = -t3;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void seasonal_predator_prey_prepare(const seasonal_predator_prey_params *params, double h,
     double coef[16])
 {
@@ -77,8 +77,8 @@ static void seasonal_predator_prey_prepare(const seasonal_predator_prey_params *
     coef[15] = params->alpha * h;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void seasonal_predator_prey_linearise(const double coef[20], const double y[2], double displacement[2],
     double increment[2], double jacobian[4], double increment_jacobian[4])
 {
@@ -185,8 +185,8 @@ static int seasonal_predator_prey_solve(double matrix[seasonal_predator_prey_DIM
         for (int i = k + 1; i < seasonal_predator_prey_DIM; ++i) {
             const double factor = matrix[i * seasonal_predator_prey_DIM + k] / pivot;
             for (int j = k + 1; j < seasonal_predator_prey_DIM; ++j)
-                matrix[i * seasonal_predator_prey_DIM + j] -= factor * matrix[k * seasonal_predator_prey_DIM
-                + j];
+                matrix[i * seasonal_predator_prey_DIM + j] -=
+                factor * matrix[k * seasonal_predator_prey_DIM + j];
             side[i] -= factor * side[k];
         }
     }
@@ -333,8 +333,8 @@ seasonal_predator_prey_status seasonal_predator_prey_init_at(seasonal_predator_p
     const seasonal_predator_prey_params *params, const double x0[seasonal_predator_prey_DIM], double t0)
 {
     if (s == NULL || x0 == NULL || !isfinite(t0)) return seasonal_predator_prey_BAD_ARGUMENT;
-    seasonal_predator_prey_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : seasonal_predator_prey_default_params };
+    if (params == NULL) params = &seasonal_predator_prey_default_params;
+    seasonal_predator_prey_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     seasonal_predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
@@ -445,19 +445,19 @@ size_t seasonal_predator_prey_solver_steps_done(const seasonal_predator_prey_sol
 seasonal_predator_prey_status seasonal_predator_prey_ensemble_at(const seasonal_predator_prey_params *params,
     double *x, size_t members, double t0, double h, size_t steps, unsigned char *status)
 {
-    seasonal_predator_prey_status worst = isfinite(h) ? seasonal_predator_prey_OK
+    seasonal_predator_prey_status result = isfinite(h) ? seasonal_predator_prey_OK
         : seasonal_predator_prey_BAD_ARGUMENT;
     if (x == NULL && members > 0) return seasonal_predator_prey_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         seasonal_predator_prey_solver s;
         for (size_t i = 0; i < seasonal_predator_prey_DIM; ++i) s.x[i] = x[i * members + m];
-        seasonal_predator_prey_status member = seasonal_predator_prey_init_at(&s, params, s.x, t0);
-        if (member == seasonal_predator_prey_OK) member = seasonal_predator_prey_integrate(&s, h, steps);
+        seasonal_predator_prey_status ended = seasonal_predator_prey_init_at(&s, params, s.x, t0);
+        if (ended == seasonal_predator_prey_OK) ended = seasonal_predator_prey_integrate(&s, h, steps);
         for (size_t i = 0; i < seasonal_predator_prey_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == seasonal_predator_prey_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == seasonal_predator_prey_OK) result = ended;
     }
-    return worst;
+    return result;
 }
 
 seasonal_predator_prey_status seasonal_predator_prey_ensemble(const seasonal_predator_prey_params *params,

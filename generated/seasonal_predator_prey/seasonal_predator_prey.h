@@ -2,7 +2,7 @@
  * seasonal_predator_prey.h: the declarations; seasonal_predator_prey.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 17a7defd996d4a251b8500693b112d79eff3290bf804a4da04b3368a07e47d1b
+ * body-sha256: 2bbbb27e6fbb70b9ddbf03782fb364675e7fc1ccd81344cd72d8a39ad7816f19
  */
 #ifndef SEASONAL_PREDATOR_PREY_H
 #define SEASONAL_PREDATOR_PREY_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define seasonal_predator_prey_DIM 2
 #define seasonal_predator_prey_ORDER 4
 #define seasonal_predator_prey_CASIMIRS 0
@@ -30,10 +29,9 @@ typedef struct {
 extern const seasonal_predator_prey_params seasonal_predator_prey_default_params;
 
 /* How a step ends; seasonal_predator_prey_status_string says it in words. */
-typedef enum {
-    seasonal_predator_prey_OK = 0, seasonal_predator_prey_NO_CONVERGENCE, seasonal_predator_prey_SINGULAR,
-        seasonal_predator_prey_NOT_FINITE, seasonal_predator_prey_BAD_ARGUMENT
-} seasonal_predator_prey_status;
+typedef enum { seasonal_predator_prey_OK = 0, seasonal_predator_prey_NO_CONVERGENCE,
+    seasonal_predator_prey_SINGULAR, seasonal_predator_prey_NOT_FINITE,
+    seasonal_predator_prey_BAD_ARGUMENT } seasonal_predator_prey_status;
 const char *seasonal_predator_prey_status_string(seasonal_predator_prey_status status);
 
 /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9a736ce88d49a8cccd970c09131d48aa15aa17d662a866935158e36bd9d90610
+ * body-sha256: 93b6e996725f64948df51be4fa83405908aa74f4be19ee0755e85d3e0b69fb3b
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -59,7 +59,7 @@ static int sine_gordon_allowed(const sine_gordon_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void sine_gordon_prepare(const sine_gordon_params *params, double h, double coef[restrict 3])
 {
     const double t1 = 1.0 / params->d;

@@ -2,7 +2,7 @@
  * sine_gordon.h: the declarations; sine_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2064cef0cea2da10ba2e4aafc8757b9307abcb094aca832d6527d2444d73b16e
+ * body-sha256: 4b41106b2a197110db7849ded15151c7c3ef4f1f4f54a61148562415df67ab52
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define sine_gordon_AXES 1
 #define sine_gordon_DIM 2
 #define sine_gordon_ORDER 4
@@ -29,10 +28,8 @@ enum { sine_gordon_ARRAYS = 2 };        /* arrays over the sites: fields, then p
 enum { sine_gordon_COEFFICIENTS = 42 }; /* numbers that depend on params and h only */
 
 /* How a step ends; sine_gordon_status_string says it in words. */
-typedef enum {
-    sine_gordon_OK = 0, sine_gordon_NO_CONVERGENCE, sine_gordon_SINGULAR, sine_gordon_NOT_FINITE,
-        sine_gordon_BAD_ARGUMENT
-} sine_gordon_status;
+typedef enum { sine_gordon_OK = 0, sine_gordon_NO_CONVERGENCE, sine_gordon_SINGULAR, sine_gordon_NOT_FINITE,
+    sine_gordon_BAD_ARGUMENT } sine_gordon_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with sine_gordon_init; a copy of the struct is the same

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 14b0114c6ae801ef09c8a88c462346381857a4e1bf857b3f20b3a2fbed8f1dbe
+ * body-sha256: 9cb3915d6681021e82c410be3d4d85102be5121f5d2f03ba008d9a6dfee3daf9
  */
 #include "sir_epidemic.h"
 #include <float.h>
@@ -34,7 +34,7 @@ static int sir_epidemic_allowed(const sir_epidemic_params *params)
     return isfinite(params->beta) && params->beta > 0.0 && isfinite(params->gamma) && params->gamma > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, double coef[4])
 {
     const double t1 = params->gamma * h;
@@ -44,7 +44,8 @@ static void sir_epidemic_prepare(const sir_epidemic_params *params, double h, do
     coef[3] = -t1;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void sir_epidemic_generate(const double coef[4], const double y[3], double slope[3],
     double jacobian[9])
 {
@@ -442,8 +443,8 @@ sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic
     const double x0[sir_epidemic_DIM])
 {
     if (s == NULL || x0 == NULL) return sir_epidemic_BAD_ARGUMENT;
-    sir_epidemic_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : sir_epidemic_default_params };
+    if (params == NULL) params = &sir_epidemic_default_params;
+    sir_epidemic_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     sir_epidemic_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!sir_epidemic_finite(fresh.x, sir_epidemic_DIM) || !sir_epidemic_allowed(&fresh.params)
@@ -532,16 +533,16 @@ size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s) { return s->
 sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    sir_epidemic_status worst = isfinite(h) ? sir_epidemic_OK : sir_epidemic_BAD_ARGUMENT;
+    sir_epidemic_status result = isfinite(h) ? sir_epidemic_OK : sir_epidemic_BAD_ARGUMENT;
     if (x == NULL && members > 0) return sir_epidemic_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         sir_epidemic_solver s;
         for (size_t i = 0; i < sir_epidemic_DIM; ++i) s.x[i] = x[i * members + m];
-        sir_epidemic_status member = sir_epidemic_init(&s, params, s.x);
-        if (member == sir_epidemic_OK) member = sir_epidemic_integrate(&s, h, steps);
+        sir_epidemic_status ended = sir_epidemic_init(&s, params, s.x);
+        if (ended == sir_epidemic_OK) ended = sir_epidemic_integrate(&s, h, steps);
         for (size_t i = 0; i < sir_epidemic_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == sir_epidemic_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == sir_epidemic_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * sir_epidemic.h: the declarations; sir_epidemic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a8cf79d667d3c88c8d77f44aca12a557cb408983215ec389e3b82d30c2df90ca
+ * body-sha256: 237c4ccfc6a0a87382303694ef617dd53060835ca8f923f9b6db643cebdff7e2
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define sir_epidemic_DIM 3
 #define sir_epidemic_ORDER 4
 #define sir_epidemic_CASIMIRS 1
@@ -26,10 +25,8 @@ typedef struct {
 extern const sir_epidemic_params sir_epidemic_default_params;
 
 /* How a step ends; sir_epidemic_status_string says it in words. */
-typedef enum {
-    sir_epidemic_OK = 0, sir_epidemic_NO_CONVERGENCE, sir_epidemic_SINGULAR, sir_epidemic_NOT_FINITE,
-        sir_epidemic_BAD_ARGUMENT
-} sir_epidemic_status;
+typedef enum { sir_epidemic_OK = 0, sir_epidemic_NO_CONVERGENCE, sir_epidemic_SINGULAR,
+    sir_epidemic_NOT_FINITE, sir_epidemic_BAD_ARGUMENT } sir_epidemic_status;
 const char *sir_epidemic_status_string(sir_epidemic_status status);
 
 enum { sir_epidemic_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -10,7 +10,7 @@
  * DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
- * body-sha256: 8b059c99c561199e82d950a0ac0e80099f8dd7887992e9fa0af3e245b303e1c9
+ * body-sha256: 31b6b801a813d05cf8f2748e94f159bb968f1c8b6be45dcce383e6bfc0494f6c
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -71,7 +71,10 @@ function prepare(params, h, coef) {
   coef[3] = -t1;
 }
 
-/** P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2). */
+/**
+ * The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+ * O(h^2).
+ */
 function generate(coef, y, slope, jacobian) {
   const S = y[0];
   const I = y[1];

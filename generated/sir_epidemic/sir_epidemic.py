@@ -9,7 +9,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 208bb8fcf99e227d965b777c87c86cf1628a6821ca8862b095ab1f8679324c86
+# body-sha256: 9bf0329d29098c0e942cd0c0f654bea9c3e249b5a8e84e303534c514b1ed1692
 import numpy as np
 
 VERSION = "0.1.0"
@@ -121,8 +121,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     S = y[..., 0]
     I = y[..., 1]
     t1 = 1.0 / S

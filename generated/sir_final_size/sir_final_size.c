@@ -11,7 +11,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 26e3401813a0de159fd7581b146a8581f9dbe68ca80861428ebfc90018dc5f7a
+ * body-sha256: 5a3a44cac113c07770b040966e2d1d4e585f4b4473f9a632cdddd05584aeb085
  */
 #include "sir_final_size.h"
 #include <float.h>
@@ -33,7 +33,7 @@ static int sir_final_size_allowed(const sir_final_size_params *params)
     return isfinite(params->beta) && params->beta > 0.0 && isfinite(params->gamma) && params->gamma > 0.0;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void sir_final_size_prepare(const sir_final_size_params *params, double h, double coef[3])
 {
     coef[0] = h;
@@ -41,7 +41,8 @@ static void sir_final_size_prepare(const sir_final_size_params *params, double h
     coef[2] = params->gamma;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void sir_final_size_generate(const double coef[3], const double y[3], double slope[3],
     double jacobian[9])
 {
@@ -449,8 +450,8 @@ sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_fi
     const double x0[sir_final_size_DIM])
 {
     if (s == NULL || x0 == NULL) return sir_final_size_BAD_ARGUMENT;
-    sir_final_size_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : sir_final_size_default_params };
+    if (params == NULL) params = &sir_final_size_default_params;
+    sir_final_size_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     sir_final_size_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!sir_final_size_finite(fresh.x, sir_final_size_DIM) || !sir_final_size_allowed(&fresh.params)
@@ -540,16 +541,16 @@ size_t sir_final_size_solver_steps_done(const sir_final_size_solver *s) { return
 sir_final_size_status sir_final_size_ensemble(const sir_final_size_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    sir_final_size_status worst = isfinite(h) ? sir_final_size_OK : sir_final_size_BAD_ARGUMENT;
+    sir_final_size_status result = isfinite(h) ? sir_final_size_OK : sir_final_size_BAD_ARGUMENT;
     if (x == NULL && members > 0) return sir_final_size_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         sir_final_size_solver s;
         for (size_t i = 0; i < sir_final_size_DIM; ++i) s.x[i] = x[i * members + m];
-        sir_final_size_status member = sir_final_size_init(&s, params, s.x);
-        if (member == sir_final_size_OK) member = sir_final_size_integrate(&s, h, steps);
+        sir_final_size_status ended = sir_final_size_init(&s, params, s.x);
+        if (ended == sir_final_size_OK) ended = sir_final_size_integrate(&s, h, steps);
         for (size_t i = 0; i < sir_final_size_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == sir_final_size_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == sir_final_size_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * sir_final_size.h: the declarations; sir_final_size.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6020642eaa95b1f015e9d9aacc7754ca91ec29629c308b3504282d89e44ff0f0
+ * body-sha256: ceadbc229d84f709b2346432cb8934587ee52989838fb7ef43d1bd1f0b38f94f
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define sir_final_size_DIM 3
 #define sir_final_size_ORDER 4
 #define sir_final_size_CASIMIRS 1
@@ -26,10 +25,8 @@ typedef struct {
 extern const sir_final_size_params sir_final_size_default_params;
 
 /* How a step ends; sir_final_size_status_string says it in words. */
-typedef enum {
-    sir_final_size_OK = 0, sir_final_size_NO_CONVERGENCE, sir_final_size_SINGULAR, sir_final_size_NOT_FINITE,
-        sir_final_size_BAD_ARGUMENT
-} sir_final_size_status;
+typedef enum { sir_final_size_OK = 0, sir_final_size_NO_CONVERGENCE, sir_final_size_SINGULAR,
+    sir_final_size_NOT_FINITE, sir_final_size_BAD_ARGUMENT } sir_final_size_status;
 const char *sir_final_size_status_string(sir_final_size_status status);
 
 enum { sir_final_size_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -8,7 +8,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 4fa509d6463cbd008e73bd6c9dfd2dd9843622cf74041a41d1b78c4b6cca14ae
+# body-sha256: a632de19cc57a74acb148b0800402caecf80f247c61943b9890aea27b1bdfad8
 import numpy as np
 
 VERSION = "0.1.0"
@@ -119,8 +119,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     return (
         _filled(y, [coef[0], coef[0], coef[0]]),
         _filled(y, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]).reshape(y.shape + (3,)),

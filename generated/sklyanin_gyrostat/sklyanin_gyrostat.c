@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: b7f3168143900cb93e7cb35372d0b27776cbc4a23999df3d61f58c15df07dddd
+ * body-sha256: eff5211e93ce2cfcfce8ec4ae2ff332f6c49cd79bf8992bb1412fcffeb8e2257
  */
 #include "sklyanin_gyrostat.h"
 #include <float.h>
@@ -29,7 +29,7 @@ enum { sklyanin_gyrostat_TERMS = 30 };
 enum { sklyanin_gyrostat_SERIES = 40 }; /* of a path, those of the coordinates first */
 enum { sklyanin_gyrostat_FIXED = 1 };   /* values that are constant along a path */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, const double gauge[1], double h,
     double coef[31])
 {
@@ -76,7 +76,8 @@ static void sklyanin_gyrostat_prepare(const sklyanin_gyrostat_params *params, co
     coef[30] = 4.0 * t6;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void sklyanin_gyrostat_generate(const double coef[31], const double y[4], double slope[4],
     double jacobian[16])
 {
@@ -123,7 +124,7 @@ static void sklyanin_gyrostat_generate(const double coef[31], const double y[4],
     jacobian[15] = 1.0 - 0.5 * (t38 + ((-2.0) * t34 - t23));
 }
 
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 static void sklyanin_gyrostat_products(const sklyanin_gyrostat_params *params, const double x[4],
     double out[3])
 {
@@ -632,8 +633,8 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *
     const double gauge[sklyanin_gyrostat_GAUGES])
 {
     if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
-    sklyanin_gyrostat_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : sklyanin_gyrostat_default_params };
+    if (params == NULL) params = &sklyanin_gyrostat_default_params;
+    sklyanin_gyrostat_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!sklyanin_gyrostat_finite(fresh.x, sklyanin_gyrostat_DIM)) return sklyanin_gyrostat_BAD_ARGUMENT;
     if (gauge == NULL) sklyanin_gyrostat_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
@@ -733,16 +734,16 @@ size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s) { 
 sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status)
 {
-    sklyanin_gyrostat_status worst = isfinite(h) ? sklyanin_gyrostat_OK : sklyanin_gyrostat_BAD_ARGUMENT;
+    sklyanin_gyrostat_status result = isfinite(h) ? sklyanin_gyrostat_OK : sklyanin_gyrostat_BAD_ARGUMENT;
     if (x == NULL && members > 0) return sklyanin_gyrostat_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         sklyanin_gyrostat_solver s;
         for (size_t i = 0; i < sklyanin_gyrostat_DIM; ++i) s.x[i] = x[i * members + m];
-        sklyanin_gyrostat_status member = sklyanin_gyrostat_init(&s, params, s.x);
-        if (member == sklyanin_gyrostat_OK) member = sklyanin_gyrostat_integrate(&s, h, steps);
+        sklyanin_gyrostat_status ended = sklyanin_gyrostat_init(&s, params, s.x);
+        if (ended == sklyanin_gyrostat_OK) ended = sklyanin_gyrostat_integrate(&s, h, steps);
         for (size_t i = 0; i < sklyanin_gyrostat_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == sklyanin_gyrostat_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == sklyanin_gyrostat_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * sklyanin_gyrostat.h: the declarations; sklyanin_gyrostat.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6178bb47b4a9613968ac664b584820cd4b6541445eeb6f68f719cedf2e5a5b93
+ * body-sha256: 78a943774fcfe561d6a5f9ac801f382333cc9c4d0a13844135d673e21fa9d1bb
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define sklyanin_gyrostat_DIM 4
 #define sklyanin_gyrostat_ORDER 4
 #define sklyanin_gyrostat_CASIMIRS 2
@@ -26,10 +25,8 @@ typedef struct {
 extern const sklyanin_gyrostat_params sklyanin_gyrostat_default_params;
 
 /* How a step ends; sklyanin_gyrostat_status_string says it in words. */
-typedef enum {
-    sklyanin_gyrostat_OK = 0, sklyanin_gyrostat_NO_CONVERGENCE, sklyanin_gyrostat_SINGULAR,
-        sklyanin_gyrostat_NOT_FINITE, sklyanin_gyrostat_BAD_ARGUMENT
-} sklyanin_gyrostat_status;
+typedef enum { sklyanin_gyrostat_OK = 0, sklyanin_gyrostat_NO_CONVERGENCE, sklyanin_gyrostat_SINGULAR,
+    sklyanin_gyrostat_NOT_FINITE, sklyanin_gyrostat_BAD_ARGUMENT } sklyanin_gyrostat_status;
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status);
 
 enum { sklyanin_gyrostat_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 2a65eaa7b1c6bcef419889d87d8c00277ca4bf58a5b0e6ca76b18b4f2062e6de
+# body-sha256: 4fe0b7100f428f2a0fa8e3839c34731289835184be4e2b2bd3205681c8f50dc3
 import numpy as np
 
 VERSION = "0.1.0"
@@ -162,8 +162,8 @@ def _prepare(parameters, gauge, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     S0 = y[..., 0]
     S1 = y[..., 1]
     S2 = y[..., 2]
@@ -548,7 +548,8 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     S1 = x[..., 1]
     S2 = x[..., 2]
     S3 = x[..., 3]

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6e71852575d24b5adfbc4524351041b27939a38d51f0994912036a46160fe694
+ * body-sha256: cc25dd32a6c03011b9cd699a5d2e28bd959f0287cf1dc2183fdd74428c13a9dc
  */
 #include "so4_manakov.h"
 #include <float.h>
@@ -84,7 +84,7 @@ static double so4_manakov_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void so4_manakov_prepare(const so4_manakov_params *params, const double gauge[1], double h,
     double coef[32])
 {
@@ -132,8 +132,7 @@ static void so4_manakov_prepare(const so4_manakov_params *params, const double g
     coef[31] = 4.0 * t17;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
+/* so4_manakov_linearise, part 1 of 3. */
 so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[130])
@@ -318,8 +317,7 @@ so4_manakov_APART static void so4_manakov_linearise_part1(const double coef[32],
     increment[5] = t59;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
+/* so4_manakov_linearise, part 2 of 3. */
 so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[130])
@@ -513,8 +511,7 @@ so4_manakov_APART static void so4_manakov_linearise_part2(const double coef[32],
     increment_jacobian[5] = work[122] + (work[125] - work[126] - work[128]);
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
+/* so4_manakov_linearise, part 3 of 3. */
 so4_manakov_APART static void so4_manakov_linearise_part3(const double coef[32], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[130])
@@ -556,8 +553,8 @@ so4_manakov_APART static void so4_manakov_linearise_part3(const double coef[32],
     increment_jacobian[35] = t24 + (t14 - t21 - t2);
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void so4_manakov_linearise(const double coef[32], const double y[6], double displacement[6],
     double increment[6], double jacobian[36], double increment_jacobian[36])
 {
@@ -567,7 +564,7 @@ static void so4_manakov_linearise(const double coef[32], const double y[6], doub
     so4_manakov_linearise_part3(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 static void so4_manakov_products(const so4_manakov_params *params, const double x[6], double out[3])
 {
     (void)params;
@@ -805,8 +802,8 @@ so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manak
     const double x0[so4_manakov_DIM], const double gauge[so4_manakov_GAUGES])
 {
     if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
-    so4_manakov_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : so4_manakov_default_params };
+    if (params == NULL) params = &so4_manakov_default_params;
+    so4_manakov_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!so4_manakov_finite(fresh.x, so4_manakov_DIM)) return so4_manakov_BAD_ARGUMENT;
     if (gauge == NULL) so4_manakov_choose_gauge(&fresh.params, fresh.x, fresh.gauge);
@@ -901,16 +898,16 @@ size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s) { return s->st
 so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    so4_manakov_status worst = isfinite(h) ? so4_manakov_OK : so4_manakov_BAD_ARGUMENT;
+    so4_manakov_status result = isfinite(h) ? so4_manakov_OK : so4_manakov_BAD_ARGUMENT;
     if (x == NULL && members > 0) return so4_manakov_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         so4_manakov_solver s;
         for (size_t i = 0; i < so4_manakov_DIM; ++i) s.x[i] = x[i * members + m];
-        so4_manakov_status member = so4_manakov_init(&s, params, s.x);
-        if (member == so4_manakov_OK) member = so4_manakov_integrate(&s, h, steps);
+        so4_manakov_status ended = so4_manakov_init(&s, params, s.x);
+        if (ended == so4_manakov_OK) ended = so4_manakov_integrate(&s, h, steps);
         for (size_t i = 0; i < so4_manakov_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == so4_manakov_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == so4_manakov_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * so4_manakov.h: the declarations; so4_manakov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a8124464be6b97bbf9eb39af6d87429b7f45789bd6912446a12b8b3cf741aced
+ * body-sha256: 8fe6a9772fbc2252b9b1c1724ed619f24465a01645703870aefbc33ca620cb67
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define so4_manakov_DIM 6
 #define so4_manakov_ORDER 4
 #define so4_manakov_CASIMIRS 2
@@ -26,10 +25,8 @@ typedef struct {
 extern const so4_manakov_params so4_manakov_default_params;
 
 /* How a step ends; so4_manakov_status_string says it in words. */
-typedef enum {
-    so4_manakov_OK = 0, so4_manakov_NO_CONVERGENCE, so4_manakov_SINGULAR, so4_manakov_NOT_FINITE,
-        so4_manakov_BAD_ARGUMENT
-} so4_manakov_status;
+typedef enum { so4_manakov_OK = 0, so4_manakov_NO_CONVERGENCE, so4_manakov_SINGULAR, so4_manakov_NOT_FINITE,
+    so4_manakov_BAD_ARGUMENT } so4_manakov_status;
 const char *so4_manakov_status_string(so4_manakov_status status);
 
 enum { so4_manakov_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: b21834e0c01265cac92dbf68a846bfa62a0536dd16231ee7aabe6bbfdc8b36db
+# body-sha256: 39143226810d07ed09087de430499a04c393f93dc8c210ae4426b90d8ff2cd38
 import numpy as np
 
 VERSION = "0.1.0"
@@ -819,7 +819,8 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     x12 = x[..., 0]
     x13 = x[..., 1]
     x14 = x[..., 2]

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 103b07b40e491d33cae5327af07d64026f976f27548a1de6bad3cc2dc58ca677
+ * body-sha256: 8b8dca004b1e459c7c1b280f0520bb9262a0a7d099bddb81fc8bf2e6a442377a
  */
 #include "spin_chain5.h"
 #include <float.h>
@@ -90,7 +90,7 @@ static double spin_chain5_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void spin_chain5_prepare(const spin_chain5_params *params, const double gauge[5], double h,
     double coef[33])
 {
@@ -137,8 +137,7 @@ static void spin_chain5_prepare(const spin_chain5_params *params, const double g
     coef[32] = 2.0 * t6;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 7) */
+/* spin_chain5_linearise, part 1 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -346,8 +345,7 @@ spin_chain5_APART static void spin_chain5_linearise_part1(const double coef[33],
     work[0] = work[25] + coef[21] * x5;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 7) */
+/* spin_chain5_linearise, part 2 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -551,8 +549,7 @@ spin_chain5_APART static void spin_chain5_linearise_part2(const double coef[33],
     increment[11] = work[91];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 7) */
+/* spin_chain5_linearise, part 3 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -751,8 +748,7 @@ spin_chain5_APART static void spin_chain5_linearise_part3(const double coef[33],
     increment_jacobian[151] = z4 * work[202] - x4 * work[208];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 4 of 7) */
+/* spin_chain5_linearise, part 4 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -955,8 +951,7 @@ spin_chain5_APART static void spin_chain5_linearise_part4(const double coef[33],
     increment_jacobian[87] = x2 * work[268] - y2 * work[266];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 5 of 7) */
+/* spin_chain5_linearise, part 5 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -1156,8 +1151,7 @@ spin_chain5_APART static void spin_chain5_linearise_part5(const double coef[33],
     jacobian[108] = work[304] * work[365] + (work[301] * work[366] + work[298] * work[367]);
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 6 of 7) */
+/* spin_chain5_linearise, part 6 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -1350,8 +1344,7 @@ spin_chain5_APART static void spin_chain5_linearise_part6(const double coef[33],
     increment_jacobian[222] = x5 * work[470] - y5 * work[494] + work[97];
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 7 of 7) */
+/* spin_chain5_linearise, part 7 of 7. */
 spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33], const double y[15],
     double displacement[15], double increment[15], double jacobian[225], double increment_jacobian[225],
     double work[505])
@@ -1428,8 +1421,8 @@ spin_chain5_APART static void spin_chain5_linearise_part7(const double coef[33],
     increment_jacobian[224] = t31 - t29;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void spin_chain5_linearise(const double coef[33], const double y[15], double displacement[15],
     double increment[15], double jacobian[225], double increment_jacobian[225])
 {
@@ -1443,7 +1436,7 @@ static void spin_chain5_linearise(const double coef[33], const double y[15], dou
     spin_chain5_linearise_part7(coef, y, displacement, increment, jacobian, increment_jacobian, work);
 }
 
-/* grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge */
+/* The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge. */
 static void spin_chain5_products(const spin_chain5_params *params, const double x[15], double out[11])
 {
     const double x1 = x[0], y1 = x[1], z1 = x[2], x2 = x[3], y2 = x[4], z2 = x[5], x3 = x[6], y3 = x[7],
@@ -1715,8 +1708,8 @@ spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chai
     const double x0[spin_chain5_DIM], const double gauge[spin_chain5_GAUGES])
 {
     if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
-    spin_chain5_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : spin_chain5_default_params };
+    if (params == NULL) params = &spin_chain5_default_params;
+    spin_chain5_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     spin_chain5_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!spin_chain5_finite(fresh.x, spin_chain5_DIM) || !spin_chain5_allowed(&fresh.params)
@@ -1814,16 +1807,16 @@ size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s) { return s->st
 spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    spin_chain5_status worst = isfinite(h) ? spin_chain5_OK : spin_chain5_BAD_ARGUMENT;
+    spin_chain5_status result = isfinite(h) ? spin_chain5_OK : spin_chain5_BAD_ARGUMENT;
     if (x == NULL && members > 0) return spin_chain5_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         spin_chain5_solver s;
         for (size_t i = 0; i < spin_chain5_DIM; ++i) s.x[i] = x[i * members + m];
-        spin_chain5_status member = spin_chain5_init(&s, params, s.x);
-        if (member == spin_chain5_OK) member = spin_chain5_integrate(&s, h, steps);
+        spin_chain5_status ended = spin_chain5_init(&s, params, s.x);
+        if (ended == spin_chain5_OK) ended = spin_chain5_integrate(&s, h, steps);
         for (size_t i = 0; i < spin_chain5_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == spin_chain5_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == spin_chain5_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * spin_chain5.h: the declarations; spin_chain5.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 13f5ef738ecda358a32628389e507e1d3bff60cbd02611de58ce20837cd15205
+ * body-sha256: 0cbf37fe43260e891a5cbaa2c1ca9535b2b7a93e8922a83e1b6e01f4befec6a1
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define spin_chain5_DIM 15
 #define spin_chain5_ORDER 4
 #define spin_chain5_CASIMIRS 5
@@ -26,10 +25,8 @@ typedef struct {
 extern const spin_chain5_params spin_chain5_default_params;
 
 /* How a step ends; spin_chain5_status_string says it in words. */
-typedef enum {
-    spin_chain5_OK = 0, spin_chain5_NO_CONVERGENCE, spin_chain5_SINGULAR, spin_chain5_NOT_FINITE,
-        spin_chain5_BAD_ARGUMENT
-} spin_chain5_status;
+typedef enum { spin_chain5_OK = 0, spin_chain5_NO_CONVERGENCE, spin_chain5_SINGULAR, spin_chain5_NOT_FINITE,
+    spin_chain5_BAD_ARGUMENT } spin_chain5_status;
 const char *spin_chain5_status_string(spin_chain5_status status);
 
 enum { spin_chain5_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: ee929b1ddedbb408afc3637001cbe8ac4291fe8ed33cd1de1f062ac05b9da691
+# body-sha256: 9eade93244c716124af40453ade4594d27a16af4cfbdc33a84c622b38481e313
 import numpy as np
 
 VERSION = "0.1.0"
@@ -1678,7 +1678,8 @@ def _choose_gauge(parameters, x):
 
 
 def _products(parameters, x):
-    """Grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the gauge."""
+    """The products grad H . grad H, then grad H . grad C and grad C . grad C for each Casimir of the
+    gauge."""
     J = parameters["J"]
     x1 = x[..., 0]
     y1 = x[..., 1]

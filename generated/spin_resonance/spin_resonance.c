@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 84b195e9ea8ad21439efdb80bb39e99ffd18eba18b21f954d9315ddf0679edbf
+ * body-sha256: 6a49b3ed126baef58182edc5f4f2b1ba3090679c56034a9624a15d5c3e1957dc
  */
 #include "spin_resonance.h"
 #include <float.h>
@@ -86,7 +86,7 @@ static double spin_resonance_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on the time, but not on the state */
+/* Everything that depends on the time, but not on the state. */
 static void spin_resonance_at_time(const double coef[7], double t, double now[8])
 {
     const double t1 = coef[1] * t, t2 = cos(t1), t3 = sin(t1), t4 = t3 * t3, t5 = t2 * t2;
@@ -100,7 +100,7 @@ static void spin_resonance_at_time(const double coef[7], double t, double now[8]
     now[7] = (-1.0 / 12.0) * (coef[5] * t5) - coef[6] - 1.0 / 12.0 * (coef[5] * t4);
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void spin_resonance_prepare(const spin_resonance_params *params, double h, double coef[7])
 {
     const double t1 = h * h, t2 = h * t1, t3 = params->b * params->b;
@@ -115,8 +115,8 @@ static void spin_resonance_prepare(const spin_resonance_params *params, double h
     coef[6] = params->b0 * h;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void spin_resonance_linearise(const double coef[15], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -384,8 +384,8 @@ spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spi
     const double x0[spin_resonance_DIM], double t0)
 {
     if (s == NULL || x0 == NULL || !isfinite(t0)) return spin_resonance_BAD_ARGUMENT;
-    spin_resonance_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : spin_resonance_default_params };
+    if (params == NULL) params = &spin_resonance_default_params;
+    spin_resonance_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     spin_resonance_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
@@ -489,18 +489,18 @@ size_t spin_resonance_solver_steps_done(const spin_resonance_solver *s) { return
 spin_resonance_status spin_resonance_ensemble_at(const spin_resonance_params *params, double *x,
     size_t members, double t0, double h, size_t steps, unsigned char *status)
 {
-    spin_resonance_status worst = isfinite(h) ? spin_resonance_OK : spin_resonance_BAD_ARGUMENT;
+    spin_resonance_status result = isfinite(h) ? spin_resonance_OK : spin_resonance_BAD_ARGUMENT;
     if (x == NULL && members > 0) return spin_resonance_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         spin_resonance_solver s;
         for (size_t i = 0; i < spin_resonance_DIM; ++i) s.x[i] = x[i * members + m];
-        spin_resonance_status member = spin_resonance_init_at(&s, params, s.x, t0);
-        if (member == spin_resonance_OK) member = spin_resonance_integrate(&s, h, steps);
+        spin_resonance_status ended = spin_resonance_init_at(&s, params, s.x, t0);
+        if (ended == spin_resonance_OK) ended = spin_resonance_integrate(&s, h, steps);
         for (size_t i = 0; i < spin_resonance_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == spin_resonance_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == spin_resonance_OK) result = ended;
     }
-    return worst;
+    return result;
 }
 
 spin_resonance_status spin_resonance_ensemble(const spin_resonance_params *params, double *x, size_t members,

@@ -2,7 +2,7 @@
  * spin_resonance.h: the declarations; spin_resonance.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 80144491fae4d6a79a306f320dea4259ecdbfce053d30a2af30c7f7d84dabf2b
+ * body-sha256: 9567f39c2adaebd6f0f6dee2d2048d7c6e7ddefe23066013b645f7ffff6bb361
  */
 #ifndef SPIN_RESONANCE_H
 #define SPIN_RESONANCE_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define spin_resonance_DIM 3
 #define spin_resonance_ORDER 4
 #define spin_resonance_CASIMIRS 1
@@ -28,10 +27,8 @@ typedef struct {
 extern const spin_resonance_params spin_resonance_default_params;
 
 /* How a step ends; spin_resonance_status_string says it in words. */
-typedef enum {
-    spin_resonance_OK = 0, spin_resonance_NO_CONVERGENCE, spin_resonance_SINGULAR, spin_resonance_NOT_FINITE,
-        spin_resonance_BAD_ARGUMENT
-} spin_resonance_status;
+typedef enum { spin_resonance_OK = 0, spin_resonance_NO_CONVERGENCE, spin_resonance_SINGULAR,
+    spin_resonance_NOT_FINITE, spin_resonance_BAD_ARGUMENT } spin_resonance_status;
 const char *spin_resonance_status_string(spin_resonance_status status);
 
 enum { spin_resonance_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

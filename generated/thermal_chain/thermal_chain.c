@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: f7772d3ff27316bf53cced133d65aa597fc733a0b4ab538bbf8c5f50f652c011
+ * body-sha256: 8bbb5fe32a29e3c9c8b1df857ed55c4499ea59347247c0147c931e0ee8034ac1
  */
 #include "thermal_chain.h"
 #include <float.h>
@@ -101,7 +101,7 @@ static double thermal_chain_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on the increments of the noise, but not on the state */
+/* Everything that depends on the increments of the noise, but not on the state. */
 static void thermal_chain_at_step(const double coef[5], const double dw[12], double now[12])
 {
     now[0] = coef[4] * dw[2];
@@ -118,7 +118,7 @@ static void thermal_chain_at_step(const double coef[5], const double dw[12], dou
     now[11] = coef[4] * dw[10];
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void thermal_chain_prepare(const thermal_chain_params *params, double h, double coef[5])
 {
     coef[0] = -(params->J * h);
@@ -128,8 +128,7 @@ static void thermal_chain_prepare(const thermal_chain_params *params, double h, 
     coef[4] = sqrt(2.0 * (params->T * params->damping_rate));
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 3) */
+/* thermal_chain_linearise, part 1 of 3. */
 thermal_chain_APART static void thermal_chain_linearise_part1(const double coef[17], const double y[12],
     double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
     double work[103])
@@ -311,8 +310,7 @@ thermal_chain_APART static void thermal_chain_linearise_part1(const double coef[
     jacobian[29] = coef[0] * t50 + (work[82] * t52 - work[84] * t51);
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 3) */
+/* thermal_chain_linearise, part 2 of 3. */
 thermal_chain_APART static void thermal_chain_linearise_part2(const double coef[17], const double y[12],
     double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
     double work[103])
@@ -491,8 +489,7 @@ thermal_chain_APART static void thermal_chain_linearise_part2(const double coef[
     jacobian[142] = t89 - t88 + (work[91] * t90 - work[94] * t92);
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 3) */
+/* thermal_chain_linearise, part 3 of 3. */
 thermal_chain_APART static void thermal_chain_linearise_part3(const double coef[17], const double y[12],
     double displacement[12], double increment[12], double jacobian[144], double increment_jacobian[144],
     double work[103])
@@ -569,8 +566,8 @@ thermal_chain_APART static void thermal_chain_linearise_part3(const double coef[
     increment_jacobian[143] = -(t42 + t40);
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void thermal_chain_linearise(const double coef[17], const double y[12], double displacement[12],
     double increment[12], double jacobian[144], double increment_jacobian[144])
 {
@@ -892,8 +889,8 @@ thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_c
     const double x0[thermal_chain_DIM])
 {
     if (s == NULL || x0 == NULL) return thermal_chain_BAD_ARGUMENT;
-    thermal_chain_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : thermal_chain_default_params };
+    if (params == NULL) params = &thermal_chain_default_params;
+    thermal_chain_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     thermal_chain_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!thermal_chain_finite(fresh.x, thermal_chain_DIM) || !thermal_chain_allowed(&fresh.params)
@@ -985,7 +982,7 @@ size_t thermal_chain_solver_steps_done(const thermal_chain_solver *s) { return s
 thermal_chain_status thermal_chain_ensemble_of(const thermal_chain_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
 {
-    thermal_chain_status worst = isfinite(h) ? thermal_chain_OK : thermal_chain_BAD_ARGUMENT;
+    thermal_chain_status result = isfinite(h) ? thermal_chain_OK : thermal_chain_BAD_ARGUMENT;
     size_t earliest = members;
     if (x == NULL && members > 0) return thermal_chain_BAD_ARGUMENT;
 #ifdef _OPENMP
@@ -994,22 +991,22 @@ thermal_chain_status thermal_chain_ensemble_of(const thermal_chain_params *param
     for (size_t m = 0; m < members; ++m) {
         thermal_chain_solver s;
         for (size_t i = 0; i < thermal_chain_DIM; ++i) s.x[i] = x[i * members + m];
-        thermal_chain_status member = thermal_chain_init(&s, params, s.x);
-        if (member == thermal_chain_OK)
+        thermal_chain_status ended = thermal_chain_init(&s, params, s.x);
+        if (ended == thermal_chain_OK)
             thermal_chain_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
-        if (member == thermal_chain_OK) member = thermal_chain_integrate(&s, h, steps);
+        if (ended == thermal_chain_OK) ended = thermal_chain_integrate(&s, h, steps);
         for (size_t i = 0; i < thermal_chain_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (member == thermal_chain_OK) continue;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (ended == thermal_chain_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
 #endif
         if (m < earliest) {
             earliest = m;
-            worst = member;
+            result = ended;
         }
     }
-    return worst;
+    return result;
 }
 
 thermal_chain_status thermal_chain_ensemble(const thermal_chain_params *params, double *x, size_t members,

@@ -2,7 +2,7 @@
  * thermal_chain.h: the declarations; thermal_chain.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7abfa93c355802edc4721cd1e62f595595e2cdb0465cc4b3bac0d2503daa40fc
+ * body-sha256: 3bde86c1a003fc0f40c5210d35728968821b8194e6900f39e6173e0e2eb30bb2
  */
 #ifndef THERMAL_CHAIN_H
 #define THERMAL_CHAIN_H
@@ -11,7 +11,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define thermal_chain_DIM 12
 #define thermal_chain_ORDER 2
 #define thermal_chain_CASIMIRS 4
@@ -34,10 +33,8 @@ typedef struct {
 extern const thermal_chain_params thermal_chain_default_params;
 
 /* How a step ends; thermal_chain_status_string says it in words. */
-typedef enum {
-    thermal_chain_OK = 0, thermal_chain_NO_CONVERGENCE, thermal_chain_SINGULAR, thermal_chain_NOT_FINITE,
-        thermal_chain_BAD_ARGUMENT
-} thermal_chain_status;
+typedef enum { thermal_chain_OK = 0, thermal_chain_NO_CONVERGENCE, thermal_chain_SINGULAR,
+    thermal_chain_NOT_FINITE, thermal_chain_BAD_ARGUMENT } thermal_chain_status;
 const char *thermal_chain_status_string(thermal_chain_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thermal_chain_init. */

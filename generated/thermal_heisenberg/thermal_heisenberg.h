@@ -2,7 +2,7 @@
  * thermal_heisenberg.h: the declarations; thermal_heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f0a26d02d42004ce0a6f28a46fff906a5b2e01787efd99e309b2b6da66fc90b0
+ * body-sha256: 9634e8ae451ecc935c20633b8766dd9bb067fcb671bdf96c891382bd4bbbf8dd
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -11,7 +11,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define thermal_heisenberg_AXES 1
 #define thermal_heisenberg_DIM 3
 #define thermal_heisenberg_ORDER 2
@@ -33,10 +32,8 @@ enum { thermal_heisenberg_COEFFICIENTS = 3 }; /* numbers that depend on params a
 enum { thermal_heisenberg_DIRECTIONS = 24 };  /* of a Krylov space */
 
 /* How a step ends; thermal_heisenberg_status_string says it in words. */
-typedef enum {
-    thermal_heisenberg_OK = 0, thermal_heisenberg_NO_CONVERGENCE, thermal_heisenberg_SINGULAR,
-        thermal_heisenberg_NOT_FINITE, thermal_heisenberg_BAD_ARGUMENT
-} thermal_heisenberg_status;
+typedef enum { thermal_heisenberg_OK = 0, thermal_heisenberg_NO_CONVERGENCE, thermal_heisenberg_SINGULAR,
+    thermal_heisenberg_NOT_FINITE, thermal_heisenberg_BAD_ARGUMENT } thermal_heisenberg_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with thermal_heisenberg_init; a copy of the struct is the

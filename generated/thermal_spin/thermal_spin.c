@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: ef7d066ec8890ae41f437cb231bee7612c0df6e92e7a2673d405f9e1c31ee676
+ * body-sha256: 980f799c3596728a0afa6c68d404906cabd20da64716df6869215383f1eed10c
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -93,7 +93,7 @@ static double thermal_spin_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on the increments of the noise, but not on the state */
+/* Everything that depends on the increments of the noise, but not on the state. */
 static void thermal_spin_at_step(const double coef[7], const double dw[3], double now[6])
 {
     const double t1 = coef[5] * dw[2], t2 = t1 - coef[6];
@@ -105,7 +105,7 @@ static void thermal_spin_at_step(const double coef[7], const double dw[3], doubl
     now[5] = coef[6] - t1;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void thermal_spin_prepare(const thermal_spin_params *params, double h, double coef[7])
 {
     const double t1 = params->B * h;
@@ -118,8 +118,8 @@ static void thermal_spin_prepare(const thermal_spin_params *params, double h, do
     coef[6] = t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void thermal_spin_linearise(const double coef[13], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -423,8 +423,8 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     const double x0[thermal_spin_DIM])
 {
     if (s == NULL || x0 == NULL) return thermal_spin_BAD_ARGUMENT;
-    thermal_spin_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : thermal_spin_default_params };
+    if (params == NULL) params = &thermal_spin_default_params;
+    thermal_spin_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     thermal_spin_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!thermal_spin_finite(fresh.x, thermal_spin_DIM) || !thermal_spin_allowed(&fresh.params)
@@ -515,7 +515,7 @@ size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s) { return s->
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
 {
-    thermal_spin_status worst = isfinite(h) ? thermal_spin_OK : thermal_spin_BAD_ARGUMENT;
+    thermal_spin_status result = isfinite(h) ? thermal_spin_OK : thermal_spin_BAD_ARGUMENT;
     size_t earliest = members;
     if (x == NULL && members > 0) return thermal_spin_BAD_ARGUMENT;
 #ifdef _OPENMP
@@ -524,22 +524,22 @@ thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, 
     for (size_t m = 0; m < members; ++m) {
         thermal_spin_solver s;
         for (size_t i = 0; i < thermal_spin_DIM; ++i) s.x[i] = x[i * members + m];
-        thermal_spin_status member = thermal_spin_init(&s, params, s.x);
-        if (member == thermal_spin_OK)
+        thermal_spin_status ended = thermal_spin_init(&s, params, s.x);
+        if (ended == thermal_spin_OK)
             thermal_spin_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
-        if (member == thermal_spin_OK) member = thermal_spin_integrate(&s, h, steps);
+        if (ended == thermal_spin_OK) ended = thermal_spin_integrate(&s, h, steps);
         for (size_t i = 0; i < thermal_spin_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (member == thermal_spin_OK) continue;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (ended == thermal_spin_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
 #endif
         if (m < earliest) {
             earliest = m;
-            worst = member;
+            result = ended;
         }
     }
-    return worst;
+    return result;
 }
 
 thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, double *x, size_t members,

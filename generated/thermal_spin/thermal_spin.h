@@ -2,7 +2,7 @@
  * thermal_spin.h: the declarations; thermal_spin.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 32112f5669a4e92a5821078a8e11ef496b42d68862eab1a09b67b99185f43304
+ * body-sha256: 1f2b1faf365e90d8c1c49f3f991e65e3e1e0c1f1a919c3f2897731a6de9ac43b
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -11,7 +11,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define thermal_spin_DIM 3
 #define thermal_spin_ORDER 2
 #define thermal_spin_CASIMIRS 1
@@ -31,10 +30,8 @@ typedef struct {
 extern const thermal_spin_params thermal_spin_default_params;
 
 /* How a step ends; thermal_spin_status_string says it in words. */
-typedef enum {
-    thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR, thermal_spin_NOT_FINITE,
-        thermal_spin_BAD_ARGUMENT
-} thermal_spin_status;
+typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR,
+    thermal_spin_NOT_FINITE, thermal_spin_BAD_ARGUMENT } thermal_spin_status;
 const char *thermal_spin_status_string(thermal_spin_status status);
 
 /* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thermal_spin_init. */

@@ -15,7 +15,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 830d0078d1c42396b09de2875dec2c17a2120ddda15f44077ec3ebe92b865472
+ * body-sha256: 32e02ad7befb73d0ba3a1be77d277250665f65c0a1d61dc851435f698fc5c888
  */
 #include "thruster_body.h"
 #include <float.h>
@@ -91,7 +91,7 @@ static double thruster_body_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void thruster_body_prepare(const thruster_body_params *params, double h, double coef[8])
 {
     const double t1 = params->drag * h;
@@ -105,8 +105,8 @@ static void thruster_body_prepare(const thruster_body_params *params, double h, 
     coef[7] = -t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void thruster_body_linearise(const double coef[8], const double y[3], double displacement[3],
     double increment[3], double jacobian[9], double increment_jacobian[9])
 {
@@ -363,8 +363,8 @@ thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_
     const double x0[thruster_body_DIM])
 {
     if (s == NULL || x0 == NULL) return thruster_body_BAD_ARGUMENT;
-    thruster_body_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : thruster_body_default_params };
+    if (params == NULL) params = &thruster_body_default_params;
+    thruster_body_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     thruster_body_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!thruster_body_finite(fresh.x, thruster_body_DIM) || !thruster_body_allowed(&fresh.params)
@@ -473,16 +473,16 @@ size_t thruster_body_solver_steps_done(const thruster_body_solver *s) { return s
 thruster_body_status thruster_body_ensemble(const thruster_body_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status)
 {
-    thruster_body_status worst = isfinite(h) ? thruster_body_OK : thruster_body_BAD_ARGUMENT;
+    thruster_body_status result = isfinite(h) ? thruster_body_OK : thruster_body_BAD_ARGUMENT;
     if (x == NULL && members > 0) return thruster_body_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         thruster_body_solver s;
         for (size_t i = 0; i < thruster_body_DIM; ++i) s.x[i] = x[i * members + m];
-        thruster_body_status member = thruster_body_init(&s, params, s.x);
-        if (member == thruster_body_OK) member = thruster_body_integrate(&s, h, steps);
+        thruster_body_status ended = thruster_body_init(&s, params, s.x);
+        if (ended == thruster_body_OK) ended = thruster_body_integrate(&s, h, steps);
         for (size_t i = 0; i < thruster_body_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == thruster_body_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == thruster_body_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * thruster_body.h: the declarations; thruster_body.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fd7d6c347bca2b41c7e8621f30306f1ccc820acc14f8a58d3e232565cf4b0f85
+ * body-sha256: 117c651adb023b87518bf940ff5df39e1c2774e18b4aaa4beffac14a9d0a58dc
  */
 #ifndef THRUSTER_BODY_H
 #define THRUSTER_BODY_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define thruster_body_DIM 3
 #define thruster_body_ORDER 4
 #define thruster_body_CASIMIRS 1
@@ -30,10 +29,8 @@ typedef struct {
 extern const thruster_body_params thruster_body_default_params;
 
 /* How a step ends; thruster_body_status_string says it in words. */
-typedef enum {
-    thruster_body_OK = 0, thruster_body_NO_CONVERGENCE, thruster_body_SINGULAR, thruster_body_NOT_FINITE,
-        thruster_body_BAD_ARGUMENT
-} thruster_body_status;
+typedef enum { thruster_body_OK = 0, thruster_body_NO_CONVERGENCE, thruster_body_SINGULAR,
+    thruster_body_NOT_FINITE, thruster_body_BAD_ARGUMENT } thruster_body_status;
 const char *thruster_body_status_string(thruster_body_status status);
 
 enum { thruster_body_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 16226f47f37021dbdf7f95c14acd39ca0e5579ae0e820786018d416528455b37
+ * body-sha256: b5e748198bb523dee83a42a1e36d0e2297e21ec54744e0a83e310b00c62fc0f1
  */
 #include "toda.h"
 #include <float.h>
@@ -56,7 +56,7 @@ static int toda_allowed(const toda_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void toda_prepare(const toda_params *params, double h, double coef[restrict 2])
 {
     (void)params;

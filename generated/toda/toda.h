@@ -2,7 +2,7 @@
  * toda.h: the declarations; toda.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f9d376d856197d8d9fd3605b056285b44c1fcdf2dd07f5829bf2156215d00403
+ * body-sha256: ec00203aa5ad7e0347fa64c55779a21d90ece6cafb830aa2ad43e167320ef613
  */
 #ifndef TODA_H
 #define TODA_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define toda_AXES 1
 #define toda_DIM 2
 #define toda_ORDER 4
@@ -29,9 +28,8 @@ enum { toda_ARRAYS = 2 };        /* arrays over the sites: fields, then paramete
 enum { toda_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
 
 /* How a step ends; toda_status_string says it in words. */
-typedef enum {
-    toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE, toda_BAD_ARGUMENT
-} toda_status;
+typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
+    toda_BAD_ARGUMENT } toda_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with toda_init; a copy of the struct is the same solver,

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 12dab2e290772a5f79bddb7dc8d2ad8ff4ae434872308ba81f7739c5e24a9de5
+ * body-sha256: c80e841f835d5c9ffa1e55880bcfeb4654802f3e9ac2fac86d18dbdb00900076
  */
 #include "toda3.h"
 #include <float.h>
@@ -76,7 +76,7 @@ static double toda3_phi1(double s)
     return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void toda3_prepare(const toda3_params *params, double h, double coef[10])
 {
     (void)params;
@@ -93,8 +93,8 @@ static void toda3_prepare(const toda3_params *params, double h, double coef[10])
     coef[9] = 1.0 / 3.0 * t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void toda3_linearise(const double coef[10], const double y[5], double displacement[5],
     double increment[5], double jacobian[25], double increment_jacobian[25])
 {
@@ -398,7 +398,8 @@ static toda3_status toda3_attempt(toda3_solver *s)
 toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[toda3_DIM])
 {
     if (s == NULL || x0 == NULL) return toda3_BAD_ARGUMENT;
-    toda3_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params : toda3_default_params };
+    if (params == NULL) params = &toda3_default_params;
+    toda3_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!toda3_finite(fresh.x, toda3_DIM)) return toda3_BAD_ARGUMENT;
     *s = fresh;
@@ -481,16 +482,16 @@ size_t toda3_solver_steps_done(const toda3_solver *s) { return s->steps; }
 toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status)
 {
-    toda3_status worst = isfinite(h) ? toda3_OK : toda3_BAD_ARGUMENT;
+    toda3_status result = isfinite(h) ? toda3_OK : toda3_BAD_ARGUMENT;
     if (x == NULL && members > 0) return toda3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         toda3_solver s;
         for (size_t i = 0; i < toda3_DIM; ++i) s.x[i] = x[i * members + m];
-        toda3_status member = toda3_init(&s, params, s.x);
-        if (member == toda3_OK) member = toda3_integrate(&s, h, steps);
+        toda3_status ended = toda3_init(&s, params, s.x);
+        if (ended == toda3_OK) ended = toda3_integrate(&s, h, steps);
         for (size_t i = 0; i < toda3_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == toda3_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == toda3_OK) result = ended;
     }
-    return worst;
+    return result;
 }

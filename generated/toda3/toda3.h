@@ -2,7 +2,7 @@
  * toda3.h: the declarations; toda3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 33f1d6ff49666da9460a04e24a3447de4f4465c37e466766f9f432f5a3960d68
+ * body-sha256: 5be9dc53f1b647132ce4b1f0589820ba6a109c8f3cc885b01eddf50512db6515
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define toda3_DIM 5
 #define toda3_ORDER 4
 #define toda3_CASIMIRS 1
@@ -25,9 +24,8 @@ typedef struct {
 extern const toda3_params toda3_default_params;
 
 /* How a step ends; toda3_status_string says it in words. */
-typedef enum {
-    toda3_OK = 0, toda3_NO_CONVERGENCE, toda3_SINGULAR, toda3_NOT_FINITE, toda3_BAD_ARGUMENT
-} toda3_status;
+typedef enum { toda3_OK = 0, toda3_NO_CONVERGENCE, toda3_SINGULAR, toda3_NOT_FINITE,
+    toda3_BAD_ARGUMENT } toda3_status;
 const char *toda3_status_string(toda3_status status);
 
 enum { toda3_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Members of an
  *   ensemble; Ensembles
- * body-sha256: a3730b39fcaafc8a1d85669c4b76be68da5e13c260a57b1cf9d093adfedbca5e
+ * body-sha256: 7c78e442229a9bb84d3d62c6e5f005a28fd2690d83e030626b406ec0d9b466a0
  */
 #include "toda3_quadratic.h"
 #include <float.h>
@@ -33,14 +33,15 @@ enum { toda3_quadratic_SERIES = 41 }; /* of a path, those of the coordinates fir
 enum { toda3_quadratic_FIXED = 1 };   /* values that are constant along a path */
 enum { toda3_quadratic_CHECKS = 8 };  /* values that a recurrence is not fitted to, but has to foresee */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void toda3_quadratic_prepare(const toda3_quadratic_params *params, double h, double coef[restrict 1])
 {
     (void)params;
     coef[0] = h;
 }
 
-/* p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2) */
+/* The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
+   O(h^2). */
 static void toda3_quadratic_generate(const double coef[1], const double y[5], double slope[restrict 5],
     double jacobian[restrict 25])
 {
@@ -715,8 +716,8 @@ toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const tod
     const double x0[toda3_quadratic_DIM])
 {
     if (s == NULL || x0 == NULL) return toda3_quadratic_BAD_ARGUMENT;
-    toda3_quadratic_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : toda3_quadratic_default_params };
+    if (params == NULL) params = &toda3_quadratic_default_params;
+    toda3_quadratic_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!toda3_quadratic_finite(fresh.x, toda3_quadratic_DIM)) return toda3_quadratic_BAD_ARGUMENT;
     *s = fresh;
@@ -832,7 +833,7 @@ typedef struct {
     size_t members, steps, own;
     const toda3_quadratic_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;         /* 0 where there are no frames */
+    size_t stride;
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } toda3_quadratic_members;
@@ -858,7 +859,7 @@ static toda3_quadratic_status toda3_quadratic_take_member(const toda3_quadratic_
 static size_t toda3_quadratic_to_frame(const toda3_quadratic_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -896,16 +897,16 @@ static void toda3_quadratic_put_member(const toda3_quadratic_members *all, size_
 /* All members. The first status that is not OK. */
 static toda3_quadratic_status toda3_quadratic_run(const toda3_quadratic_members *all)
 {
-    toda3_quadratic_status worst = toda3_quadratic_OK;
+    toda3_quadratic_status result = toda3_quadratic_OK;
     for (size_t m = 0; m < all->members; ++m) {
         toda3_quadratic_solver s;
         double x[toda3_quadratic_DIM];
         const toda3_quadratic_status begun = toda3_quadratic_take_member(all, m, x, &s);
         const toda3_quadratic_status status = toda3_quadratic_end_member(all, m, 0, &s, begun);
         toda3_quadratic_put_member(all, m, begun == toda3_quadratic_OK ? s.x : x, status);
-        if (worst == toda3_quadratic_OK) worst = status;
+        if (result == toda3_quadratic_OK) result = status;
     }
-    return worst;
+    return result;
 }
 
 toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *params, double *x,
@@ -915,8 +916,8 @@ toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *pa
     toda3_quadratic_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
         .status = status };
     if (x == NULL && members > 0) return toda3_quadratic_BAD_ARGUMENT;
-    const toda3_quadratic_status worst = toda3_quadratic_run(&all);
-    return isfinite(h) ? worst : toda3_quadratic_BAD_ARGUMENT;
+    const toda3_quadratic_status result = toda3_quadratic_run(&all);
+    return isfinite(h) ? result : toda3_quadratic_BAD_ARGUMENT;
 }
 
 toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_params *params, double *x,
@@ -926,7 +927,7 @@ toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_param
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return toda3_quadratic_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return toda3_quadratic_BAD_ARGUMENT;
-    all.stride = frames != NULL ? stride : 0;
+    all.stride = stride;
     all.frames = frames;
     all.status = status;
     return toda3_quadratic_run(&all);

@@ -2,7 +2,7 @@
  * toda3_quadratic.h: the declarations; toda3_quadratic.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 59c8d6ec042f8a236e3273baf453909f664e87e6dd101b1a138d6eb57b3d3886
+ * body-sha256: ad08c3c6f98325d4a5fb05cb5297daa37f0014ff2509791b2282b0ec0e775873
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define toda3_quadratic_DIM 5
 #define toda3_quadratic_ORDER 4
 #define toda3_quadratic_CASIMIRS 1
@@ -28,10 +27,8 @@ typedef struct {
 extern const toda3_quadratic_params toda3_quadratic_default_params;
 
 /* How a step ends; toda3_quadratic_status_string says it in words. */
-typedef enum {
-    toda3_quadratic_OK = 0, toda3_quadratic_NO_CONVERGENCE, toda3_quadratic_SINGULAR,
-        toda3_quadratic_NOT_FINITE, toda3_quadratic_BAD_ARGUMENT
-} toda3_quadratic_status;
+typedef enum { toda3_quadratic_OK = 0, toda3_quadratic_NO_CONVERGENCE, toda3_quadratic_SINGULAR,
+    toda3_quadratic_NOT_FINITE, toda3_quadratic_BAD_ARGUMENT } toda3_quadratic_status;
 const char *toda3_quadratic_status_string(toda3_quadratic_status status);
 
 enum { toda3_quadratic_KEPT = 2 * toda3_quadratic_REMEMBERED };

@@ -8,7 +8,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: b768f563873246a5e642401288a5bd3988b63090393e5e20a594559e32a2bd06
+# body-sha256: 3a4eb65e73035c2ec736f88bd3a72dda1c922be601431234eea6187e7fa3f13e
 import numpy as np
 
 VERSION = "0.1.0"
@@ -115,8 +115,8 @@ def _prepare(parameters, h):
 
 
 def _generate(coef, y):
-    """P = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to
-    O(h^2)."""
+    """The momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up
+    to O(h^2)."""
     return (
         _filled(y, [0.0, 0.0, coef[0], coef[0], coef[0]]),
         _filled(y, [

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: dc414fc3fcac48125e88c5908cae6ad82b5c9f7e75d4eaacc0bec10ce78e4c05
+ * body-sha256: b3cea3e472a96862058c41f80e88e70909ff4e4d02cf13fe60282903e3310b6c
  */
 #include "volterra.h"
 #include <float.h>
@@ -58,7 +58,7 @@ static int volterra_allowed(const volterra_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void volterra_prepare(const volterra_params *params, double h, double coef[restrict 1])
 {
     (void)params;

@@ -2,7 +2,7 @@
  * volterra.h: the declarations; volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 51d00e2ce039a87b52e7419b648381f852d529a2424e274266a6be8db72678f3
+ * body-sha256: da0c77abc744172ddaffe5ce8519cee79b1f8a13f2db82529c5e236a500a0a92
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define volterra_AXES 1
 #define volterra_DIM 1
 #define volterra_ORDER 4
@@ -29,9 +28,8 @@ enum { volterra_ARRAYS = 1 };        /* arrays over the sites: fields, then para
 enum { volterra_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
 /* How a step ends; volterra_status_string says it in words. */
-typedef enum {
-    volterra_OK = 0, volterra_NO_CONVERGENCE, volterra_SINGULAR, volterra_NOT_FINITE, volterra_BAD_ARGUMENT
-} volterra_status;
+typedef enum { volterra_OK = 0, volterra_NO_CONVERGENCE, volterra_SINGULAR, volterra_NOT_FINITE,
+    volterra_BAD_ARGUMENT } volterra_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with volterra_init; a copy of the struct is the same

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 3ab940ef845a170faa8e9391e5832a6ce6c41027ecca81795e3b9f3032e854dd
+ * body-sha256: ddbb2bef35e6bab8399c47269951fd789b9228dbfefbe561937691365b287d4b
  */
 #include "volterra5.h"
 #include <float.h>
@@ -25,7 +25,7 @@ const volterra5_params volterra5_default_params = { 0 };
 enum { volterra5_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define volterra5_TOLERANCE 1e-20       /* the error that an accepted correction may leave, as estimated */
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void volterra5_prepare(const volterra5_params *params, double h, double coef[4])
 {
     (void)params;
@@ -36,8 +36,8 @@ static void volterra5_prepare(const volterra5_params *params, double h, double c
     coef[3] = 1.0 / 12.0 * t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void volterra5_linearise(const double coef[4], const double y[5], double displacement[5],
     double increment[5], double jacobian[25], double increment_jacobian[25])
 {
@@ -352,8 +352,8 @@ volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *par
     const double x0[volterra5_DIM])
 {
     if (s == NULL || x0 == NULL) return volterra5_BAD_ARGUMENT;
-    volterra5_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : volterra5_default_params };
+    if (params == NULL) params = &volterra5_default_params;
+    volterra5_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!volterra5_finite(fresh.x, volterra5_DIM)) return volterra5_BAD_ARGUMENT;
     *s = fresh;
@@ -436,16 +436,16 @@ size_t volterra5_solver_steps_done(const volterra5_solver *s) { return s->steps;
 volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    volterra5_status worst = isfinite(h) ? volterra5_OK : volterra5_BAD_ARGUMENT;
+    volterra5_status result = isfinite(h) ? volterra5_OK : volterra5_BAD_ARGUMENT;
     if (x == NULL && members > 0) return volterra5_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         volterra5_solver s;
         for (size_t i = 0; i < volterra5_DIM; ++i) s.x[i] = x[i * members + m];
-        volterra5_status member = volterra5_init(&s, params, s.x);
-        if (member == volterra5_OK) member = volterra5_integrate(&s, h, steps);
+        volterra5_status ended = volterra5_init(&s, params, s.x);
+        if (ended == volterra5_OK) ended = volterra5_integrate(&s, h, steps);
         for (size_t i = 0; i < volterra5_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == volterra5_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == volterra5_OK) result = ended;
     }
-    return worst;
+    return result;
 }

@@ -2,7 +2,7 @@
  * volterra5.h: the declarations; volterra5.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2d4cd2e8444f325bac002dc8dff510d2c8ec07d6d9b2e69482494934cd70049d
+ * body-sha256: c8bb34c10f6032a74e239567cbd789c32a9aaa2e45a87a8dd0988e291caf070e
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define volterra5_DIM 5
 #define volterra5_ORDER 4
 #define volterra5_CASIMIRS 1
@@ -25,10 +24,8 @@ typedef struct {
 extern const volterra5_params volterra5_default_params;
 
 /* How a step ends; volterra5_status_string says it in words. */
-typedef enum {
-    volterra5_OK = 0, volterra5_NO_CONVERGENCE, volterra5_SINGULAR, volterra5_NOT_FINITE,
-        volterra5_BAD_ARGUMENT
-} volterra5_status;
+typedef enum { volterra5_OK = 0, volterra5_NO_CONVERGENCE, volterra5_SINGULAR, volterra5_NOT_FINITE,
+    volterra5_BAD_ARGUMENT } volterra5_status;
 const char *volterra5_status_string(volterra5_status status);
 
 enum { volterra5_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

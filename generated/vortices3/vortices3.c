@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: b9c1f81e4ad59ebdd9930f02e0e654b8fd872f4eff93500a01e465951ffe8c17
+ * body-sha256: 45efe29a8cec25501053eb296ab598439c4cade9a657b5c7adae1de859d62c3d
  */
 #include "vortices3.h"
 #include <float.h>
@@ -32,7 +32,7 @@ enum { vortices3_MAX_ITERATIONS = 20 }; /* of an inner solve */
 #define vortices3_APART
 #endif
 
-/* everything that depends on parameters and step size only */
+/* Everything that depends on parameters and step size only. */
 static void vortices3_prepare(const vortices3_params *params, double h, double coef[3])
 {
     (void)params;
@@ -42,8 +42,7 @@ static void vortices3_prepare(const vortices3_params *params, double h, double c
     coef[2] = h * t1;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 1 of 4) */
+/* vortices3_linearise, part 1 of 4. */
 vortices3_APART static void vortices3_linearise_part1(const double coef[3], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[218])
@@ -252,8 +251,7 @@ vortices3_APART static void vortices3_linearise_part1(const double coef[3], cons
     jacobian[7] = 1.0 + t71;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 2 of 4) */
+/* vortices3_linearise, part 2 of 4. */
 vortices3_APART static void vortices3_linearise_part2(const double coef[3], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[218])
@@ -460,8 +458,7 @@ vortices3_APART static void vortices3_linearise_part2(const double coef[3], cons
     increment_jacobian[24] = 2.0 * t85;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 3 of 4) */
+/* vortices3_linearise, part 3 of 4. */
 vortices3_APART static void vortices3_linearise_part3(const double coef[3], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[218])
@@ -668,8 +665,7 @@ vortices3_APART static void vortices3_linearise_part3(const double coef[3], cons
     increment_jacobian[35] = (-2.0) * t125;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) (part 4 of 4) */
+/* vortices3_linearise, part 4 of 4. */
 vortices3_APART static void vortices3_linearise_part4(const double coef[3], const double y[6],
     double displacement[6], double increment[6], double jacobian[36], double increment_jacobian[36],
     double work[218])
@@ -702,8 +698,8 @@ vortices3_APART static void vortices3_linearise_part4(const double coef[3], cons
     increment_jacobian[34] = (-2.0) * t8;
 }
 
-/* at the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
-   increment, all with the momenta p = grad S_h(y) */
+/* At the point y: displacement alpha - y, increment beta - alpha, the Jacobian of alpha and that of the
+   increment, all with the momenta p = grad S_h(y). */
 static void vortices3_linearise(const double coef[3], const double y[6], double displacement[6],
     double increment[6], double jacobian[36], double increment_jacobian[36])
 {
@@ -920,8 +916,8 @@ vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *par
     const double x0[vortices3_DIM])
 {
     if (s == NULL || x0 == NULL) return vortices3_BAD_ARGUMENT;
-    vortices3_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params
-        : vortices3_default_params };
+    if (params == NULL) params = &vortices3_default_params;
+    vortices3_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!vortices3_finite(fresh.x, vortices3_DIM)) return vortices3_BAD_ARGUMENT;
     *s = fresh;
@@ -1004,16 +1000,16 @@ size_t vortices3_solver_steps_done(const vortices3_solver *s) { return s->steps;
 vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)
 {
-    vortices3_status worst = isfinite(h) ? vortices3_OK : vortices3_BAD_ARGUMENT;
+    vortices3_status result = isfinite(h) ? vortices3_OK : vortices3_BAD_ARGUMENT;
     if (x == NULL && members > 0) return vortices3_BAD_ARGUMENT;
     for (size_t m = 0; m < members; ++m) {
         vortices3_solver s;
         for (size_t i = 0; i < vortices3_DIM; ++i) s.x[i] = x[i * members + m];
-        vortices3_status member = vortices3_init(&s, params, s.x);
-        if (member == vortices3_OK) member = vortices3_integrate(&s, h, steps);
+        vortices3_status ended = vortices3_init(&s, params, s.x);
+        if (ended == vortices3_OK) ended = vortices3_integrate(&s, h, steps);
         for (size_t i = 0; i < vortices3_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == vortices3_OK) worst = member;
+        if (status != NULL) status[m] = (unsigned char)ended;
+        if (result == vortices3_OK) result = ended;
     }
-    return worst;
+    return result;
 }

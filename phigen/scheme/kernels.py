@@ -173,7 +173,7 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
     flat = coefficients.hoist([*generating.slope, *jacobian])
     return Kernel(
         "generate",
-        "p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2)",
+        "the momenta p = grad S_h(y), and the Jacobian 1 - Hess S_h(y) pi(y) / 2 of the equation for p, up to O(h^2)",
         {"coef": coefficients.slots, "y": system.coordinates},
         _outputs(flat, ("slope", "jacobian"), (n, n * n)),
     )

@@ -40,7 +40,7 @@ def curvature(system: System, generating: GeneratingFunction, coefficients: Coef
     flat = coefficients.hoist([*generating.slope, *(e for row in generating.hessian for e in row)])
     return Kernel(
         "curvature",
-        "grad S_h(y) and the Hessian of S_h at y",
+        "the gradient of S_h and its Hessian at y",
         {"coef": coefficients.slots, "y": system.coordinates},
         (Output("slope", tuple(flat[:n])), Output("slope_jacobian", tuple(flat[n:]))),
     )

@@ -19,6 +19,11 @@ def plain(text: str) -> str:
     return re.sub(r"[ \n]+", " ", kept).strip()
 
 
+def sentence(text: str) -> str:
+    """What a kernel is for, as a sentence."""
+    return f"{text[:1].upper()}{text[1:]}."
+
+
 def header_lines(program: Program, command: str) -> list[str]:
     """The lines of the header comment, without comment marks and without the checksum."""
     about = program.about

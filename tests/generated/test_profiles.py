@@ -11,6 +11,7 @@ from support import RawC, compiled, files, setting, small, solver
 from phigen import resources, spec
 from phigen.compiler import compile_spec
 from phigen.spec.model import Extras
+from phigen.targets.c.emitter import FEW_SCREENS
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
 
@@ -46,8 +47,8 @@ def test_small_code_makes_the_steps_of_fast_code(name, scheme):
 @pytest.mark.parametrize(
     ("name", "order", "lines", "runtime", "row"),
     [
-        ("rigid_body", 4, 600, 300, "rigid body, order 4"),
-        ("pendulum_euler", 1, 275, 150, "pendulum, explicit, order 1"),
+        ("rigid_body", 4, 596, 300, "rigid body, order 4"),
+        ("pendulum_euler", 1, 269, 127, "pendulum, explicit, order 1"),
     ],
 )
 def test_small_code_is_short(name, order, lines, runtime, row):
@@ -119,5 +120,6 @@ def test_code_is_fit_to_be_read(path):
     assert "_STAGES" in text or not re.search(r"\bstage <|\[stage\]|\bint stage\b", text)
     contents = re.findall(r"^ \* Contents: (.*?)\n \* body", text, re.M | re.S)
     chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", text, re.M)
-    assert [re.sub(r"\n \* +", " ", found) for found in contents] == ["; ".join(chapters)] * bool(chapters)
+    long = text.split("*/\n", 1)[1].count("\n") > FEW_SCREENS
+    assert [re.sub(r"\n \* +", " ", found) for found in contents] == ["; ".join(chapters)] * bool(chapters and long)
     assert not re.search(r"^}\n(?:/\*|#define|enum|static)", text, re.M), "something sticks to the end of a function"

@@ -19,9 +19,15 @@ _OVER_STAGES = re.compile(rf"^( *)for \(int stage = (?:{_FORTH}|{_BACK})\)(?: (.
 _ONE_STAGE = (
     (re.compile(r"phi_fractions\[stage\] \* |PHI_STAGES \* | \+ stage \* PHI_ROW"), ""),
     (re.compile(r"\[(?:stage|PHI_STAGES)\]"), ""),
-    (re.compile(r"((?:->|\.)(?:coef|history|stage|use_recurrences))\[0\]"), r"\1"),
+    (re.compile(r"((?:->|\.)(?:coef|history|stage|use_recurrences|weight))\[0\]"), r"\1"),
     (re.compile(r", (?:int )?stage(?=[,)])"), ""),
+    (re.compile(r"&models->stage\b|\b(?:this|next)_stage(?=->)"), "model"),
+    (re.compile(r"\bmodels(->|\.)stage\."), r"model\1"),
+    (re.compile(r"\bmodels\.stage\b|\bmodels(?=[;,)])"), "model"),
+    (re.compile(r"\bphi_models\b"), "phi_model"),
 )
+#: What holds the stages of a step, and says which is meant: one stage is the step.
+_STAGES = re.compile(r"typedef struct \{ phi_model stage\[PHI_STAGES\]; \}| *phi_model \*this_stage = ")
 
 
 @dataclass
@@ -110,6 +116,8 @@ def one_stage(lines: Sequence[str]) -> list[str]:
             continue
         shift = 4 * len(ends)
         found = _OVER_STAGES.match(line)
+        if _STAGES.match(line):
+            continue
         if found is None:
             kept.append(line[shift:] if line.startswith(" " * shift) else line)
         elif found[2] in (None, "{"):

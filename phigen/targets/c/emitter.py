@@ -36,6 +36,9 @@ TERMS = 30
 #: at one point has no need.
 PASSES, PASSES_OF_CALLS = 2, 1
 
+#: Lines of a file that is read without a table of contents.
+FEW_SCREENS = 240
+
 Sizes = list[tuple[str, int, str]]
 
 
@@ -100,7 +103,8 @@ def _declared_lines(program: Program) -> list[str]:
 
 def _sealed(lines: Sequence[str], body: str) -> str:
     chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", body, re.MULTILINE)
-    contents = textwrap.wrap(f"Contents: {'; '.join(chapters)}", 100, subsequent_indent="  ") if chapters else []
+    long = chapters and body.count("\n") > FEW_SCREENS
+    contents = textwrap.wrap(f"Contents: {'; '.join(chapters)}", 100, subsequent_indent="  ") if long else []
     text = "\n".join(f" * {line}".rstrip() for line in [*lines, *contents])
     return f"/*\n{text}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
 

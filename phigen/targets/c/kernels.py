@@ -15,7 +15,7 @@ from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.symbols import TEMPORARY, WORK, Symbol, kind_of
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, Store, lower, parts, with_zeros_first
-from phigen.targets.header import plain
+from phigen.targets.header import plain, sentence
 from phigen.targets.language import Language
 from phigen.targets.names import Scope, identifiers
 from phigen.targets.printer import Printer
@@ -89,11 +89,12 @@ def function(
     own = f"{program.name}_{name or kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
     plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
     form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays))
-    purpose = f"{program.name}_{kernel.name} in {'one lane' if single else 'all lanes'}" if lanes else kernel.purpose
+    where = f" in {'one lane' if single else 'all lanes'}" if lanes else ""
+    called = f"{program.name}_{name or kernel.name}{where}"
     code = lower(kernel)
     code = code if lanes else _in_order(kernel, with_zeros_first(code))
     pieces = parts(code, LONGEST_FUNCTION)
-    said = [] if exported else _comment(purpose, "")  # the header says it
+    said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))  # the header says it
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if len(pieces) == 1:
         return "\n".join([*head, *_body(program, kernel, form, pieces[0]), "}"]) + "\n"
@@ -101,7 +102,7 @@ def function(
     texts = []
     for k, piece in enumerate(pieces, 1):
         part = replace(form, name=f"{own}_part{k}", workspace=workspace, exported=False, returning=False)
-        lines = [*_comment(f"{purpose} (part {k} of {len(pieces)})", ""), _signature(program, kernel, part) + "\n{"]
+        lines = [*_comment(f"{called}, part {k} of {len(pieces)}."), _signature(program, kernel, part) + "\n{"]
         texts.append("\n".join([*lines, *_body(program, kernel, part, piece), "}\n"]))
     arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
     head.append(f"    {form.number(program, 'work')} work[{workspace}];")
@@ -285,5 +286,5 @@ def members(program: Program) -> dict[str, str]:
     return identifiers((p.name for p in program.parameters), C_RESERVED)
 
 
-def _comment(text: str, indent: str) -> list[str]:
-    return comment(f"/* {plain(text)} */", indent)
+def _comment(text: str) -> list[str]:
+    return comment(f"/* {plain(text)} */")

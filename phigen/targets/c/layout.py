@@ -12,8 +12,8 @@ WIDTH = 110
 _BEHIND = re.compile(r"( *[^ /].*?[;,0-9A-Z]) +(/\*.*\*/)")
 _STRING = re.compile(r'"[^"]*"')
 
-#: What a level of parentheses costs a place to break at, in columns: outer places are preferred.
-_DEPTH = 18
+#: What a level of parentheses, and of brackets, costs a place to break at, in columns: outer places are preferred.
+_DEPTH, _INDEX = 18, 60
 
 #: The same for operators that bind: where one of them is broken at, what it holds together falls apart.
 _BOUND = dict.fromkeys("*/", 50) | dict.fromkeys("+-", 36) | dict.fromkeys(("<", ">", "<=", ">=", "==", "!="), 28)
@@ -110,10 +110,11 @@ def _code(line: str) -> Iterator[str]:
 
 def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
     """Where the line may be broken, each place behind its worth."""
-    depth, head = 0, re.match(r" *(for|if|while) \(", line)
+    depth, index, head = 0, 0, re.match(r" *(for|if|while) \(", line)
     line = _STRING.sub(lambda found: "'" * len(found[0]), line)
     for k, c in enumerate(line[: WIDTH + 1]):
-        depth += (c in "([{") - (c in ")]}")
+        depth += (c in "({") - (c in ")}")
+        index += (c == "[") - (c == "]")
         if c != " " or k <= least:
             continue
         after_loop = head is not None and depth == 0 and line[k - 1] == ")"
@@ -123,4 +124,4 @@ def _places(line: str, least: int) -> Iterator[tuple[int, int]]:
         assigned = line[k - 1] == "=" and line[k - 2] not in "<>=!"
         if line[k - 1] in ",;" or assigned or operator or after_loop or label:
             bound = _BOUND.get(operator[1], 0) if operator else 12 * assigned
-            yield k - _DEPTH * depth - bound + (WIDTH if after_loop else 0), k
+            yield k - _DEPTH * depth - _INDEX * index - bound + (WIDTH if after_loop else 0), k

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from phigen.spec.model import Parameter
 from phigen.symbolic.functions import FUNCTIONS, written_in
-from phigen.targets.header import plain
+from phigen.targets.header import plain, sentence
 from phigen.targets.language import Language
 from phigen.targets.reserved import JAVASCRIPT_RESERVED
 
@@ -41,10 +41,10 @@ def camel(name: str) -> str:
 
 def comment(text: str) -> list[str]:
     """A sentence before a function."""
-    said = f"{text[:1].upper()}{text[1:]}."
+    said = plain(sentence(text))
     if len(said) <= WIDTH - 8:
-        return [f"/** {plain(said)} */"]
-    return ["/**", *textwrap.wrap(plain(said), WIDTH, initial_indent=" * ", subsequent_indent=" * "), " */"]
+        return [f"/** {said} */"]
+    return ["/**", *textwrap.wrap(said, WIDTH, initial_indent=" * ", subsequent_indent=" * "), " */"]
 
 
 def properties(parameters: Sequence[Parameter]) -> list[str]:

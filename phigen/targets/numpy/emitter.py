@@ -29,7 +29,7 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
-from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
+from phigen.targets.header import CHECKSUM, checksum, header_lines, plain, sentence
 from phigen.targets.names import Scope
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.path import Syntax, statements, tangent_program
@@ -396,9 +396,8 @@ def _function(program: Program, kernel: Kernel) -> str:
 
 
 def _docstring(text: str) -> list[str]:
-    said = plain(text).replace(chr(34), chr(39))
-    quoted = f'"""{said[:1].upper()}{said[1:]}."""'
-    return textwrap.wrap(quoted, 104, initial_indent="    ", subsequent_indent="    ")
+    said = plain(sentence(text)).replace(chr(34), chr(39))
+    return textwrap.wrap(f'"""{said}"""', 104, initial_indent="    ", subsequent_indent="    ")
 
 
 def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:

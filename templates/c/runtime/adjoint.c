@@ -329,7 +329,7 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
 #endif
 {
     const size_t each = stride > 0 ? (steps + stride - 1) / stride * PHI_DIM : 0;
-    phi_status worst = PHI_OK;
+    phi_status result = PHI_OK;
     if (members > 0 && (x0 == NULL || h == NULL || rows_bar == NULL || x0_bar == NULL)) return PHI_BAD_ARGUMENT;
 #if PHI_TIMED
     if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
@@ -357,9 +357,9 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
         if (member == PHI_OK) member = phi_pullback(&s, h[m], steps, stride, made, bars, bar, own_bar, trail);
 #endif
         if (status != NULL) status[m] = (unsigned char)member;
-        if (worst == PHI_OK) worst = member;
+        if (result == PHI_OK) result = member;
     }
-    return worst;
+    return result;
 }
 #endif
 #endif

@@ -15,10 +15,7 @@ typedef struct {
     phi_lanes coef[PHI_STAGES][PHI_COEFFICIENTS], weight[PHI_STAGES][PHI_WINDOW][PHI_DIM];
 } phi_table;
 
-/* The stages of a step. */
-typedef struct {
-    phi_model stage[PHI_STAGES];
-} phi_models;
+typedef struct { phi_model stage[PHI_STAGES]; } phi_models; /* the stages of a step */
 
 /* phi_near for the guesses of all lanes, seen from one value. */
 static int phi_near_lanes(phi_lanes y[restrict PHI_DIM], const double last[PHI_DIM])
@@ -49,33 +46,33 @@ static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DI
 #if PHI_COMPOSED
     for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
         const int lane = k / PHI_STAGES, after = (k + 1) / PHI_STAGES % PHI_LANES;
-        phi_model *at = &models->stage[k % PHI_STAGES], *next = &models->stage[(k + 1) % PHI_STAGES];
+        phi_model *this_stage = &models->stage[k % PHI_STAGES], *next_stage = &models->stage[(k + 1) % PHI_STAGES];
 #else
+    phi_model *this_stage = &models->stage[0], *next_stage = &models->stage[0];
     for (int lane = 0; lane < PHI_LANES; ++lane) {
         const int after = (lane + 1) % PHI_LANES;
-        phi_model *at = &models->stage[0], *next = &models->stage[0];
 #endif
 #if PHI_SPARSE
-        phi_substitute_lane(at->factor, at->slope, residual, lane, delta, gained);
+        phi_substitute_lane(this_stage->factor, this_stage->slope, residual, lane, delta, gained);
         for (int i = 0; i < PHI_DIM; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            at->residual[i][lane] = residual[i];
-            residual[i] = (((next->y[i][after] - at->y[i][lane]) + turn) + residual[i]) + gained[i];
+            const double change = this_stage->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next_stage->displacement[i][after] - this_stage->displacement[i][lane]) - change;
+            this_stage->residual[i][lane] = residual[i];
+            residual[i] = (((next_stage->y[i][after] - this_stage->y[i][lane]) + turn) + residual[i]) + gained[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
             sum[i] = total;
         }
 #else
         double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
         for (int i = 0; i < PHI_DIM; ++i) {
-            at->residual[i][lane] = residual[i];
-            for (int j = 0; j < PHI_DIM; j += 2) even[i] += at->gain[i * PHI_DIM + j][lane] * residual[j];
-            for (int j = 1; j < PHI_DIM; j += 2) odd[i] += at->gain[i * PHI_DIM + j][lane] * residual[j];
+            this_stage->residual[i][lane] = residual[i];
+            for (int j = 0; j < PHI_DIM; j += 2) even[i] += this_stage->gain[i * PHI_DIM + j][lane] * residual[j];
+            for (int j = 1; j < PHI_DIM; j += 2) odd[i] += this_stage->gain[i * PHI_DIM + j][lane] * residual[j];
         }
         for (int i = 0; i < PHI_DIM; ++i) {
-            const double change = at->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next->displacement[i][after] - at->displacement[i][lane]) - change;
-            const double moved = (next->y[i][after] - at->y[i][lane]) + turn;
+            const double change = this_stage->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next_stage->displacement[i][after] - this_stage->displacement[i][lane]) - change;
+            const double moved = (next_stage->y[i][after] - this_stage->y[i][lane]) + turn;
             residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
             small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
             sum[i] = total;
@@ -89,7 +86,7 @@ static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DI
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
-static void phi_refresh_stage(const phi_solver *s, int stage, phi_table *table)
+static void phi_refresh(const phi_solver *s, int stage, phi_table *table)
 {
     if (table->fits[stage] == s->history[stage].fits) return;
     table->fits[stage] = s->history[stage].fits;
@@ -97,11 +94,6 @@ static void phi_refresh_stage(const phi_solver *s, int stage, phi_table *table)
         for (int lane = 0; lane < PHI_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
     memcpy(table->weight[stage], s->history[stage].weight,
         (size_t)s->history[stage].recurrence_terms * PHI_DIM * sizeof(phi_lanes));
-}
-
-static void phi_refresh(const phi_solver *s, phi_table *table)
-{
-    for (int stage = 0; stage < PHI_STAGES; ++stage) phi_refresh_stage(s, stage, table);
 }
 
 #if PHI_RENEWED
@@ -149,12 +141,12 @@ static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM]
     history->count += PHI_LANES;
 }
 
-/* A step of size h by the classical Runge-Kutta method, from the time t if there is one. x becomes its end, mean the
-   mean slope. */
 #if PHI_TIMED
-static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM], double mean[PHI_DIM])
+/* A step of size h by the classical Runge-Kutta method, from the time t. x becomes its end, mean the mean slope. */
+static void phi_runge_kutta(const phi_solver *s, double t, double h, double x[PHI_DIM], double mean[PHI_DIM])
 #else
-static void phi_stride(const phi_solver *s, double h, double x[PHI_DIM], double mean[PHI_DIM])
+/* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
+static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], double mean[PHI_DIM])
 #endif
 {
     static const double reach[4] = { 0.5, 0.5, 1.0, 0.0 }, weight[4] = { 1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0 };
@@ -190,7 +182,7 @@ enum {
 
 /* Guesses where no recurrence is known. The beginnings of all steps are those of Runge-Kutta steps, made one after the
    other; from there on each lane makes the stages of its own step, by iteration. */
-static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
+static void phi_guess_by_runge_kutta(const phi_solver *s, phi_table *table, phi_models *models)
 {
     double x[PHI_DIM], mean[PHI_DIM];
     phi_lanes begin[PHI_DIM];
@@ -199,24 +191,24 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
         for (int i = 0; i < PHI_DIM; ++i) begin[i][lane] = x[i];
         for (int part = 0; part < PHI_STRIDES && lane < PHI_LANES - 1; ++part)
 #if PHI_TIMED
-            phi_stride(s, s->t + (lane + (double)part / PHI_STRIDES) * s->h, s->h / PHI_STRIDES, x, mean);
+            phi_runge_kutta(s, s->t + (lane + (double)part / PHI_STRIDES) * s->h, s->h / PHI_STRIDES, x, mean);
 #else
-            phi_stride(s, s->h / PHI_STRIDES, x, mean);
+            phi_runge_kutta(s, s->h / PHI_STRIDES, x, mean);
 #endif
     }
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        phi_model *at = &models->stage[stage];
-        memcpy(at->y, begin, sizeof begin);
+        phi_model *this_stage = &models->stage[stage];
+        memcpy(this_stage->y, begin, sizeof begin);
         for (int meeting = 0; meeting < PHI_MEETINGS; ++meeting) {
-            phi_evaluate_lanes(table->coef[stage], at->y, at->displacement, at->increment);
+            phi_evaluate_lanes(table->coef[stage], this_stage->y, this_stage->displacement, this_stage->increment);
             for (int i = 0; i < PHI_DIM; ++i) {
                 PHI_EACH_LANE
-                for (int lane = 0; lane < PHI_LANES; ++lane) at->y[i][lane] = begin[i][lane] - at->displacement[i][lane];
+                for (int lane = 0; lane < PHI_LANES; ++lane) this_stage->y[i][lane] = begin[i][lane] - this_stage->displacement[i][lane];
             }
         }
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane) begin[i][lane] += at->increment[i][lane];
+            for (int lane = 0; lane < PHI_LANES; ++lane) begin[i][lane] += this_stage->increment[i][lane];
         }
     }
 }
@@ -235,7 +227,7 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
+static void phi_guess_by_runge_kutta(const phi_solver *s, phi_table *table, phi_models *models)
 {
     double x[PHI_DIM], mean[PHI_DIM];
 #if PHI_TIMED
@@ -246,20 +238,20 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
     for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
         const int lane = k / PHI_STAGES;
         const double h = phi_fractions[k % PHI_STAGES] * s->h;
-        phi_model *at = &models->stage[k % PHI_STAGES];
+        phi_model *this_stage = &models->stage[k % PHI_STAGES];
 #else
+    phi_model *this_stage = &models->stage[0];
     const double h = s->h;
-    phi_model *at = &models->stage[0];
     for (int lane = 0; lane < PHI_LANES; ++lane) {
 #endif
-        for (int i = 0; i < PHI_DIM; ++i) at->y[i][lane] = x[i];
+        for (int i = 0; i < PHI_DIM; ++i) this_stage->y[i][lane] = x[i];
 #if PHI_TIMED
-        phi_stride(s, begin, h, x, mean);
+        phi_runge_kutta(s, begin, h, x, mean);
         begin += h;
 #else
-        phi_stride(s, h, x, mean);
+        phi_runge_kutta(s, h, x, mean);
 #endif
-        for (int i = 0; i < PHI_DIM; ++i) at->y[i][lane] += 0.5 * h * mean[i];
+        for (int i = 0; i < PHI_DIM; ++i) this_stage->y[i][lane] += 0.5 * h * mean[i];
     }
     for (int stage = 0; stage < PHI_STAGES; ++stage) phi_from_means(table->coef[stage], &models->stage[stage]);
 }
@@ -268,20 +260,18 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_models *models)
 /* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not near the state. */
 static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
 {
-    if (!s->blocks.use_recurrences) phi_march(s, table, models);
+#if PHI_COMPOSED
+    if (!s->blocks.use_recurrences) phi_guess_by_runge_kutta(s, table, models);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], models->stage[stage].y);
         if (!phi_near_lanes(models->stage[stage].y, s->x)) return 0;
     }
     return 1;
-}
-
-/* One pass over the points of a stage: correct them by the residuals. The largest correction. */
-static double phi_correct_stage(phi_model *model)
-{
-    phi_lanes sizes;
-    phi_correct(model, sizes);
-    return phi_largest(sizes);
+#else
+    if (s->blocks.use_recurrences) phi_foresee(&s->history[0], table->weight[0], models->stage[0].y);
+    else phi_guess_by_runge_kutta(s, table, models);
+    return phi_near_lanes(models->stage[0].y, s->x);
+#endif
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order. After the
@@ -358,20 +348,26 @@ static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_models models;
+    phi_lanes sizes;
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!phi_guess(s, table, &models)) return 0;
     while (!solved) {
-        double size = 0.0;
         const int matrices = previous > PHI_FROZEN;
         for (int stage = 0; stage < PHI_STAGES; ++stage) phi_update(table->coef[stage], &models.stage[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         phi_chain(&models, x, carry);
+#if PHI_COMPOSED
+        double size = 0.0;
         for (int stage = 0; stage < PHI_STAGES; ++stage) {
-            const double largest = phi_correct_stage(&models.stage[stage]);
-            size = largest > size ? largest : size;
+            phi_correct(&models.stage[stage], sizes);
+            size = fmax(size, phi_largest(sizes));
         }
+#else
+        phi_correct(&models.stage[0], sizes);
+        const double size = phi_largest(sizes);
+#endif
         s->evaluations += PHI_STAGES * PHI_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = phi_remaining(size, bend, bound);
@@ -408,8 +404,10 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 
 enum {
     PHI_REPAY_BLOCKS = 4 * PHI_REPAY, /* steps that fits for whole blocks are saved in */
-    PHI_MOST_SINGLE_STEPS = 1000      /* before blocks are tried again */
+    PHI_MOST_SINGLE_STEPS = 1000,     /* before blocks are tried again */
+    PHI_TOO_MANY = 5 * PHI_LANES      /* of these: recurrences are to blame */
 };
+#define PHI_LATEST 0.125 /* the weight of the latest step in the mean of evaluations */
 
 /* Recurrences are given up for a while, the longer the more often that happens. */
 static void phi_give_up(phi_solver *s)
@@ -437,9 +435,13 @@ static void phi_choose_guess(phi_solver *s, size_t steps)
         }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < PHI_REPAY_BLOCKS && s->steps < PHI_REPAY) return;
+#if PHI_COMPOSED
     s->blocks.use_recurrences = 1;
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fitted(&s->history[stage]);
+#else
+    s->blocks.use_recurrences = phi_fitted(&s->history[0]);
+#endif
     s->blocks.single_steps = PHI_LANES;
     if (!s->blocks.use_recurrences) phi_give_up(s);
 }
@@ -457,7 +459,7 @@ static void phi_learn_from(phi_solver *s, int passes)
     }
     if (!s->blocks.use_recurrences) {
         s->blocks.passes_without_recurrences = passes > 0 ? passes : INT_MAX;
-    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > 5 * PHI_LANES) {
+    } else if (passes > s->blocks.passes_without_recurrences || s->blocks.last_single_steps > PHI_TOO_MANY) {
         phi_give_up(s);
     }
 }
@@ -476,7 +478,7 @@ static phi_status phi_single(phi_solver *s)
 #else
     const double evaluations = (double)(s->evaluations - before);
 #endif
-    s->blocks.evaluations_per_stage += 0.125 * (evaluations - s->blocks.evaluations_per_stage);
+    s->blocks.evaluations_per_stage += PHI_LATEST * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }
 
@@ -490,7 +492,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     while (status == PHI_OK && steps > 0) {
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
-            phi_refresh(s, &table);
+            for (int stage = 0; stage < PHI_STAGES; ++stage) phi_refresh(s, stage, &table);
 #if PHI_RENEWED
             phi_renew_lanes(s, &table);
 #endif

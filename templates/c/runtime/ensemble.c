@@ -23,7 +23,7 @@
 /* All members. The first status that is not OK. */
 static phi_status phi_run(const phi_members *all)
 {
-    phi_status worst = PHI_OK;
+    phi_status result = PHI_OK;
     size_t earliest = all->members;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic)
@@ -36,26 +36,26 @@ static phi_status phi_run(const phi_members *all)
 #endif
         if (first < earliest) {
             earliest = first;
-            worst = group;
+            result = group;
         }
     }
-    return worst;
+    return result;
 }
 
 #elif PHI_EACH
 /* All members. The first status that is not OK. */
 static phi_status phi_run(const phi_members *all)
 {
-    phi_status worst = PHI_OK;
+    phi_status result = PHI_OK;
     for (size_t m = 0; m < all->members; ++m) {
         phi_solver s;
         double x[PHI_DIM];
         const phi_status begun = phi_take_member(all, m, x, &s);
         const phi_status status = phi_end_member(all, m, 0, &s, begun);
         phi_put_member(all, m, begun == PHI_OK ? s.x : x, status);
-        if (worst == PHI_OK) worst = status;
+        if (result == PHI_OK) result = status;
     }
-    return worst;
+    return result;
 }
 
 #endif
@@ -74,8 +74,8 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 #if PHI_TIMED
     all.t0 = &t0;
 #endif
-    const phi_status worst = phi_run(&all);
-    return isfinite(h) ? worst : PHI_BAD_ARGUMENT;
+    const phi_status result = phi_run(&all);
+    return isfinite(h) ? result : PHI_BAD_ARGUMENT;
 }
 
 #else
@@ -93,7 +93,7 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
     unsigned char *status)
 #endif
 {
-    phi_status worst = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
+    phi_status result = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
 #if PHI_NOISE
     size_t earliest = members;
 #endif
@@ -107,30 +107,30 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
         phi_solver s;
         for (size_t i = 0; i < PHI_DIM; ++i) s.x[i] = x[i * members + m];
 #if PHI_TIMED
-        phi_status member = phi_init_at(&s, params, s.x, t0);
+        phi_status ended = phi_init_at(&s, params, s.x, t0);
 #else
-        phi_status member = phi_init(&s, params, s.x);
+        phi_status ended = phi_init(&s, params, s.x);
 #endif
 #if PHI_NOISE
-        if (member == PHI_OK) phi_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
+        if (ended == PHI_OK) phi_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
 #endif
-        if (member == PHI_OK) member = phi_integrate(&s, h, steps);
+        if (ended == PHI_OK) ended = phi_integrate(&s, h, steps);
         for (size_t i = 0; i < PHI_DIM; ++i) x[i * members + m] = s.x[i];
-        if (status != NULL) status[m] = (unsigned char)member;
+        if (status != NULL) status[m] = (unsigned char)ended;
 #if PHI_NOISE
-        if (member == PHI_OK) continue;
+        if (ended == PHI_OK) continue;
 #ifdef _OPENMP
 #pragma omp critical
 #endif
         if (m < earliest) {
             earliest = m;
-            worst = member;
+            result = ended;
         }
 #else
-        if (worst == PHI_OK) worst = member;
+        if (result == PHI_OK) result = ended;
 #endif
     }
-    return worst;
+    return result;
 }
 #endif
 #if PHI_NOISE && PHI_TIMED

@@ -274,20 +274,20 @@ static int phi_group_step(phi_group *group, size_t remaining)
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
     phi_model model;
     const int next = (group->latest > 0 ? group->latest : PHI_REMEMBERED) - 1;
-    int most = 0;
+    int slow = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         const int iterations = phi_group_solve(group, stage, &model);
         phi_group_advance(group->x, group->carry, &model);
-        if (iterations > most) most = iterations;
+        slow = slow || iterations > 1;
         if ((iterations > 1 && next % PHI_HISTORY == 0) || group->count < PHI_HISTORY)
             phi_group_judge(group, stage, model.y);
         memcpy(group->past[stage][next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < PHI_REMEMBERED) ++group->count;
-    group->slow_steps = most > 1 ? group->slow_steps + 1 : 0;
+    group->slow_steps = slow ? group->slow_steps + 1 : 0;
     if (group->slow_steps > group->slow_steps_allowed && group->count == PHI_REMEMBERED && remaining >= PHI_GROUP_REPAY)
         phi_group_fit(group);
     return phi_group_leave(group, x, carry, remaining);
@@ -347,20 +347,20 @@ static phi_status phi_group_end(const phi_group *group, int lane, const phi_memb
 static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;
-    phi_status worst = PHI_OK, member[PHI_LANES];
+    phi_status result = PHI_OK, begun[PHI_LANES];
     const int count = all->members - first < PHI_LANES ? (int)(all->members - first) : PHI_LANES;
     size_t left = all->steps;
     memset(&group, 0, sizeof group);
-    for (int lane = 0; lane < count; ++lane) member[lane] = phi_group_join(&group, lane, all, first + (size_t)lane);
+    for (int lane = 0; lane < count; ++lane) begun[lane] = phi_group_join(&group, lane, all, first + (size_t)lane);
     for (int active = count; left > 0 && active >= PHI_FEWEST;) {
         active = phi_group_step(&group, left--);
         if (all->frames != NULL) phi_group_frame(&group, all, first, all->steps - left);
     }
     for (int lane = 0; lane < count; ++lane) {
         if (group.active[lane]) group.steps_left[lane] = left;
-        const phi_status status = phi_group_end(&group, lane, all, first + (size_t)lane, member[lane]);
-        if (worst == PHI_OK) worst = status;
+        const phi_status status = phi_group_end(&group, lane, all, first + (size_t)lane, begun[lane]);
+        if (result == PHI_OK) result = status;
     }
-    return worst;
+    return result;
 }
 #endif

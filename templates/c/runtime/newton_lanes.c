@@ -52,7 +52,7 @@ static void phi_sizes(phi_lanes y[restrict PHI_DIM], phi_lanes delta[restrict PH
 #include "largest.c"
 
 #if PHI_SPARSE
-/* Correct y by the residuals, with the factors in the table, and measure the corrections; also find what they take from
+/* Correct y by the residuals, with the factors of its matrix, and measure the corrections; also find what they take from
    the increments. */
 static void phi_correct(phi_model *model, phi_lanes size)
 {
@@ -64,7 +64,7 @@ static void phi_correct(phi_model *model, phi_lanes size)
 }
 
 #else
-/* Correct y by the residuals, with the inverse in the table, and measure the corrections. */
+/* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void phi_correct(phi_model *model, phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];
@@ -93,8 +93,8 @@ static double phi_remaining(double size, double bend, double bound)
 #include "path_lanes.c"
 #else
 #if PHI_SPARSE
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
+/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
     phi_lanes matrix[PHI_DIM * PHI_DIM], bad = { 0.0 };
     phi_linearise_lanes(coef, model->y, model->displacement, model->increment, matrix, model->slope);
@@ -108,8 +108,8 @@ static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
 }
 
 #elif PHI_INVERSE_UNROLLED
-/* Everything about a stage at the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
-static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
+/* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is infinite. */
+static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
     phi_lanes jacobian[PHI_DIM * PHI_DIM], reciprocal[PHI_DIM];
     phi_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
@@ -151,8 +151,8 @@ static void phi_invert(phi_lanes matrix[restrict PHI_DIM * PHI_DIM])
     }
 }
 
-/* Everything about a stage at the points y. */
-static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
+/* Linearise a stage around the points y. */
+static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
     phi_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
     phi_invert(model->inverse);
@@ -169,11 +169,11 @@ static void phi_tabulate(phi_lanes coef[restrict], phi_model *model)
 }
 
 #endif
-/* The table of a stage, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
 {
     if (matrices)
-        phi_tabulate(coef, model);
+        phi_linearise_stage(coef, model);
     else
         phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }

@@ -3,10 +3,10 @@
 #include <math.h>
 #include <string.h>
 
-#include "lanes.c"
 #include "members.c"
 #include "model.h"
 #include "solver.c"
+#include "lanes.c"
 
 /* ---- Packs of members ---- */
 enum {
@@ -224,12 +224,12 @@ static phi_status phi_group_end(const phi_group *group, int m, const phi_members
 PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
 {
     phi_group group;
-    phi_status worst = PHI_OK, member[PHI_GROUP];
+    phi_status result = PHI_OK, begun[PHI_GROUP];
     const int count = all->members - first < PHI_GROUP ? (int)(all->members - first) : PHI_GROUP;
     memset(&group, 0, sizeof group);
     group.packs = (count + PHI_LANES - 1) / PHI_LANES;
     phi_group_share(&group, all->own);
-    for (int m = 0; m < count; ++m) member[m] = phi_group_join(&group, m, all, first);
+    for (int m = 0; m < count; ++m) begun[m] = phi_group_join(&group, m, all, first);
     int active = count > 1; /* one alone is quicker without lanes */
     for (size_t done = 0; done < all->steps && active > 0;) {
         const size_t next = phi_to_frame(all, done);
@@ -239,9 +239,9 @@ PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
         if (all->frames != NULL) phi_group_frame(&group, all, first, done);
     }
     for (int m = 0; m < count; ++m) {
-        const phi_status status = phi_group_end(&group, m, all, first, member[m]);
-        if (worst == PHI_OK) worst = status;
+        const phi_status status = phi_group_end(&group, m, all, first, begun[m]);
+        if (result == PHI_OK) result = status;
     }
-    return worst;
+    return result;
 }
 #endif

@@ -71,7 +71,7 @@ static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_
     }
 }
 
-/* The table of a stage, with its matrices or with those of the last pass. */
+/* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
 {
     phi_expansion e;

@@ -21,8 +21,6 @@
 #endif
 #if PHI_BLOCKS
 #include <limits.h>
-
-#include "lanes.c"
 #endif
 
 #if PHI_NOISE
@@ -49,7 +47,8 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #else
     if (s == NULL || x0 == NULL) return PHI_BAD_ARGUMENT;
 #endif
-    phi_solver fresh = { .h = (double)NAN, .params = params != NULL ? *params : phi_default_params };
+    if (params == NULL) params = &phi_default_params;
+    phi_solver fresh = { .h = (double)NAN, .params = *params };
     memcpy(fresh.x, x0, sizeof fresh.x);
 #if PHI_TIMED
     fresh.t = t0;
@@ -118,7 +117,7 @@ static phi_status phi_set_step(phi_solver *s, double h)
 #endif
 #if PHI_BLOCKS
     memset(&s->blocks, 0, sizeof s->blocks);
-    s->blocks.single_steps = 2 * PHI_LANES;
+    s->blocks.single_steps = 2 * PHI_AHEAD;
     s->blocks.passes_without_recurrences = INT_MAX;
 #endif
     s->h = h;
