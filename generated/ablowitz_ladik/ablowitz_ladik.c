@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9d888122731d1549dfd0df699e760632c90d670faa2623ce5e192967f1255b06
+ * body-sha256: 67362d4633f60c9afc552bdd1471293749fee13b4394297e54e212c4a998a420
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -541,7 +541,7 @@ void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)
 {
     ablowitz_ladik_fill(s, ablowitz_ladik_energy_row, out);
 }
-/* there are none */
+
 void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out) { (void)s, (void)out; }
 void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out)
 {

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0458a3c4cceb991489287de66e2f56f9a15e226914fbcc86fc79222458582650
+ * body-sha256: 851d75a5e3a668b9c844df28f703ddaba5a89b609078ad4246fee7de1186f351
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -966,10 +966,12 @@ void chiral_magnet_density(const chiral_magnet_solver *s, double *out)
 {
     chiral_magnet_fill(s, chiral_magnet_energy_row, out);
 }
+
 void chiral_magnet_casimirs(const chiral_magnet_solver *s, double *out)
 {
     chiral_magnet_fill(s, chiral_magnet_casimirs_row, out);
 }
+
 void chiral_magnet_vector_field(const chiral_magnet_solver *s, double *out)
 {
     chiral_magnet_fill(s, chiral_magnet_vector_field_row, out);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 79489c0963a9d823fc6ef8813fb4272d71c0fd055e91b5e74b62033af87c42c7
+ * body-sha256: c094d1dbe13581e553a0292de5ca75d1a7b92fc653c819cadba8efc69ac507c1
  */
 #include "dnls.h"
 #include <float.h>
@@ -506,7 +506,7 @@ static void dnls_fill(const dnls_solver *s, dnls_kernel *kernel, double *out)
 }
 
 void dnls_density(const dnls_solver *s, double *out) { dnls_fill(s, dnls_energy_row, out); }
-void dnls_casimirs(const dnls_solver *s, double *out) { (void)s, (void)out; } /* there are none */
+void dnls_casimirs(const dnls_solver *s, double *out) { (void)s, (void)out; }
 void dnls_vector_field(const dnls_solver *s, double *out) { dnls_fill(s, dnls_vector_field_row, out); }
 
 const char *dnls_status_string(dnls_status status)

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8f5cc49800dedc361a395e2e28412e9de51958929ef742e13baecbaa0dbc192b
+ * body-sha256: cd24a0f3522b9aee521ecf8014ad05054dfe350a5506e58b7da14c68a64e22d8
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -564,7 +564,7 @@ void dnls_disorder_density(const dnls_disorder_solver *s, double *out)
 {
     dnls_disorder_fill(s, dnls_disorder_energy_row, out);
 }
-/* there are none */
+
 void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out) { (void)s, (void)out; }
 void dnls_disorder_vector_field(const dnls_disorder_solver *s, double *out)
 {

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 650d4f316be775c140fc0b9da4f55e411331a8b1ae1bfc0b0240378aa2945940
+ * body-sha256: 609bd37fc1447187d323f29aad8653adf22db998c9d9d485e7b95cfef0f6ecb9
  */
 #include "food_web.h"
 #include <float.h>
@@ -687,7 +687,7 @@ static void food_web_fill(const food_web_solver *s, food_web_kernel *kernel, dou
 }
 
 void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }
-void food_web_casimirs(const food_web_solver *s, double *out) { (void)s, (void)out; } /* there are none */
+void food_web_casimirs(const food_web_solver *s, double *out) { (void)s, (void)out; }
 void food_web_vector_field(const food_web_solver *s, double *out)
 {
     food_web_fill(s, food_web_vector_field_row, out);

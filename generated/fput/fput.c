@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 8b1d11decad03d6f013492501e70cda881f08ba1247f9c05051045d69035e93c
+ * body-sha256: ff1d351c7266f2b6daa7bfa44c48c4d6ae5982f0e748e2ea19e36fcdb860aa94
  */
 #include "fput.h"
 #include <float.h>
@@ -614,7 +614,7 @@ static void fput_fill(const fput_solver *s, fput_kernel *kernel, double *out)
 }
 
 void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }
-void fput_casimirs(const fput_solver *s, double *out) { (void)s, (void)out; } /* there are none */
+void fput_casimirs(const fput_solver *s, double *out) { (void)s, (void)out; }
 void fput_vector_field(const fput_solver *s, double *out) { fput_fill(s, fput_vector_field_row, out); }
 
 /* ---- Steps by hand ---- */

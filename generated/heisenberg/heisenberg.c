@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: a8806d8ddc0de8684c6cb885492030578bc14b642df93c5156467fe5a89f68f9
+ * body-sha256: 09fd414a7152f79ca6a2997e5655893ac35a218b8062918b82b5cfcbcc9001a0
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -969,10 +969,12 @@ void heisenberg_density(const heisenberg_solver *s, double *out)
 {
     heisenberg_fill(s, heisenberg_energy_row, out);
 }
+
 void heisenberg_casimirs(const heisenberg_solver *s, double *out)
 {
     heisenberg_fill(s, heisenberg_casimirs_row, out);
 }
+
 void heisenberg_vector_field(const heisenberg_solver *s, double *out)
 {
     heisenberg_fill(s, heisenberg_vector_field_row, out);

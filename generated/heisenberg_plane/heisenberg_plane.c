@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 23fa4237405be01dfc3e2652e8155b2fa99b3777ca6317eab232be898e6510cc
+ * body-sha256: 8bc3cd718e17ffe84cee7cadc4bb41a6d57882a71b8678fce1bc06fcc9adca38
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -645,10 +645,12 @@ void heisenberg_plane_density(const heisenberg_plane_solver *s, double *out)
 {
     heisenberg_plane_fill(s, heisenberg_plane_energy_row, out);
 }
+
 void heisenberg_plane_casimirs(const heisenberg_plane_solver *s, double *out)
 {
     heisenberg_plane_fill(s, heisenberg_plane_casimirs_row, out);
 }
+
 void heisenberg_plane_vector_field(const heisenberg_plane_solver *s, double *out)
 {
     heisenberg_plane_fill(s, heisenberg_plane_vector_field_row, out);

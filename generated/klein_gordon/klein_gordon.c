@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 061fde9303e204b25aab6e701caedecfc6b12af10b2039a019b5d77628bc934a
+ * body-sha256: c383cc8de4ffad8973d05d33b47c5deb96eb3c73262adec22c65c06867288621
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -473,7 +473,7 @@ void klein_gordon_density(const klein_gordon_solver *s, double *out)
 {
     klein_gordon_fill(s, klein_gordon_energy_row, out);
 }
-/* there are none */
+
 void klein_gordon_casimirs(const klein_gordon_solver *s, double *out) { (void)s, (void)out; }
 void klein_gordon_vector_field(const klein_gordon_solver *s, double *out)
 {

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 435314c7e38c2511acc6933f420edc52c8c4f8e1e2cade6f38bae0abecbba0a3
+ * body-sha256: 76301da3218f75ae3251697a77fada2eed1c4445dfe7967be35e36eb8aed8665
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -495,10 +495,12 @@ void nonlinear_wave_density(const nonlinear_wave_solver *s, double *out)
 {
     nonlinear_wave_fill(s, nonlinear_wave_energy_row, out);
 }
+
 void nonlinear_wave_casimirs(const nonlinear_wave_solver *s, double *out)
 {
     nonlinear_wave_fill(s, nonlinear_wave_casimirs_row, out);
 }
+
 void nonlinear_wave_vector_field(const nonlinear_wave_solver *s, double *out)
 {
     nonlinear_wave_fill(s, nonlinear_wave_vector_field_row, out);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: abb41e0971baa4fdc473e99331bc057d9994ed8707db738a60218f4260f50ee0
+ * body-sha256: 4ae41b429bdea8949ce96d6a4b73feaeb1ba7b05568d00c74d1e6875237e3456
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -580,7 +580,7 @@ void outer_planets_density(const outer_planets_solver *s, double *out)
 {
     outer_planets_fill(s, outer_planets_energy_row, out);
 }
-/* there are none */
+
 void outer_planets_casimirs(const outer_planets_solver *s, double *out) { (void)s, (void)out; }
 void outer_planets_vector_field(const outer_planets_solver *s, double *out)
 {

@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: fa1275d35714c3594dbfe9073452db7f9a7f7fbcf629944de69c3541d7b94594
+ * body-sha256: a6646ad19f89538ccbec8ea90215536a74117a3b9ec2b6020bc2292069d5d38b
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -1045,7 +1045,7 @@ void point_vortices_density(const point_vortices_solver *s, double *out)
 {
     point_vortices_fill(s, point_vortices_energy_row, out);
 }
-/* there are none */
+
 void point_vortices_casimirs(const point_vortices_solver *s, double *out) { (void)s, (void)out; }
 void point_vortices_vector_field(const point_vortices_solver *s, double *out)
 {

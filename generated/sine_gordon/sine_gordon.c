@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 93b6e996725f64948df51be4fa83405908aa74f4be19ee0755e85d3e0b69fb3b
+ * body-sha256: 7ba610a704a4154e6ebdb88e975b14eef58ae1c18143f623bd022eba59afc222
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -506,7 +506,7 @@ void sine_gordon_density(const sine_gordon_solver *s, double *out)
 {
     sine_gordon_fill(s, sine_gordon_energy_row, out);
 }
-/* there are none */
+
 void sine_gordon_casimirs(const sine_gordon_solver *s, double *out) { (void)s, (void)out; }
 void sine_gordon_vector_field(const sine_gordon_solver *s, double *out)
 {

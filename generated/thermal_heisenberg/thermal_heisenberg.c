@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The stages;
  *   Krylov spaces; Newton's method where sweeps fail; What is seen at sites
- * body-sha256: b068207ddc5a601cffe24ca7c8d201930434c698df45ab510f9b701b0eadf411
+ * body-sha256: 515533467885344c6843adca58f03f55ff325f2aa984c17d12ed1eb76f846649
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -1259,10 +1259,12 @@ void thermal_heisenberg_density(const thermal_heisenberg_solver *s, double *out)
 {
     thermal_heisenberg_fill(s, thermal_heisenberg_energy_row, out);
 }
+
 void thermal_heisenberg_casimirs(const thermal_heisenberg_solver *s, double *out)
 {
     thermal_heisenberg_fill(s, thermal_heisenberg_casimirs_row, out);
 }
+
 void thermal_heisenberg_vector_field(const thermal_heisenberg_solver *s, double *out)
 {
     thermal_heisenberg_fill(s, thermal_heisenberg_vector_field_row, out);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b3cea3e472a96862058c41f80e88e70909ff4e4d02cf13fe60282903e3310b6c
+ * body-sha256: 3cd97ebc01c73e4ecb5f7b77b0e2c2fb450e0bb5d7dc0b7fe214e4743fc5d31f
  */
 #include "volterra.h"
 #include <float.h>
@@ -511,6 +511,7 @@ void volterra_casimirs(const volterra_solver *s, double *out)
 {
     volterra_fill(s, volterra_casimirs_row, out);
 }
+
 void volterra_vector_field(const volterra_solver *s, double *out)
 {
     volterra_fill(s, volterra_vector_field_row, out);

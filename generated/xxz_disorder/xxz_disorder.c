@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 26d2abe8b6a5e75e05603ac7660227fd38cb6b69455809499fa04ab25830ca4b
+ * body-sha256: c904ebc1ede422a55cc9a63d4db0a22cb34c326405c5fe38632e7d40b9f21788
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -569,10 +569,12 @@ void xxz_disorder_density(const xxz_disorder_solver *s, double *out)
 {
     xxz_disorder_fill(s, xxz_disorder_energy_row, out);
 }
+
 void xxz_disorder_casimirs(const xxz_disorder_solver *s, double *out)
 {
     xxz_disorder_fill(s, xxz_disorder_casimirs_row, out);
 }
+
 void xxz_disorder_vector_field(const xxz_disorder_solver *s, double *out)
 {
     xxz_disorder_fill(s, xxz_disorder_vector_field_row, out);

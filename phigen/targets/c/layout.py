@@ -53,7 +53,10 @@ def _lines(lines: list[str]) -> Iterator[str]:
         elif block[-1].endswith("*/") and block[0].lstrip().startswith("/*"):
             yield from comment(" ".join(line.strip() for line in block), _indent(block[0]))
         else:
-            yield from _code(" ".join([block[0], *(line.strip() for line in block[1:])]))
+            whole = " ".join([block[0], *(line.strip() for line in block[1:])])
+            yield from _code(whole)
+            if _FUNCTION.fullmatch(whole) and k < len(lines) and lines[k]:
+                yield ""
 
 
 def _statement(lines: list[str], first: int) -> int:

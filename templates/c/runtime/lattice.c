@@ -578,7 +578,7 @@ void phi_density(const phi_solver *s, double *out) { phi_fill(s, phi_energy_row,
 #if PHI_CASIMIRS
 void phi_casimirs(const phi_solver *s, double *out) { phi_fill(s, phi_casimirs_row, out); }
 #else
-void phi_casimirs(const phi_solver *s, double *out) { (void)s, (void)out; } /* there are none */
+void phi_casimirs(const phi_solver *s, double *out) { (void)s, (void)out; }
 #endif
 void phi_vector_field(const phi_solver *s, double *out) { phi_fill(s, phi_vector_field_row, out); }
 
