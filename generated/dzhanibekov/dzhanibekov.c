@@ -12,8 +12,8 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
- *   step, by Newton's method; The solver
- * body-sha256: 072aba3d2faaeb59b0cc6ddeb0e2cfea7d18430496b1a01da948e197c19cd5de
+ *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
+ * body-sha256: 6f0edb7b44295813e2d98fb96248923bd41131ef49c6b325a033a8a958d16be1
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -543,11 +543,15 @@ dzhanibekov_status dzhanibekov_set_attitude(dzhanibekov_solver *s,
     for (int i = 0; i < dzhanibekov_ATTITUDE_SIZE; ++i) size = fabs(first[i]) > size ? fabs(first[i]) : size;
     if (!(size > 0.0)) return dzhanibekov_BAD_ARGUMENT;
     double square = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        first[i] /= size;
-        square += first[i] * first[i];
+    for (int i = 0; i < 4; ++i) square += first[i] * first[i];
+    if (!(fabs(square - 1.0) <= 4.0 * DBL_EPSILON)) { /* else it has been divided by its length before */
+        square = 0.0;
+        for (int i = 0; i < 4; ++i) {
+            first[i] /= size;
+            square += first[i] * first[i];
+        }
+        for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
     }
-    for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
     dzhanibekov_begin_attitude(s, first);
     return dzhanibekov_OK;
 }
@@ -739,6 +743,150 @@ const char *dzhanibekov_status_string(dzhanibekov_status status)
 
 size_t dzhanibekov_solver_size(void) { return sizeof(dzhanibekov_solver); }
 size_t dzhanibekov_solver_steps_done(const dzhanibekov_solver *s) { return s->steps; }
+
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const dzhanibekov_params *params; /* NULL for the defaults */
+    const double *h;
+    const double *gauge;   /* NULL to choose it */
+    double *attitude;      /* as x is given; NULL where nobody asks for it */
+    double *attitudes;     /* NULL for none */
+    size_t stride;         /* 0 where there are no frames */
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} dzhanibekov_members;
+
+/* Start a member at a state, with what is its own. */
+static dzhanibekov_status dzhanibekov_begin_member(const dzhanibekov_members *all, size_t m,
+    const double x[dzhanibekov_DIM], const double *gauge, dzhanibekov_solver *s)
+{
+    const dzhanibekov_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const dzhanibekov_status status = dzhanibekov_init_gauge(s, params, x, gauge);
+    return status == dzhanibekov_OK ? dzhanibekov_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* The same at the state that the ensemble has for it, which is x then. */
+static dzhanibekov_status dzhanibekov_take_member(const dzhanibekov_members *all, size_t m,
+    double x[dzhanibekov_DIM], dzhanibekov_solver *s)
+{
+    for (size_t i = 0; i < dzhanibekov_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return dzhanibekov_begin_member(all, m, x, all->gauge != NULL ? all->gauge + m * dzhanibekov_GAUGES
+        : NULL, s);
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t dzhanibekov_to_frame(const dzhanibekov_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void dzhanibekov_put_frame(const dzhanibekov_members *all, size_t m, size_t done, const double *x)
+{
+    for (size_t i = 0; i < dzhanibekov_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * dzhanibekov_DIM + i) * all->members + m] = x != NULL ? x[i]
+            : (double)NAN;
+}
+
+/* The same for its attitude. */
+static void dzhanibekov_put_attitude(const dzhanibekov_members *all, size_t m, size_t done,
+    const dzhanibekov_solver *s)
+{
+    double element[dzhanibekov_ELEMENT];
+    if (all->attitudes == NULL || done % all->stride != 0) return;
+    if (s != NULL) dzhanibekov_attitude(s, element);
+    for (size_t i = 0; i < dzhanibekov_ELEMENT; ++i)
+        all->attitudes[((done / all->stride - 1) * dzhanibekov_ELEMENT + i) * all->members + m] = s != NULL
+            ? element[i] : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static dzhanibekov_status dzhanibekov_end_member(const dzhanibekov_members *all, size_t m, size_t done,
+    dzhanibekov_solver *s, dzhanibekov_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = dzhanibekov_to_frame(all, done);
+        if (status == dzhanibekov_OK) status = dzhanibekov_integrate(s, s->h, steps);
+        done += steps;
+        dzhanibekov_put_frame(all, m, done, status == dzhanibekov_OK ? s->x : NULL);
+        dzhanibekov_put_attitude(all, m, done, status == dzhanibekov_OK ? s : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void dzhanibekov_put_member(const dzhanibekov_members *all, size_t m, const double x[dzhanibekov_DIM],
+    dzhanibekov_status status)
+{
+    for (size_t i = 0; i < dzhanibekov_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
+/* ---- Members with attitudes ---- */
+/* Start a member with the attitude and the random numbers that the ensemble has for it. */
+static dzhanibekov_status dzhanibekov_take_turned(const dzhanibekov_members *all, size_t m,
+    double x[dzhanibekov_DIM], dzhanibekov_solver *s)
+{
+    double element[dzhanibekov_ELEMENT];
+    dzhanibekov_status status = dzhanibekov_take_member(all, m, x, s);
+    for (size_t i = 0; i < dzhanibekov_ELEMENT; ++i) element[i] = all->attitude[i * all->members + m];
+    if (status == dzhanibekov_OK) status = dzhanibekov_set_attitude(s, element);
+    return status;
+}
+
+/* One member, from its start to its end. */
+static dzhanibekov_status dzhanibekov_turn_member(const dzhanibekov_members *all, size_t m)
+{
+    dzhanibekov_solver s;
+    double x[dzhanibekov_DIM], element[dzhanibekov_ELEMENT];
+    const dzhanibekov_status begun = dzhanibekov_take_turned(all, m, x, &s);
+    const dzhanibekov_status status = dzhanibekov_end_member(all, m, 0, &s, begun);
+    dzhanibekov_put_member(all, m, begun == dzhanibekov_OK ? s.x : x, status);
+    if (begun != dzhanibekov_OK) return status;
+    dzhanibekov_attitude(&s, element);
+    for (size_t i = 0; i < dzhanibekov_ELEMENT; ++i) all->attitude[i * all->members + m] = element[i];
+    return status;
+}
+
+/* The arguments are in the order of dzhanibekov_ensemble_each and dzhanibekov_ensemble_of. */
+dzhanibekov_status dzhanibekov_ensemble_attitudes(const dzhanibekov_params *params, double *x,
+    double *attitude, size_t members, const double *gauge, const double *h, size_t steps, size_t stride,
+    double *frames, double *attitudes, unsigned char *status)
+{
+    dzhanibekov_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1,
+        .params = params };
+    dzhanibekov_status worst = dzhanibekov_OK;
+    size_t earliest = members;
+    if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return dzhanibekov_BAD_ARGUMENT;
+    if ((frames != NULL || attitudes != NULL) && stride == 0) return dzhanibekov_BAD_ARGUMENT;
+    all.gauge = gauge;
+    all.h = h;
+    all.stride = frames != NULL || attitudes != NULL ? stride : 0;
+    all.frames = frames;
+    all.attitudes = attitudes;
+    all.status = status;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic, 16)
+#endif
+    for (size_t m = 0; m < members; ++m) {
+        const dzhanibekov_status member = dzhanibekov_turn_member(&all, m);
+        if (member == dzhanibekov_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (m < earliest) {
+            earliest = m;
+            worst = member;
+        }
+    }
+    return worst;
+}
 
 dzhanibekov_status dzhanibekov_ensemble(const dzhanibekov_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)

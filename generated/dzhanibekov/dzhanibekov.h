@@ -2,7 +2,7 @@
  * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 20e457a99e0e6325d8c8193119b909d8a096db3ddf716fe7877101d389ad4e84
+ * body-sha256: e959053a23361a4c986c7abbfc2a62a4bf6c2c9366783fd8d581d291bd9cf0fd
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -94,6 +94,16 @@ dzhanibekov_status dzhanibekov_kick(dzhanibekov_solver *s, const double change[d
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 dzhanibekov_status dzhanibekov_ensemble(const dzhanibekov_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
+
+/* Many members with attitudes, in place, each by itself as dzhanibekov_integrate makes it; with OpenMP,
+   members in parallel: x[i * members + m] is coordinate i of member m, attitude[i * members + m] number i of
+   its attitude in the order of dzhanibekov_attitude, at its start, then at its end. What differs from member
+   to member is given as for a single one, params may be NULL for the defaults. frames and attitudes (or NULL)
+   receive what x and attitude are after every stride-th step, those after (k + 1) * stride steps as row k,
+   NaN where a member failed before. Arrays must not overlap. */
+dzhanibekov_status dzhanibekov_ensemble_attitudes(const dzhanibekov_params *params, double *x,
+    double *attitude, size_t members, const double *gauge, const double *h, size_t steps, size_t stride,
+    double *frames, double *attitudes, unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double dzhanibekov_hamiltonian(const dzhanibekov_params *params, const double x[dzhanibekov_DIM]);

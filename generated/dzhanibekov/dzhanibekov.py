@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 0a25e6093378bd87b19aa6e4c22d7a80803d9163fea1435612284db4ed8e3d59
+# body-sha256: 95652fdaf24ed83e40e472f695ca9e5e751a0c7f7df49486effdacae3d2752b5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -781,10 +781,10 @@ def _first(attitude0):
     q = _numbers(attitude0)
     if q.shape[-1:] != (4,) or not np.isfinite(q).all():
         raise ValueError("attitude0 must be finite quaternions (..., 4)")
-    return _unit(q.reshape(-1, 4))
+    return _normalised(q.reshape(-1, 4))
 
 
-def _unit(q):
+def _normalised(q):
     """Quaternions divided by their lengths."""
     largest = np.abs(q).max(axis=-1, keepdims=True)
     if not (largest > 0.0).all():

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 5a7ad9b1168f6c2a10274f9e2a94a9ea3ec22bd25d1bf648d3b9337af91b93c9
+ * body-sha256: 46f25d989c84fcb044eb72750fcdfff271cf02d2099ae6b3b427fc74e064a49a
  */
 #include "kdv.h"
 #include <float.h>
@@ -510,8 +510,9 @@ static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
     {
         kdv_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = kdv_share(units, &first);
-        if (coef != NULL) kdv_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+        const int measured = coef != NULL;
+        if (measured) kdv_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; !measured && unit < end; ++unit) {
             const kdv_piece at = kdv_piece_of(s, unit);
             kdv_measure(s->y[now], s->y[1 - now], &at, &own);
         }
@@ -559,7 +560,7 @@ static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *no
 }
 
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void kdv_predict(const kdv_solver *s)
+static void kdv_predict(const kdv_solver *s, double *const *x)
 {
     kdv_PARALLEL
     {
@@ -568,7 +569,7 @@ static void kdv_predict(const kdv_solver *s)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
                     end = first + s->length + 2 * kdv_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
                 for (int d = 0; d < s->guess.order; ++d) {
                     const double *difference = s->guess.difference[d][k];
                     for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
@@ -579,7 +580,7 @@ static void kdv_predict(const kdv_solver *s)
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
    order. */
-static void kdv_remember(kdv_solver *s, int now)
+static void kdv_remember(kdv_solver *s, double *const *from, int now)
 {
     kdv_guess *guess = &s->guess;
     double size[kdv_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
@@ -591,7 +592,7 @@ static void kdv_remember(kdv_solver *s, int now)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
                     end = first + s->length + 2 * kdv_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
+                const double *restrict y = s->y[now][k], *restrict x = from[k];
                 for (ptrdiff_t i = first; i < end; ++i) {
                     double next = y[i] - x[i];
                     for (int d = 0; d < guess->count; ++d) {
@@ -744,21 +745,28 @@ static int kdv_factorise(kdv_solver *s, const double *coef, int now)
     return kdv_decompose(m.d, border, border, -1, border, m.pivots + inner);
 }
 
+/* Solve the equation of the matrix, in place. */
+static void kdv_solve(const kdv_matrix *m)
+{
+    const ptrdiff_t inner = m->inner, border = m->border;
+    double *lower = m->side + inner;
+    kdv_substitute(m->a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m->pivots, m->side);
+    for (ptrdiff_t k = 0; k < inner; ++k)
+        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m->c[k * border + i] * m->side[k];
+    kdv_substitute(m->d, border, border, -1, border, m->pivots + inner, lower);
+    for (ptrdiff_t j = 0; j < border; ++j)
+        for (ptrdiff_t i = 0; i < inner; ++i) m->side[i] -= m->b[j * inner + i] * lower[j];
+}
+
 /* s->y[now] with the correction by a sweep to the other, in place of what the sweep has made. */
 static void kdv_eliminate(kdv_solver *s, int now)
 {
     kdv_matrix m;
     kdv_matrix_of(s->sites, s->matrix, &m);
-    const ptrdiff_t sites = s->length, inner = m.inner, border = m.border;
-    double *lower = m.side + inner;
+    const ptrdiff_t sites = s->length;
     for (ptrdiff_t i = 0; i < sites; ++i)
         for (int k = 0; k < kdv_DIM; ++k) m.side[i * kdv_DIM + k] = s->y[1 - now][k][i] - s->y[now][k][i];
-    kdv_substitute(m.a, inner, kdv_TALL, 2 * kdv_BAND, kdv_BAND, m.pivots, m.side);
-    for (ptrdiff_t k = 0; k < inner; ++k)
-        for (ptrdiff_t i = 0; i < border; ++i) lower[i] -= m.c[k * border + i] * m.side[k];
-    kdv_substitute(m.d, border, border, -1, border, m.pivots + inner, lower);
-    for (ptrdiff_t j = 0; j < border; ++j)
-        for (ptrdiff_t i = 0; i < inner; ++i) m.side[i] -= m.b[j * inner + i] * lower[j];
+    kdv_solve(&m);
     for (int k = 0; k < kdv_DIM; ++k) {
         for (ptrdiff_t i = 0; i < sites; ++i) s->y[1 - now][k][i] = s->y[now][k][i] + m.side[i * kdv_DIM + k];
         kdv_ends(s->y[1 - now][k], sites, 0, sites);
@@ -824,17 +832,17 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     const size_t units = kdv_units(s);
     const double *coef = s->coef;
     int now = 0;
-    kdv_predict(s);
+    kdv_predict(s, s->x);
     kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, &now);
     if (status != kdv_OK && (far || status != kdv_NOT_FINITE)) {
         s->stiff = 1;
         now = 0;
         const double range = kdv_range(s, coef);
-        kdv_predict(s);
+        kdv_predict(s, s->x);
         status = kdv_newton(s, coef, range, &now);
     }
     if (status != kdv_OK) return status;
-    kdv_remember(s, now);
+    kdv_remember(s, s->x, now);
     kdv_PARALLEL
     {
         size_t first, end = kdv_share(units, &first);

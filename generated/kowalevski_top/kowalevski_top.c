@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
  *   Ensembles
- * body-sha256: 17500411498493de0102af15f86a0f5b8cd786ffd51fefe436e2877fafdeaa9d
+ * body-sha256: 745de8c061d3745252db4f2e455d10cf31d0db4768101a1f7336825890c6c683
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -3070,7 +3070,7 @@ typedef struct {
     size_t members, steps, own;
     const kowalevski_top_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } kowalevski_top_members;
@@ -3096,7 +3096,7 @@ static kowalevski_top_status kowalevski_top_take_member(const kowalevski_top_mem
 static size_t kowalevski_top_to_frame(const kowalevski_top_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -3535,7 +3535,7 @@ kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return kowalevski_top_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return kowalevski_top_BAD_ARGUMENT;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return kowalevski_top_run(&all);

@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
  *   Ensembles
- * body-sha256: 73cce72c4ce489726f9042088b8b9c5ba647e10862b64745ed97121af188a4ec
+ * body-sha256: abba261456f848c006d942ee257168e8bb2963f827c0361d087b27370b6ecf81
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -1185,7 +1185,7 @@ typedef struct {
     size_t members, steps, own;
     const lotka_volterra_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } lotka_volterra_members;
@@ -1211,7 +1211,7 @@ static lotka_volterra_status lotka_volterra_take_member(const lotka_volterra_mem
 static size_t lotka_volterra_to_frame(const lotka_volterra_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -1650,7 +1650,7 @@ lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return lotka_volterra_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return lotka_volterra_BAD_ARGUMENT;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return lotka_volterra_run(&all);

@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; Blocks of steps;
  *   Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 564add0e54f5e90b8bb468bf7b2a604e343dd1447f1045e47ab348e74fc5ac37
+ * body-sha256: 24d82067f331de7f0a64a273284cf497537f693ea9aeb07134a85689210ed552
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1932,7 +1932,7 @@ typedef struct {
     size_t members, steps, own;
     const nambu_pendulum_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } nambu_pendulum_members;
@@ -1958,7 +1958,7 @@ static nambu_pendulum_status nambu_pendulum_take_member(const nambu_pendulum_mem
 static size_t nambu_pendulum_to_frame(const nambu_pendulum_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -2397,7 +2397,7 @@ nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return nambu_pendulum_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return nambu_pendulum_BAD_ARGUMENT;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return nambu_pendulum_run(&all);

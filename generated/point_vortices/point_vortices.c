@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: a6646ad19f89538ccbec8ea90215536a74117a3b9ec2b6020bc2292069d5d38b
+ * body-sha256: 1740b51b1e9930092bf36a4fcfe2539bbe5f5a3e4aa24059f193d0deb0b5b327
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -600,8 +600,9 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     {
         point_vortices_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = point_vortices_share(units, &first);
-        if (coef != NULL) point_vortices_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+        const int measured = coef != NULL;
+        if (measured) point_vortices_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; !measured && unit < end; ++unit) {
             const point_vortices_piece at = point_vortices_piece_of(s, unit);
             point_vortices_measure(s->y[now], s->y[1 - now], &at, &own);
         }
@@ -651,7 +652,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
 }
 
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void point_vortices_predict(const point_vortices_solver *s, int stage)
+static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
     point_vortices_PARALLEL
     {
@@ -660,7 +661,7 @@ static void point_vortices_predict(const point_vortices_solver *s, int stage)
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
                     end = first + s->length + 2 * point_vortices_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = s->x[k][i];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
                 for (int d = 0; d < s->guess[stage].order; ++d) {
                     const double *difference = s->guess[stage].difference[d][k];
                     for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
@@ -671,7 +672,7 @@ static void point_vortices_predict(const point_vortices_solver *s, int stage)
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
    order. */
-static void point_vortices_remember(point_vortices_solver *s, int stage, int now)
+static void point_vortices_remember(point_vortices_solver *s, double *const *from, int stage, int now)
 {
     point_vortices_guess *guess = &s->guess[stage];
     double size[point_vortices_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
@@ -683,7 +684,7 @@ static void point_vortices_remember(point_vortices_solver *s, int stage, int now
             for (size_t r = row; r < rows; ++r) {
                 const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
                     end = first + s->length + 2 * point_vortices_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = s->x[k];
+                const double *restrict y = s->y[now][k], *restrict x = from[k];
                 for (ptrdiff_t i = first; i < end; ++i) {
                     double next = y[i] - x[i];
                     for (int d = 0; d < guess->count; ++d) {
@@ -785,7 +786,7 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     }
 }
 
-/* to = a - b; with coefficients b is first made what a sweep does to a. */
+/* to = a - b; with coefficients b is first made what a sweep does to a, or its transpose. */
 static void point_vortices_subtract(point_vortices_solver *s, const double *coef, int now, double *const *a,
     double *const *b, double *const *to)
 {
@@ -918,18 +919,18 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
     for (int stage = 0; stage < point_vortices_STAGES; ++stage) {
         const double *coef = s->coef + stage * point_vortices_ROW;
         int now = 0;
-        point_vortices_predict(s, stage);
+        point_vortices_predict(s, s->x, stage);
         point_vortices_status status = s->stiff ? point_vortices_NO_CONVERGENCE : point_vortices_middle(s,
             coef, far, &now);
         if (status != point_vortices_OK && (far || status != point_vortices_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             const double range = point_vortices_range(s, coef);
-            point_vortices_predict(s, stage);
+            point_vortices_predict(s, s->x, stage);
             status = point_vortices_newton(s, coef, range, &now);
         }
         if (status != point_vortices_OK) return status;
-        point_vortices_remember(s, stage, now);
+        point_vortices_remember(s, s->x, stage, now);
         point_vortices_PARALLEL
         {
             size_t first, end = point_vortices_share(units, &first);

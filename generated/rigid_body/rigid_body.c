@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes;
  *   Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 7aeac0ad1628f4014295a663c48e5d8d34ec568e2bc37269b28eabd8ed509409
+ * body-sha256: 3fa75687a62bb27a43732833226dd2650bf87628957df26fb7f6944f749c7b1a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1562,8 +1562,8 @@ typedef struct {
     size_t members, steps, own;
     const rigid_body_params *params; /* NULL for the defaults */
     const double *h;
-    const double *gauge; /* NULL to choose it */
-    size_t stride;
+    const double *gauge;   /* NULL to choose it */
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } rigid_body_members;
@@ -1590,7 +1590,7 @@ static rigid_body_status rigid_body_take_member(const rigid_body_members *all, s
 static size_t rigid_body_to_frame(const rigid_body_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -2021,7 +2021,7 @@ rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, doub
     if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
     all.gauge = gauge;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return rigid_body_run(&all);

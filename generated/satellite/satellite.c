@@ -12,8 +12,8 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
- *   step, by Newton's method; The solver
- * body-sha256: 132fc12544020f74e746e342256c1ec8d925e77cc6d2b858d33cad6e4acc0305
+ *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
+ * body-sha256: 21b0272ceb06c32963d9ca26b34c9fa38f6a49b5cd5781951a902d63f603f527
  */
 #include "satellite.h"
 #include <float.h>
@@ -1092,11 +1092,15 @@ satellite_status satellite_set_attitude(satellite_solver *s, const double attitu
     for (int i = 0; i < satellite_ATTITUDE_SIZE; ++i) size = fabs(first[i]) > size ? fabs(first[i]) : size;
     if (!(size > 0.0)) return satellite_BAD_ARGUMENT;
     double square = 0.0;
-    for (int i = 0; i < 4; ++i) {
-        first[i] /= size;
-        square += first[i] * first[i];
+    for (int i = 0; i < 4; ++i) square += first[i] * first[i];
+    if (!(fabs(square - 1.0) <= 4.0 * DBL_EPSILON)) { /* else it has been divided by its length before */
+        square = 0.0;
+        for (int i = 0; i < 4; ++i) {
+            first[i] /= size;
+            square += first[i] * first[i];
+        }
+        for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
     }
-    for (int i = 0; i < 4; ++i) first[i] /= sqrt(square);
     satellite_begin_attitude(s, first);
     return satellite_OK;
 }
@@ -1276,6 +1280,147 @@ const char *satellite_status_string(satellite_status status)
 
 size_t satellite_solver_size(void) { return sizeof(satellite_solver); }
 size_t satellite_solver_steps_done(const satellite_solver *s) { return s->steps; }
+
+/* ---- Members of an ensemble ---- */
+/* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m];
+   where it is 0, all have the first. */
+typedef struct {
+    double *x;
+    size_t members, steps, own;
+    const satellite_params *params; /* NULL for the defaults */
+    const double *h;
+    double *attitude;      /* as x is given; NULL where nobody asks for it */
+    double *attitudes;     /* NULL for none */
+    size_t stride;         /* 0 where there are no frames */
+    double *frames;        /* NULL for none */
+    unsigned char *status; /* NULL for none */
+} satellite_members;
+
+/* Start a member at a state, with what is its own. */
+static satellite_status satellite_begin_member(const satellite_members *all, size_t m,
+    const double x[satellite_DIM], satellite_solver *s)
+{
+    const satellite_params *params = all->params != NULL ? all->params + m * all->own : NULL;
+    const satellite_status status = satellite_init(s, params, x);
+    return status == satellite_OK ? satellite_set_step(s, all->h[m * all->own]) : status;
+}
+
+/* The same at the state that the ensemble has for it, which is x then. */
+static satellite_status satellite_take_member(const satellite_members *all, size_t m, double x[satellite_DIM],
+    satellite_solver *s)
+{
+    for (size_t i = 0; i < satellite_DIM; ++i) x[i] = all->x[i * all->members + m];
+    return satellite_begin_member(all, m, x, s);
+}
+
+/* How many steps there are to the next frame, or to the end. */
+static size_t satellite_to_frame(const satellite_members *all, size_t done)
+{
+    const size_t left = all->steps - done;
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
+        : left;
+}
+
+/* The frame of a member after so many steps, if there is one: x, or what is no number for NULL. */
+static void satellite_put_frame(const satellite_members *all, size_t m, size_t done, const double *x)
+{
+    for (size_t i = 0; i < satellite_DIM && all->frames != NULL && done % all->stride == 0; ++i)
+        all->frames[((done / all->stride - 1) * satellite_DIM + i) * all->members + m] = x != NULL ? x[i]
+            : (double)NAN;
+}
+
+/* The same for its attitude. */
+static void satellite_put_attitude(const satellite_members *all, size_t m, size_t done,
+    const satellite_solver *s)
+{
+    double element[satellite_ELEMENT];
+    if (all->attitudes == NULL || done % all->stride != 0) return;
+    if (s != NULL) satellite_attitude(s, element);
+    for (size_t i = 0; i < satellite_ELEMENT; ++i)
+        all->attitudes[((done / all->stride - 1) * satellite_ELEMENT + i) * all->members + m] = s != NULL
+            ? element[i] : (double)NAN;
+}
+
+/* The steps of a member after so many, by itself. */
+static satellite_status satellite_end_member(const satellite_members *all, size_t m, size_t done,
+    satellite_solver *s, satellite_status status)
+{
+    while (done < all->steps) {
+        const size_t steps = satellite_to_frame(all, done);
+        if (status == satellite_OK) status = satellite_integrate(s, s->h, steps);
+        done += steps;
+        satellite_put_frame(all, m, done, status == satellite_OK ? s->x : NULL);
+        satellite_put_attitude(all, m, done, status == satellite_OK ? s : NULL);
+    }
+    return status;
+}
+
+/* Where a member ends. */
+static void satellite_put_member(const satellite_members *all, size_t m, const double x[satellite_DIM],
+    satellite_status status)
+{
+    for (size_t i = 0; i < satellite_DIM; ++i) all->x[i * all->members + m] = x[i];
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+}
+
+/* ---- Members with attitudes ---- */
+/* Start a member with the attitude and the random numbers that the ensemble has for it. */
+static satellite_status satellite_take_turned(const satellite_members *all, size_t m, double x[satellite_DIM],
+    satellite_solver *s)
+{
+    double element[satellite_ELEMENT];
+    satellite_status status = satellite_take_member(all, m, x, s);
+    for (size_t i = 0; i < satellite_ELEMENT; ++i) element[i] = all->attitude[i * all->members + m];
+    if (status == satellite_OK) status = satellite_set_attitude(s, element);
+    return status;
+}
+
+/* One member, from its start to its end. */
+static satellite_status satellite_turn_member(const satellite_members *all, size_t m)
+{
+    satellite_solver s;
+    double x[satellite_DIM], element[satellite_ELEMENT];
+    const satellite_status begun = satellite_take_turned(all, m, x, &s);
+    const satellite_status status = satellite_end_member(all, m, 0, &s, begun);
+    satellite_put_member(all, m, begun == satellite_OK ? s.x : x, status);
+    if (begun != satellite_OK) return status;
+    satellite_attitude(&s, element);
+    for (size_t i = 0; i < satellite_ELEMENT; ++i) all->attitude[i * all->members + m] = element[i];
+    return status;
+}
+
+/* The arguments are in the order of satellite_ensemble_each and satellite_ensemble_of. */
+satellite_status satellite_ensemble_attitudes(const satellite_params *params, double *x, double *attitude,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
+    unsigned char *status)
+{
+    satellite_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1,
+        .params = params };
+    satellite_status worst = satellite_OK;
+    size_t earliest = members;
+    if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return satellite_BAD_ARGUMENT;
+    if ((frames != NULL || attitudes != NULL) && stride == 0) return satellite_BAD_ARGUMENT;
+    all.h = h;
+    all.stride = frames != NULL || attitudes != NULL ? stride : 0;
+    all.frames = frames;
+    all.attitudes = attitudes;
+    all.status = status;
+#ifdef _OPENMP
+#pragma omp parallel for schedule(dynamic, 16)
+#endif
+    for (size_t m = 0; m < members; ++m) {
+        const satellite_status member = satellite_turn_member(&all, m);
+        if (member == satellite_OK) continue;
+#ifdef _OPENMP
+#pragma omp critical
+#endif
+        if (m < earliest) {
+            earliest = m;
+            worst = member;
+        }
+    }
+    return worst;
+}
 
 satellite_status satellite_ensemble(const satellite_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status)

@@ -2,7 +2,7 @@
  * satellite.h: the declarations; satellite.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 530a72e7b12358a67c46dfc2f6fe501bf37113ddf4b13bab314e725345a471c5
+ * body-sha256: d299968337240a620d672c2fd8885ffded63d434484362cd051fd33afdcbf4df
  */
 #ifndef SATELLITE_H
 #define SATELLITE_H
@@ -85,6 +85,16 @@ satellite_status satellite_kick(satellite_solver *s, const double change[satelli
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 satellite_status satellite_ensemble(const satellite_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
+
+/* Many members with attitudes, in place, each by itself as satellite_integrate makes it; with OpenMP, members
+   in parallel: x[i * members + m] is coordinate i of member m, attitude[i * members + m] number i of its
+   attitude in the order of satellite_attitude, at its start, then at its end. What differs from member to
+   member is given as for a single one, params may be NULL for the defaults. frames and attitudes (or NULL)
+   receive what x and attitude are after every stride-th step, those after (k + 1) * stride steps as row k,
+   NaN where a member failed before. Arrays must not overlap. */
+satellite_status satellite_ensemble_attitudes(const satellite_params *params, double *x, double *attitude,
+    size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
+    unsigned char *status);
 
 /* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
 double satellite_hamiltonian(const satellite_params *params, const double x[satellite_DIM]);

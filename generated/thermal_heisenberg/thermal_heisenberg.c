@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The stages;
  *   Krylov spaces; Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 515533467885344c6843adca58f03f55ff325f2aa984c17d12ed1eb76f846649
+ * body-sha256: 5ff8c08258a4098250cf3ead502950a4f65cb07a6e21c2a4e04bc7ad3b957605
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -892,8 +892,9 @@ static double thermal_heisenberg_relaxed(thermal_heisenberg_solver *s, const dou
     {
         thermal_heisenberg_extent own = { { 0.0 }, { 0.0 } };
         size_t first, end = thermal_heisenberg_share(units, &first);
-        if (coef != NULL) thermal_heisenberg_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; coef == NULL && unit < end; ++unit) {
+        const int measured = coef != NULL;
+        if (measured) thermal_heisenberg_relax_rows(s, coef, far, now, &own, first, end);
+        for (size_t unit = first; !measured && unit < end; ++unit) {
             const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
             thermal_heisenberg_measure(s->y[now], s->y[1 - now], &at, &own);
         }
@@ -945,7 +946,7 @@ static thermal_heisenberg_status thermal_heisenberg_middle(thermal_heisenberg_so
     return thermal_heisenberg_NO_CONVERGENCE;
 }
 
-#define thermal_heisenberg_predict(s) thermal_heisenberg_copy((s)->y[0], (s)->x, s)
+#define thermal_heisenberg_predict(s, x) thermal_heisenberg_copy((s)->y[0], x, s)
 #define thermal_heisenberg_forget(s) ((s)->stiff = 0)
 
 /* ---- Krylov spaces ---- */
@@ -1018,7 +1019,7 @@ static void thermal_heisenberg_combine(const thermal_heisenberg_solver *s, doubl
     }
 }
 
-/* to = a - b; with coefficients b is first made what a sweep does to a. */
+/* to = a - b; with coefficients b is first made what a sweep does to a, or its transpose. */
 static void thermal_heisenberg_subtract(thermal_heisenberg_solver *s, const double *coef, int now,
     double *const *a, double *const *b, double *const *to)
 {
@@ -1156,14 +1157,14 @@ static thermal_heisenberg_status thermal_heisenberg_stages(thermal_heisenberg_so
     }
     const double *coef = s->coef;
     int now = 0;
-    thermal_heisenberg_predict(s);
+    thermal_heisenberg_predict(s, s->x);
     thermal_heisenberg_status status = s->stiff ? thermal_heisenberg_NO_CONVERGENCE
         : thermal_heisenberg_middle(s, coef, far, &now);
     if (status != thermal_heisenberg_OK && (far || status != thermal_heisenberg_NOT_FINITE)) {
         s->stiff = 1;
         now = 0;
         const double range = thermal_heisenberg_range(s, coef);
-        thermal_heisenberg_predict(s);
+        thermal_heisenberg_predict(s, s->x);
         status = thermal_heisenberg_newton(s, coef, range, &now);
     }
     if (status != thermal_heisenberg_OK) return status;

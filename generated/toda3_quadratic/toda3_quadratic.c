@@ -12,7 +12,7 @@
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Members of an
  *   ensemble; Ensembles
- * body-sha256: 7c78e442229a9bb84d3d62c6e5f005a28fd2690d83e030626b406ec0d9b466a0
+ * body-sha256: 32671cdf299415b12aaeb8809d328fde32c14e545e32a65df0a4c7644c482ffb
  */
 #include "toda3_quadratic.h"
 #include <float.h>
@@ -833,7 +833,7 @@ typedef struct {
     size_t members, steps, own;
     const toda3_quadratic_params *params; /* NULL for the defaults */
     const double *h;
-    size_t stride;
+    size_t stride;         /* 0 where there are no frames */
     double *frames;        /* NULL for none */
     unsigned char *status; /* NULL for none */
 } toda3_quadratic_members;
@@ -859,7 +859,7 @@ static toda3_quadratic_status toda3_quadratic_take_member(const toda3_quadratic_
 static size_t toda3_quadratic_to_frame(const toda3_quadratic_members *all, size_t done)
 {
     const size_t left = all->steps - done;
-    return all->frames != NULL && all->stride - done % all->stride < left ? all->stride - done % all->stride
+    return all->stride > 0 && all->stride - done % all->stride < left ? all->stride - done % all->stride
         : left;
 }
 
@@ -927,7 +927,7 @@ toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_param
         .h = h };
     if (members > 0 && (x == NULL || h == NULL)) return toda3_quadratic_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return toda3_quadratic_BAD_ARGUMENT;
-    all.stride = stride;
+    all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
     all.status = status;
     return toda3_quadratic_run(&all);

@@ -311,12 +311,12 @@ def over_rows(
     They have the numbers 1, 2, …, or those of ``labels``.
     """
     last = [bounds(w)[-1] for w in layout.weights]
+    low, one_row = max([0, *(-low for low, _ in last)]), len(layout.step.sites.axes) == 1
     values = {
         "NAME": program.name,
-        "low": max([0, *(-low for low, _ in last)]),
+        "low": low if one_row else f"at.row.whole ? {low} : s->length",
         "high": max([0, *(high for _, high in last)]),
-        "one_row": len(layout.step.sites.axes) == 1,
-        "skipping": switches(program, layout.step, layout)["BY_HAND"] and len(layout.step.sites.axes) == 1,
+        "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
     }
     body = [line for case in cases if not isinstance(case, str) for line in case.orders]
     body = [*dict.fromkeys(body), *_over_pieces(program, values, cases, labels or range(1, 1 + len(cases)))]
