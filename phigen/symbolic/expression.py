@@ -33,12 +33,11 @@ from fractions import Fraction
 from functools import lru_cache, reduce
 from hashlib import blake2b
 from typing import Any, TypeVar
-from weakref import WeakValueDictionary
+from weakref import ref
 
 from phigen import progress
 from phigen.symbolic.functions import FUNCTIONS
 
-_NODES: WeakValueDictionary[tuple[Any, ...], Expression] = WeakValueDictionary()
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
 #: So many nodes take a tenth of a second or more to walk over.
@@ -51,13 +50,13 @@ T = TypeVar("T")
 class Expression:
     """A node; make one with the functions of this module or with operators, never directly."""
 
-    __slots__ = ("__weakref__", "args", "depth", "digest", "op", "value")
+    __slots__ = ("__weakref__", "_digest", "args", "depth", "op", "value")
 
     op: str
     args: tuple[Expression, ...]
     value: Any
     depth: int
-    digest: bytes
+    _digest: bytes  # empty until it is asked for, which few are
 
     def __add__(self, other: Expression | Number) -> Expression:
         return add(self, as_expression(other))
@@ -92,12 +91,27 @@ class Expression:
     @property
     def is_zero(self) -> bool:
         """Whether this is the literal number 0 (not: whether it simplifies to 0)."""
-        return self.op == "number" and self.value == 0
+        return self is ZERO
 
     @property
     def is_number(self) -> bool:
         """Whether this is a literal rational number."""
         return self.op == "number"
+
+    @property
+    def digest(self) -> bytes:
+        """A hash of the content, equal in every process: the order of commuting factors rests on it."""
+        stack = [] if self._digest else [self]
+        while stack:
+            node = stack[-1]
+            left = [a for a in node.args if not a._digest]
+            if left:
+                stack += left
+            else:
+                head = f"{node.op}|{node.value}".encode()
+                node._digest = blake2b(b"|".join([head, *(a._digest for a in node.args)]), digest_size=10).digest()
+                stack.pop()
+        return self._digest
 
     def __str__(self) -> str:
         return text(self)
@@ -109,20 +123,36 @@ class Expression:
         return _node, (self.op, self.args, self.value)
 
 
+class _Reference(ref[Expression]):
+    """A node in the table of nodes, which it leaves when it dies."""
+
+    __slots__ = ("key",)
+
+    key: tuple[Any, ...]
+
+
+_NODES: dict[tuple[Any, ...], _Reference] = {}
+
+
+def _forget(dead: _Reference, nodes: dict[tuple[Any, ...], _Reference] = _NODES) -> None:
+    if nodes.get(dead.key) is dead:
+        del nodes[dead.key]
+
+
 def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expression:
     # Plain integers: the keys of dying nodes are compared at interpreter exit, when Fraction no longer can be.
-    plain = (value.numerator, value.denominator) if isinstance(value, Fraction) else value
-    key = (op, plain, *map(id, args))
+    key = (op, (value.numerator, value.denominator) if type(value) is Fraction else value, args)
     found = _NODES.get(key)
-    if found is not None:
-        return found
-    node = Expression.__new__(Expression)
-    node.op, node.args, node.value = op, args, value
-    node.depth = 1 + max((a.depth for a in args), default=0)
-    # A hash of the content, equal in every process: the order of commuting factors rests on it.
-    head = f"{op}|{value}".encode()
-    node.digest = blake2b(b"|".join([head, *(a.digest for a in args)]), digest_size=10).digest()
-    _NODES[key] = node
+    node = found() if found else None
+    if node is None:
+        node = Expression.__new__(Expression)
+        node.op, node.args, node.value, node._digest = op, args, value, b""
+        depth = 0
+        for a in args:
+            depth = max(a.depth, depth)
+        node.depth = 1 + depth
+        reference = _NODES[key] = _Reference(node, _forget)
+        reference.key = key
     return node
 
 
@@ -132,9 +162,17 @@ def natural_key(name: str) -> tuple[tuple[int, int | str], ...]:
     return tuple((0, int(t)) if t.isdigit() else (1, t) for t in re.findall(r"\d+|\D+", name))
 
 
-def _commuting_key(e: Expression) -> tuple[Any, ...]:
+def _ordered(a: Expression, b: Expression) -> tuple[Expression, Expression]:
+    """The two in the order in which terms and factors stand, the same in every process."""
+    first, second = _place(a), _place(b)
+    if first == second:
+        first, second = a.digest, b.digest
+    return (b, a) if second < first else (a, b)
+
+
+def _place(e: Expression) -> Any:
     name = natural_key(e.value) if e.op == "symbol" else ()
-    return (_RANK.get(e.op, 3), name, e.depth, e.digest)
+    return _RANK.get(e.op, 3), name, e.depth
 
 
 def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
@@ -144,7 +182,7 @@ def raw(op: str, args: tuple[Expression, ...], value: Any = None) -> Expression:
 
 def number(value: Number) -> Expression:
     """A literal rational number."""
-    return _node("number", (), Fraction(value))
+    return _node("number", (), value if type(value) is Fraction else Fraction(value))
 
 
 def symbol(name: str) -> Expression:
@@ -181,9 +219,7 @@ def add(a: Expression, b: Expression) -> Expression:
         return sub(a, neg(b))
     if _has_minus(a):
         return sub(b, neg(a))
-    if _commuting_key(b) < _commuting_key(a):
-        a, b = b, a
-    return _node("add", (a, b))
+    return _node("add", _ordered(a, b))
 
 
 def sub(a: Expression, b: Expression) -> Expression:
@@ -257,9 +293,7 @@ def mul(a: Expression, b: Expression) -> Expression:
         return power(a, b.value + 1)
     if a.op == "pow" and b.op == "pow" and a.args[0] is b.args[0]:
         return power(a.args[0], a.value + b.value)
-    if _commuting_key(b) < _commuting_key(a):
-        a, b = b, a
-    return _node("mul", (a, b))
+    return _node("mul", _ordered(a, b))
 
 
 def power(base: Expression, exponent: Expression | Number) -> Expression:
@@ -351,17 +385,17 @@ def topological(roots: Iterable[Expression], known: Container[int] = ()) -> list
     ``known`` has the ``id`` of nodes that are left out, with what is below them.
     """
     order: list[Expression] = []
-    done: set[int] = set()
+    done: set[Expression] = set()
     for root in roots:
-        stack = [] if id(root) in done else [root]
+        stack = [] if root in done or (known and id(root) in known) else [root]
         while stack:
-            node = stack[-1]
-            if id(node) in done or (known and id(node) in known):
-                stack.pop()
-            elif left := [a for a in node.args if id(a) not in done and not (known and id(a) in known)]:
-                stack += reversed(left)
+            for a in stack[-1].args:
+                if a not in done and not (known and id(a) in known):
+                    stack.append(a)
+                    break
             else:
-                done.add(id(stack.pop()))
+                node = stack.pop()
+                done.add(node)
                 order.append(node)
     return order
 
@@ -377,10 +411,10 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
     Every walk over expressions (substitution, evaluation, conversion, printing) is a call of this one;
     a shared node is visited once.
     """
-    values: dict[int, T] = {}
+    values: dict[Expression, T] = {}
     for node in _counted(topological(roots)):
-        values[id(node)] = visit(node, [values[id(a)] for a in node.args])
-    return [values[id(r)] for r in roots]
+        values[node] = visit(node, [values[a] for a in node.args])
+    return [values[r] for r in roots]
 
 
 def _counted(order: Sequence[Expression]) -> Iterable[Expression]:

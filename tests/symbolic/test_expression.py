@@ -3,6 +3,7 @@
 import pytest
 
 from phigen.spec import loads
+from phigen.symbolic import expression
 from phigen.symbolic.expression import ZERO, derivatives, sparse_derivatives, symbol, total, total_at
 
 NAMES = ("x", "y", "z")
@@ -29,3 +30,22 @@ def test_sparse_derivatives_are_the_derivatives_that_are_not_zero(text):
 def test_a_sum_without_its_zeros_is_the_same_tree(places):
     terms = {k: symbol(f"v{k}") for k in places}
     assert total_at(terms) is total([terms.get(k, ZERO) for k in range(11)])
+
+
+def test_equal_formulas_are_one_node_which_is_forgotten_with_its_last_use():
+    x, before = symbol("forgotten"), {*expression._NODES}
+    made = x * (x + 3) ** 2
+    assert made is x * (x + 3) ** 2
+    assert not {*expression._NODES} <= before
+    del made
+    assert {*expression._NODES} <= before
+
+
+def test_order_of_terms_is_that_of_their_contents_whichever_is_made_first():
+    """What is as deep is told apart by a hash of the content, found when it is asked for."""
+    given = {}
+    for turn in (1, -1):
+        made = {n: symbol("x") ** n * symbol("y") for n in (2, 3, 4, 5)[::turn]}
+        given[turn] = [str(made[n] + made[m]) for n in made for m in made if n < m]
+        del made
+    assert sorted(given[1]) == sorted(given[-1])
