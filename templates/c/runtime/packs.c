@@ -107,7 +107,8 @@ static void phi_steps_far_lanes(phi_pack *pack, int packs, int steps)
 typedef struct {
     phi_pack pack[PHI_PACK_COUNT];
     phi_lanes coef[PHI_PACK_COUNT][PHI_STAGES][PHI_COEFFICIENTS]; /* only the first is used where all have the same */
-    int packs; /* in use */
+    int packs;    /* in use */
+    int prepared; /* whether a member has brought coefficients that all have */
 #if PHI_FAR
     int far; /* whether arguments of functions are too large for polynomials */
 #endif
@@ -171,22 +172,29 @@ static void phi_group_share(phi_group *group, size_t own)
         for (int stage = 0; stage < PHI_STAGES; ++stage) group->pack[k].coef[stage] = group->coef[own ? k : 0][stage];
 }
 
-/* Put a member into its lane, and its coefficients there or, if all have the same, into all lanes. */
+/* Put a member into its lane, and its coefficients there; if all have the same, the first brings them to all lanes. */
 static phi_status phi_group_join(phi_group *group, int m, const phi_members *all, size_t first)
 {
     phi_solver s;
     double x[PHI_DIM];
     phi_pack *pack = &group->pack[m / PHI_LANES];
     const int lane = m % PHI_LANES, from = all->own ? lane : 0, to = all->own ? lane + 1 : PHI_LANES;
-    const phi_status status = phi_take_member(all, first + (size_t)m, x, &s);
+    phi_status status = PHI_OK;
+    if (group->prepared) {
+        for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + first + (size_t)m];
+        if (!phi_finite(x, PHI_DIM)) status = PHI_BAD_ARGUMENT;
+    } else {
+        status = phi_take_member(all, first + (size_t)m, x, &s);
+    }
     for (int i = 0; i < PHI_DIM; ++i) pack->x[i][lane] = x[i];
     group->steps_left[m] = all->steps;
-    if (status != PHI_OK) return status;
+    group->active[m] = status == PHI_OK;
+    if (status != PHI_OK || group->prepared) return status;
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         for (int k = 0; k < PHI_COEFFICIENTS; ++k)
             for (int j = from; j < to; ++j) pack->coef[stage][k][j] = s.coef[stage][k];
-    group->active[m] = 1;
-    return status;
+    group->prepared = !all->own;
+    return PHI_OK;
 }
 
 /* The frames after so many steps, of the members that are active. */
