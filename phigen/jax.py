@@ -88,6 +88,7 @@ def propagator(
 
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
         x = jnp.asarray(x0, dtype=jnp.result_type(float, x0))
+        made.expect(x.shape, parameters or {})
         return run(x, {name: jnp.asarray(v, dtype=x.dtype) for name, v in (parameters or {}).items()})
 
     return propagate

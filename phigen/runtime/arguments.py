@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from reprlib import repr as shortened
@@ -153,11 +153,10 @@ def together(given: Mapping[str, Any] | None, more: Mapping[str, Any]) -> dict[s
 
 def parameters(interface: Interface, given: Mapping[str, float] | None, more: Mapping[str, float]) -> dict[str, float]:
     """The values of all parameters: those ``given`` and ``more``, which exclude each other, and defaults."""
-    known = interface.parameters
-    values = {name: float(value) for name, value in known.items()}
-    for name, value in together(given, more).items():
-        if name not in known:
-            raise TypeError(_unknown(name, known))
+    values = {name: float(value) for name, value in interface.parameters.items()}
+    asked = together(given, more)
+    expect_known(asked, interface.parameters)
+    for name, value in asked.items():
         values[name] = _number(value, f"parameter {name!r}")
         if name in interface.positive and values[name] <= 0:
             raise ValueError(f"parameter {name!r} must be positive, not {_shown(value)}")
@@ -320,6 +319,13 @@ def _shown(value: Any) -> str:
     if isinstance(value, int) and abs(value) > _MOST:
         return f"an integer of {int(math.log10(abs(value))) + 1} digits"
     return shortened(value)
+
+
+def expect_known(names: Iterable[str], known: Mapping[str, float]) -> None:
+    """Raises `TypeError` for the first name that no parameter has."""
+    for name in names:
+        if name not in known:
+            raise TypeError(_unknown(name, known))
 
 
 def _unknown(name: str, known: Mapping[str, float]) -> str:

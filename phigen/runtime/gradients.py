@@ -100,6 +100,8 @@ def pullback(
         raise TypeError(f"{interface.name} was compiled without pullback; {hint}") from None
     except BackendError as error:
         size, values, _ = members.numbers(error.members[0] if error.members else 0)
+        if start.ndim == 1:
+            error.members = ()
         raise solver.failure(error, size, None, values) from error
     states = states.reshape(-1, *start.shape)
     each = zip(members.parameters.items(), found, strict=True)

@@ -6,7 +6,7 @@ the leading axes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -63,6 +63,12 @@ class Propagation:
     def shape(self, start: tuple[int, ...]) -> tuple[int, ...]:
         """The shape of the result, by that of the start."""
         return start if self.stride is None else (*start[: -self.axes], self.rows, *start[-self.axes :])
+
+    def expect(self, start: tuple[int, ...], names: Iterable[str]) -> None:
+        """Raises `TypeError` and `ValueError` for arguments that no run can have."""
+        arguments.expect_known(names, self.solver.interface.parameters)
+        if not isinstance(self.solver, LatticeSolver) and start[-1:] != (self.solver.interface.dimension,):
+            raise ValueError(f"x0 must have shape (…, {self.solver.interface.dimension}), not {start}")
 
     def run(self, x0: ArrayLike, parameters: Values) -> Floats:
         """The states."""

@@ -292,6 +292,7 @@ def test_what_cannot_be_pulled_back_is_told(target):
     with pytest.raises(StepError) as failed:
         made.pullback(1e3 * x, 50.0, 10, x)
     assert failed.value.step == 0
+    assert failed.value.members == ()  # one state is no ensemble
     with pytest.raises(StepError) as failed:
         made.pullback(np.array([x, 1e3 * x]), 0.5, 10, np.array([x, x]))
     assert failed.value.members == (1,)

@@ -108,6 +108,14 @@ def test_failing_steps_raise(solver):
         propagator(solver, stride=0)
 
 
+def test_arguments_of_no_run_are_told_by_the_call_itself(solver):
+    run = propagator(solver)
+    with pytest.raises(TypeError, match="unknown parameter 'I7'"):
+        run(X[0], {"I7": 2.0})
+    with pytest.raises(ValueError, match=r"x0 must have shape \(…, 3\)"):
+        run(X[0][:2])
+
+
 @pytest.mark.parametrize("stride", [None, 3])
 def test_lattices_have_gradients_along_disorder(stride):
     """Members by `vmap`, each with fields of its own at the sites; J is shared."""
