@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 67362d4633f60c9afc552bdd1471293749fee13b4394297e54e212c4a998a420
+ * body-sha256: 2b485e10283acb0aa700208956314034afd5da81201eac6913223f7d5d61b95f
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -359,8 +359,7 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + ablowitz_ladik_LEAD;
     const size_t block = ablowitz_ladik_block(rows, width);
-    double *end = aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 851d75a5e3a668b9c844df28f703ddaba5a89b609078ad4246fee7de1186f351
+ * body-sha256: 0e270c74020ee309b596700a4987f34cebace9a6f75d8c9c795a184f8aeb8179
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -768,8 +768,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + chiral_magnet_LEAD;
     const size_t block = chiral_magnet_block(rows, width);
-    double *end = aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)

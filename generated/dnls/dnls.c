@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c094d1dbe13581e553a0292de5ca75d1a7b92fc653c819cadba8efc69ac507c1
+ * body-sha256: 3692a147178d3c5f5de14dbee4fcddd0a1046c10fe17a941d166842182082491
  */
 #include "dnls.h"
 #include <float.h>
@@ -338,8 +338,7 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
     const size_t block = dnls_block(rows, width);
-    double *end = aligned - dnls_LEAD + dnls_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_LEAD + dnls_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < dnls_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_DIM; ++k) s->before[k] = aligned + (dnls_ARRAYS + k) * block;

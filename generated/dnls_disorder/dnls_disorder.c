@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: cd24a0f3522b9aee521ecf8014ad05054dfe350a5506e58b7da14c68a64e22d8
+ * body-sha256: 37a149bc8cf08b0aeeb1e956277ae6976002e6d96ab1d238cf512443904cc926
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -381,8 +381,7 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + dnls_disorder_LEAD;
     const size_t block = dnls_disorder_block(rows, width);
-    double *end = aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 609bd37fc1447187d323f29aad8653adf22db998c9d9d485e7b95cfef0f6ecb9
+ * body-sha256: 6be22c3d509dcc34615acc39f6f7272203c8bc340c606b1067ec07921b4ae2c4
  */
 #include "food_web.h"
 #include <float.h>
@@ -501,8 +501,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + food_web_LEAD;
     const size_t block = food_web_block(rows, width);
-    double *end = aligned - food_web_LEAD + food_web_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - food_web_LEAD + food_web_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < food_web_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < food_web_DIM; ++k) s->before[k] = aligned + (food_web_ARRAYS + k) * block;

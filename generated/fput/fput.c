@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: ff1d351c7266f2b6daa7bfa44c48c4d6ae5982f0e748e2ea19e36fcdb860aa94
+ * body-sha256: 3241675e77cc7e192ec1080f58e8e63d224f9abfe21800f563f448a0556f2c56
  */
 #include "fput.h"
 #include <float.h>
@@ -343,8 +343,7 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
     const size_t block = fput_block(rows, width);
-    double *end = aligned - fput_LEAD + fput_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - fput_LEAD + fput_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < fput_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < fput_DIM; ++k) s->before[k] = aligned + (fput_ARRAYS + k) * block;

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 09fd414a7152f79ca6a2997e5655893ac35a218b8062918b82b5cfcbcc9001a0
+ * body-sha256: ff249ea0a5b6f9f73ac54c092077f809e0b8bbe1c45515df703c0acd05547bac
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -665,8 +665,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = heisenberg_block(rows, width);
-    double *end = aligned - heisenberg_LEAD + heisenberg_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_LEAD + heisenberg_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
     for (size_t k = 0; k < heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < heisenberg_DIM; ++k) s->before[k] = aligned + (heisenberg_ARRAYS + k) * block;

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8bc3cd718e17ffe84cee7cadc4bb41a6d57882a71b8678fce1bc06fcc9adca38
+ * body-sha256: ce6ecaa58a5662c4c596b2fc38838cc42923379a7477ec2cb005fb1e60af17de
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -453,8 +453,7 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + heisenberg_plane_LEAD;
     const size_t block = heisenberg_plane_block(rows, width);
-    double *end = aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block);
     for (size_t r = 0; r < rows; ++r)
         heisenberg_plane_find_lines(s, r, s->lines + r * heisenberg_plane_LINES);
     for (size_t k = 0; k < heisenberg_plane_ARRAYS; ++k) s->x[k] = aligned + k * block;

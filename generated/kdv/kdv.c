@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 46f25d989c84fcb044eb72750fcdfff271cf02d2099ae6b3b427fc74e064a49a
+ * body-sha256: 45bd5c5d29c08ce0fc9cf0c97cf8dc903466e55c0354bde19b6c0216e1bdb6e3
  */
 #include "kdv.h"
 #include <float.h>
@@ -130,38 +130,6 @@ static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
     return piece;
 }
 
-/* The largest change of y and the largest y, of each field; what is no number is left out. */
-typedef struct {
-    double change[kdv_DIM], size[kdv_DIM];
-} kdv_extent;
-
-enum { kdv_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
-
-/* Takes in what fields were and are in a piece. */
-static inline void kdv_measure(double *const *was, double *const *is, const kdv_piece *at, kdv_extent *extent)
-{
-    for (int k = 0; k < kdv_DIM; ++k) {
-        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
-        double change[kdv_WIDTH] = { 0.0 }, size[kdv_WIDTH] = { 0.0 };
-        const ptrdiff_t whole = at->to - (at->to - at->from) % kdv_WIDTH;
-        for (ptrdiff_t i = at->from; i < whole; i += kdv_WIDTH)
-            for (int l = 0; l < kdv_WIDTH; ++l) {
-                const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
-                change[l] = moved > change[l] ? moved : change[l];
-                size[l] = value > size[l] ? value : size[l];
-            }
-        for (ptrdiff_t i = whole; i < at->to; ++i) {
-            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
-            change[0] = moved > change[0] ? moved : change[0];
-            size[0] = value > size[0] ? value : size[0];
-        }
-        for (int l = 0; l < kdv_WIDTH; ++l) {
-            extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
-        }
-    }
-}
-
 /* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what
    couples the two ends of a ring lies outside. So the last sites are a border, all of them where there are
    few: of the blocks (A B; C D), A is a band, factorised with pivoting, B becomes A^-1 B, and D becomes D - C
@@ -209,19 +177,18 @@ static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t f
     }
 }
 
-/* A sweep, from s->y[now] to the other, for the pieces of rows from first on, before end. */
-static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, int now, kdv_extent *extent,
-    size_t first, size_t end)
+/* A sweep, for the pieces of rows from first on, before end. */
+static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, double *const *y,
+    double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         kdv_piece at = kdv_piece_of(s, unit);
-        at.row.x = s->y[now];
+        at.row.x = y;
         at.row.start = s->x;
-        at.row.out = s->y[1 - now];
+        at.row.out = to;
         kdv_relax(coef, &at.row, at.from, at.to);
-        kdv_ends(s->y[1 - now][0], s->length, at.from, at.to);
-        kdv_measure(s->y[now], s->y[1 - now], &at, extent);
+        kdv_ends(to[0], s->length, at.from, at.to);
     }
 }
 
@@ -243,16 +210,16 @@ static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff
 }
 
 /* The end of a stage, for the pieces of rows from first on, before end. */
-static void kdv_increment_rows(const kdv_solver *s, const double *coef, int far, int now, size_t first,
-    size_t end)
+static void kdv_increment_rows(const kdv_solver *s, const double *coef, int far, double *const *y,
+    double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         kdv_piece at = kdv_piece_of(s, unit);
-        at.row.x = s->y[now];
-        at.row.out = s->x;
+        at.row.x = y;
+        at.row.out = to;
         kdv_increment(coef, &at.row, at.from, at.to);
-        kdv_ends(s->x[0], s->length, at.from, at.to);
+        kdv_ends(to[0], s->length, at.from, at.to);
     }
 }
 
@@ -272,14 +239,14 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
     }
 }
 
-/* How a sweep follows s->y[now] along v, for the pieces of rows from first on, before end. */
-static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, int now, double *const *v,
-    double *const *to, size_t first, size_t end)
+/* How a sweep follows y along v, for the pieces of rows from first on, before end. */
+static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, double *const *y,
+    double *const *v, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         kdv_piece at = kdv_piece_of(s, unit);
-        at.row.x = s->y[now];
+        at.row.x = y;
         at.row.varied = v;
         at.row.out = to;
         kdv_slope(coef, &at.row, at.from, at.to);
@@ -336,35 +303,24 @@ static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, p
 }
 
 /* ---- The lattice ---- */
+/* Before a loop over pieces: they are worked at in parallel. */
 #ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define kdv_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define kdv_THREADS (size_t)omp_get_num_threads()
-#define kdv_THREAD (size_t)omp_get_thread_num()
+#define kdv_EACH_PIECE _Pragma("omp parallel for if (s->sites > 4096)")
 #define kdv_ONE_BY_ONE _Pragma("omp critical")
 #else
-#define kdv_PARALLEL
-#define kdv_THREADS (size_t)1
-#define kdv_THREAD (size_t)0
+#define kdv_EACH_PIECE
 #define kdv_ONE_BY_ONE
 #endif
 
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t kdv_share(size_t units, size_t *first)
-{
-    const size_t threads = kdv_THREADS, own = kdv_THREAD, each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
 enum {
+    kdv_SIDES = 2, /* y before and after a sweep */
     kdv_LEAD = (kdv_HALO + 7) / 8 * 8,
     kdv_BUFFER = 256,
-    kdv_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+    kdv_IMPLICIT = (kdv_SIDES /* arrays for y, its guesses and its variations */
         + kdv_DIFFERENCES
         + 1
-        ) * kdv_DIM,
+        ) * kdv_DIM
+        ,
     kdv_RESERVED = kdv_ARRAYS + kdv_DIM
         + kdv_IMPLICIT
 };
@@ -419,9 +375,9 @@ static void kdv_put(const kdv_solver *s, double *rows, const double *values)
 static void kdv_place_middle(kdv_solver *s, double *memory, size_t block)
 {
     for (int k = 0; k < kdv_ARRAYS; ++k)
-        for (int side = 0; side < 2; ++side)
-            s->y[side][k] = k < kdv_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
-    memory += 2 * kdv_DIM * block;
+        for (int side = 0; side < kdv_SIDES; ++side)
+            s->y[side][k] = k < kdv_DIM ? memory + (size_t)(kdv_SIDES * k + side) * block : s->x[k];
+    memory += kdv_SIDES * kdv_DIM * block;
     for (int d = 0; d < kdv_DIFFERENCES; ++d)
         for (int k = 0; k < kdv_DIM; ++k, memory += block) s->guess.difference[d][k] = memory;
     for (int k = 0; k < kdv_DIM; ++k, memory += block) s->v[k] = memory;
@@ -459,8 +415,7 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + kdv_LEAD;
     const size_t block = kdv_block(rows, width);
-    double *end = aligned - kdv_LEAD + kdv_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - kdv_LEAD + kdv_RESERVED * block);
     s->lines[0] = 0;
     s->matrix = (double *)(void *)(s->lines + kdv_LINES);
     for (size_t k = 0; k < kdv_ARRAYS; ++k) s->x[k] = aligned + k * block;
@@ -498,35 +453,60 @@ static void kdv_copy(double *const to[kdv_DIM], double *const from[kdv_DIM], con
 }
 
 /* ---- The stages ---- */
-static double kdv_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
+enum { kdv_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
+
+static inline void kdv_raise(double *largest, double value)
+{
+    *largest = value > *largest ? value : *largest;
+}
+
+/* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no
+   number is left out. */
+static void kdv_measure(const kdv_solver *s, int now, size_t unit, double *change, double *size)
+{
+    const kdv_piece at = kdv_piece_of(s, unit);
+    const ptrdiff_t whole = at.to - (at.to - at.from) % kdv_WIDTH;
+    for (int k = 0; k < kdv_DIM; ++k) {
+        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after =
+            s->y[1 - now][k] + at.row.at[0];
+        double changes[kdv_WIDTH] = { 0.0 }, sizes[kdv_WIDTH] = { 0.0 };
+        for (ptrdiff_t i = at.from; i < whole; i += kdv_WIDTH)
+            for (int l = 0; l < kdv_WIDTH; ++l) {
+                kdv_raise(changes + l, fabs(after[i + l] - before[i + l]));
+                kdv_raise(sizes + l, fabs(after[i + l]));
+            }
+        for (ptrdiff_t i = whole; i < at.to; ++i) {
+            kdv_raise(changes, fabs(after[i] - before[i]));
+            kdv_raise(sizes, fabs(after[i]));
+        }
+        for (int l = 1; l < kdv_WIDTH; ++l) {
+            kdv_raise(changes, changes[l]);
+            kdv_raise(sizes, sizes[l]);
+        }
+        kdv_ONE_BY_ONE
+        {
+            kdv_raise(change + k, *changes);
+            kdv_raise(size + k, *sizes);
+        }
+    }
+}
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
    is not. */
 static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
 {
     const size_t units = kdv_units(s);
-    kdv_extent whole = { { 0.0 }, { 0.0 } };
-    kdv_PARALLEL
-    {
-        kdv_extent own = { { 0.0 }, { 0.0 } };
-        size_t first, end = kdv_share(units, &first);
-        const int measured = coef != NULL;
-        if (measured) kdv_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; !measured && unit < end; ++unit) {
-            const kdv_piece at = kdv_piece_of(s, unit);
-            kdv_measure(s->y[now], s->y[1 - now], &at, &own);
-        }
-        kdv_ONE_BY_ONE
-        for (int k = 0; k < kdv_DIM; ++k) {
-            whole.change[k] = kdv_larger(whole.change[k], own.change[k]);
-            whole.size[k] = kdv_larger(whole.size[k], own.size[k]);
-        }
+    double change[kdv_DIM] = { 0.0 }, size[kdv_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
+    kdv_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        if (coef != NULL) kdv_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        kdv_measure(s, now, unit, change, size);
     }
-    double largest = 0.0, moved = 0.0;
-    for (int k = 0; k < kdv_DIM; ++k) largest = kdv_larger(largest, whole.size[k]);
+    for (int k = 0; k < kdv_DIM; ++k) kdv_raise(&largest, size[k]);
     for (int k = 0; k < kdv_DIM; ++k) {
-        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
-        moved = kdv_larger(moved, whole.change[k] / s->usual[k]);
+        s->usual[k] = size[k] + 1e-3 * largest + 1e-300;
+        change[k] /= s->usual[k]; /* no number where both are infinite */
+        moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
     return moved;
 }
@@ -562,20 +542,17 @@ static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *no
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
 static void kdv_predict(const kdv_solver *s, double *const *x)
 {
-    kdv_PARALLEL
-    {
-        size_t row, rows = kdv_share(s->rows, &row);
-        for (int k = 0; k < kdv_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
-                    end = first + s->length + 2 * kdv_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
-                for (int d = 0; d < s->guess.order; ++d) {
-                    const double *difference = s->guess.difference[d][k];
-                    for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
-                }
+    kdv_EACH_PIECE
+    for (size_t r = 0; r < s->rows; ++r)
+        for (int k = 0; k < kdv_DIM; ++k) {
+            const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
+                end = first + s->length + 2 * kdv_HALO;
+            for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
+            for (int d = 0; d < s->guess.order; ++d) {
+                const double *difference = s->guess.difference[d][k];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
             }
-    }
+        }
 }
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
@@ -584,28 +561,26 @@ static void kdv_remember(kdv_solver *s, double *const *from, int now)
 {
     kdv_guess *guess = &s->guess;
     double size[kdv_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
-    kdv_PARALLEL
-    {
-        size_t row, rows = kdv_share(s->rows, &row);
+    kdv_EACH_PIECE
+    for (size_t r = 0; r < s->rows; ++r) {
         double own[kdv_DIFFERENCES] = { 0.0 };
-        for (int k = 0; k < kdv_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
-                    end = first + s->length + 2 * kdv_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = from[k];
-                for (ptrdiff_t i = first; i < end; ++i) {
-                    double next = y[i] - x[i];
-                    for (int d = 0; d < guess->count; ++d) {
-                        const double last = guess->difference[d][k][i];
-                        guess->difference[d][k][i] = next;
-                        next -= last;
-                        own[d] = fabs(next) > own[d] ? fabs(next) : own[d];
-                    }
-                    if (guess->count < kdv_DIFFERENCES) guess->difference[guess->count][k][i] = next;
+        for (int k = 0; k < kdv_DIM; ++k) {
+            const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
+                end = first + s->length + 2 * kdv_HALO;
+            const double *restrict y = s->y[now][k], *restrict x = from[k];
+            for (ptrdiff_t i = first; i < end; ++i) {
+                double next = y[i] - x[i];
+                for (int d = 0; d < guess->count; ++d) {
+                    const double last = guess->difference[d][k][i];
+                    guess->difference[d][k][i] = next;
+                    next -= last;
+                    kdv_raise(own + d, fabs(next));
                 }
+                if (guess->count < kdv_DIFFERENCES) guess->difference[guess->count][k][i] = next;
             }
+        }
         kdv_ONE_BY_ONE
-        for (int d = 0; d < kdv_DIFFERENCES; ++d) size[d] = kdv_larger(size[d], own[d]);
+        for (int d = 0; d < kdv_DIFFERENCES; ++d) kdv_raise(size + d, own[d]);
     }
     guess->order = 1;
     for (int d = 0; d < guess->count; ++d)
@@ -709,7 +684,7 @@ static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         kdv_ends(s->v[k], sites, 0, sites);
     }
-    kdv_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, kdv_units(s));
+    kdv_slope_rows(s, coef, 1, s->y[now], s->v, s->y[1 - now], 0, kdv_units(s));
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;
@@ -843,11 +818,9 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     }
     if (status != kdv_OK) return status;
     kdv_remember(s, s->x, now);
-    kdv_PARALLEL
-    {
-        size_t first, end = kdv_share(units, &first);
-        kdv_increment_rows(s, coef, far, now, first, end);
-    }
+    kdv_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit)
+        kdv_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
     return kdv_all_hold(s, s->x) ? kdv_OK : kdv_NOT_FINITE;
 }
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c383cc8de4ffad8973d05d33b47c5deb96eb3c73262adec22c65c06867288621
+ * body-sha256: db1f69c1255b553d532e6bd7dc6584b959963ae666f7083a438c6fb92d025fdd
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -293,8 +293,7 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
     const size_t block = klein_gordon_block(rows, width);
-    double *end = aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < klein_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) s->before[k] = aligned + (klein_gordon_ARRAYS + k) * block;

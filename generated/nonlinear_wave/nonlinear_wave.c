@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 76301da3218f75ae3251697a77fada2eed1c4445dfe7967be35e36eb8aed8665
+ * body-sha256: f81a08bfe9204950b032b78c020f385b7df82acbf35cb243768600a062bb68d6
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -313,8 +313,7 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + nonlinear_wave_LEAD;
     const size_t block = nonlinear_wave_block(rows, width);
-    double *end = aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)

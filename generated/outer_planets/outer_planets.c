@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4ae41b429bdea8949ce96d6a4b73feaeb1ba7b05568d00c74d1e6875237e3456
+ * body-sha256: 4a2872b72674537d4c6a77b25e37adcd299eb8b1707c09eee963dafc3ff0316b
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -395,8 +395,7 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + outer_planets_LEAD;
     const size_t block = outer_planets_block(rows, width);
-    double *end = aligned - outer_planets_LEAD + outer_planets_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - outer_planets_LEAD + outer_planets_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k)

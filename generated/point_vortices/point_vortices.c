@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 1740b51b1e9930092bf36a4fcfe2539bbe5f5a3e4aa24059f193d0deb0b5b327
+ * body-sha256: f06b0605e1706e38c2729948005083e971ca7db2ee921b7aa35c30ce3711d241
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -114,39 +114,6 @@ static inline point_vortices_piece point_vortices_piece_of(const point_vortices_
     piece.from = (ptrdiff_t)unit * point_vortices_PIECE;
     piece.to = unit == point_vortices_units(s) - 1 ? s->length : piece.from + point_vortices_PIECE;
     return piece;
-}
-
-/* The largest change of y and the largest y, of each field; what is no number is left out. */
-typedef struct {
-    double change[point_vortices_DIM], size[point_vortices_DIM];
-} point_vortices_extent;
-
-enum { point_vortices_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
-
-/* Takes in what fields were and are in a piece. */
-static inline void point_vortices_measure(double *const *was, double *const *is,
-    const point_vortices_piece *at, point_vortices_extent *extent)
-{
-    for (int k = 0; k < point_vortices_DIM; ++k) {
-        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
-        double change[point_vortices_WIDTH] = { 0.0 }, size[point_vortices_WIDTH] = { 0.0 };
-        const ptrdiff_t whole = at->to - (at->to - at->from) % point_vortices_WIDTH;
-        for (ptrdiff_t i = at->from; i < whole; i += point_vortices_WIDTH)
-            for (int l = 0; l < point_vortices_WIDTH; ++l) {
-                const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
-                change[l] = moved > change[l] ? moved : change[l];
-                size[l] = value > size[l] ? value : size[l];
-            }
-        for (ptrdiff_t i = whole; i < at->to; ++i) {
-            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
-            change[0] = moved > change[0] ? moved : change[0];
-            size[0] = value > size[0] ? value : size[0];
-        }
-        for (int l = 0; l < point_vortices_WIDTH; ++l) {
-            extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
-        }
-    }
 }
 
 /* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where
@@ -276,19 +243,18 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
     }
 }
 
-/* A sweep, from s->y[now] to the other, for the pieces of rows from first on, before end. */
-static void point_vortices_relax_rows(const point_vortices_solver *s, const double *coef, int far, int now,
-    point_vortices_extent *extent, size_t first, size_t end)
+/* A sweep, for the pieces of rows from first on, before end. */
+static void point_vortices_relax_rows(const point_vortices_solver *s, const double *coef, int far,
+    double *const *y, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         point_vortices_piece at = point_vortices_piece_of(s, unit);
-        at.row.x = s->y[now];
+        at.row.x = y;
         at.row.start = s->x;
-        at.row.out = s->y[1 - now];
+        at.row.out = to;
         point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
         point_vortices_relax(coef, &at.row, at.from, at.to);
-        point_vortices_measure(s->y[now], s->y[1 - now], &at, extent);
     }
 }
 
@@ -310,13 +276,13 @@ static inline void point_vortices_increment(const double *coef, const point_vort
 
 /* The end of a stage, for the pieces of rows from first on, before end. */
 static void point_vortices_increment_rows(const point_vortices_solver *s, const double *coef, int far,
-    int now, size_t first, size_t end)
+    double *const *y, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         point_vortices_piece at = point_vortices_piece_of(s, unit);
-        at.row.x = s->y[now];
-        at.row.out = s->x;
+        at.row.x = y;
+        at.row.out = to;
         point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
         point_vortices_increment(coef, &at.row, at.from, at.to);
     }
@@ -338,14 +304,14 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
     }
 }
 
-/* How a sweep follows s->y[now] along v, for the pieces of rows from first on, before end. */
-static void point_vortices_slope_rows(const point_vortices_solver *s, const double *coef, int far, int now,
-    double *const *v, double *const *to, size_t first, size_t end)
+/* How a sweep follows y along v, for the pieces of rows from first on, before end. */
+static void point_vortices_slope_rows(const point_vortices_solver *s, const double *coef, int far,
+    double *const *y, double *const *v, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         point_vortices_piece at = point_vortices_piece_of(s, unit);
-        at.row.x = s->y[now];
+        at.row.x = y;
         at.row.varied = v;
         at.row.out = to;
         point_vortices_pair_slopes(&s->params, &at.row, at.from, at.to);
@@ -391,36 +357,25 @@ static void point_vortices_put_parameters(point_vortices_solver *s, const point_
 }
 
 /* ---- The lattice ---- */
+/* Before a loop over pieces: they are worked at in parallel. */
 #ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define point_vortices_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
-#define point_vortices_THREADS (size_t)omp_get_num_threads()
-#define point_vortices_THREAD (size_t)omp_get_thread_num()
+#define point_vortices_EACH_PIECE _Pragma("omp parallel for if (s->sites > 512)")
 #define point_vortices_ONE_BY_ONE _Pragma("omp critical")
 #else
-#define point_vortices_PARALLEL
-#define point_vortices_THREADS (size_t)1
-#define point_vortices_THREAD (size_t)0
+#define point_vortices_EACH_PIECE
 #define point_vortices_ONE_BY_ONE
 #endif
 
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t point_vortices_share(size_t units, size_t *first)
-{
-    const size_t threads = point_vortices_THREADS, own = point_vortices_THREAD, each = units / threads,
-        more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
 enum {
+    point_vortices_SIDES = 2, /* y before and after a sweep */
     point_vortices_LEAD = (point_vortices_HALO + 7) / 8 * 8,
     point_vortices_BUFFER = 256,
-    point_vortices_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+    point_vortices_IMPLICIT = (point_vortices_SIDES /* arrays for y, its guesses and its variations */
         + point_vortices_STAGES * point_vortices_DIFFERENCES
         + point_vortices_DIRECTIONS + 1
-        ) * point_vortices_DIM,
+        ) * point_vortices_DIM
+        + 1 /* for sums over pieces */
+        ,
     point_vortices_RESERVED = point_vortices_ARRAYS + point_vortices_DIM
         + point_vortices_GATHERED
         + point_vortices_IMPLICIT
@@ -451,19 +406,12 @@ static size_t point_vortices_block(size_t rows, ptrdiff_t width)
     return block < 512 ? block : block + (512 + apart - block % 512) % 512;
 }
 
-/* The doubles of sums over what is worked at in one go. */
-static size_t point_vortices_sums(size_t rows, size_t length)
-{
-    return rows * (length / point_vortices_PIECE + 1) * (point_vortices_DIRECTIONS + 1);
-}
-
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
-    doubles += point_vortices_sums(rows, sizes[point_vortices_AXES - 1]);
     return doubles * sizeof(double) + rows * point_vortices_LINES * sizeof(ptrdiff_t) + 64;
 }
 
@@ -494,15 +442,17 @@ static void point_vortices_put_parameter(const point_vortices_solver *s, double 
 static void point_vortices_place_middle(point_vortices_solver *s, double *memory, size_t block)
 {
     for (int k = 0; k < point_vortices_ARRAYS; ++k)
-        for (int side = 0; side < 2; ++side)
-            s->y[side][k] = k < point_vortices_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
-    memory += 2 * point_vortices_DIM * block;
+        for (int side = 0; side < point_vortices_SIDES; ++side)
+            s->y[side][k] = k < point_vortices_DIM ? memory + (size_t)(point_vortices_SIDES * k + side)
+                * block : s->x[k];
+    memory += point_vortices_SIDES * point_vortices_DIM * block;
     for (int stage = 0; stage < point_vortices_STAGES; ++stage)
         for (int d = 0; d < point_vortices_DIFFERENCES; ++d)
             for (int k = 0; k < point_vortices_DIM; ++k, memory += block)
                 s->guess[stage].difference[d][k] = memory;
     for (int d = 0; d <= point_vortices_DIRECTIONS; ++d)
         for (int k = 0; k < point_vortices_DIM; ++k, memory += block) s->space[d][k] = memory;
+    s->sums = memory;
 }
 
 static void point_vortices_prepare_step(const point_vortices_params *params, double h, double *coef)
@@ -541,10 +491,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + point_vortices_LEAD;
     const size_t block = point_vortices_block(rows, width);
-    double *end = aligned - point_vortices_LEAD + point_vortices_RESERVED * block;
-    s->sums = end;
-    end += point_vortices_sums(rows, length);
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - point_vortices_LEAD + point_vortices_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < point_vortices_DIM; ++k)
@@ -588,35 +535,62 @@ static void point_vortices_copy(double *const to[point_vortices_DIM], double *co
 }
 
 /* ---- The stages ---- */
-static double point_vortices_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
+enum { point_vortices_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
+
+static inline void point_vortices_raise(double *largest, double value)
+{
+    *largest = value > *largest ? value : *largest;
+}
+
+/* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no
+   number is left out. */
+static void point_vortices_measure(const point_vortices_solver *s, int now, size_t unit, double *change,
+    double *size)
+{
+    const point_vortices_piece at = point_vortices_piece_of(s, unit);
+    const ptrdiff_t whole = at.to - (at.to - at.from) % point_vortices_WIDTH;
+    for (int k = 0; k < point_vortices_DIM; ++k) {
+        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after =
+            s->y[1 - now][k] + at.row.at[0];
+        double changes[point_vortices_WIDTH] = { 0.0 }, sizes[point_vortices_WIDTH] = { 0.0 };
+        for (ptrdiff_t i = at.from; i < whole; i += point_vortices_WIDTH)
+            for (int l = 0; l < point_vortices_WIDTH; ++l) {
+                point_vortices_raise(changes + l, fabs(after[i + l] - before[i + l]));
+                point_vortices_raise(sizes + l, fabs(after[i + l]));
+            }
+        for (ptrdiff_t i = whole; i < at.to; ++i) {
+            point_vortices_raise(changes, fabs(after[i] - before[i]));
+            point_vortices_raise(sizes, fabs(after[i]));
+        }
+        for (int l = 1; l < point_vortices_WIDTH; ++l) {
+            point_vortices_raise(changes, changes[l]);
+            point_vortices_raise(sizes, sizes[l]);
+        }
+        point_vortices_ONE_BY_ONE
+        {
+            point_vortices_raise(change + k, *changes);
+            point_vortices_raise(size + k, *sizes);
+        }
+    }
+}
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
    is not. */
 static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int far, int now)
 {
     const size_t units = point_vortices_units(s);
-    point_vortices_extent whole = { { 0.0 }, { 0.0 } };
-    point_vortices_PARALLEL
-    {
-        point_vortices_extent own = { { 0.0 }, { 0.0 } };
-        size_t first, end = point_vortices_share(units, &first);
-        const int measured = coef != NULL;
-        if (measured) point_vortices_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; !measured && unit < end; ++unit) {
-            const point_vortices_piece at = point_vortices_piece_of(s, unit);
-            point_vortices_measure(s->y[now], s->y[1 - now], &at, &own);
-        }
-        point_vortices_ONE_BY_ONE
-        for (int k = 0; k < point_vortices_DIM; ++k) {
-            whole.change[k] = point_vortices_larger(whole.change[k], own.change[k]);
-            whole.size[k] = point_vortices_larger(whole.size[k], own.size[k]);
-        }
+    double change[point_vortices_DIM] = { 0.0 }, size[point_vortices_DIM] = { 0.0 }, largest = 0.0,
+        moved = 0.0;
+    point_vortices_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        if (coef != NULL) point_vortices_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        point_vortices_measure(s, now, unit, change, size);
     }
-    double largest = 0.0, moved = 0.0;
-    for (int k = 0; k < point_vortices_DIM; ++k) largest = point_vortices_larger(largest, whole.size[k]);
+    for (int k = 0; k < point_vortices_DIM; ++k) point_vortices_raise(&largest, size[k]);
     for (int k = 0; k < point_vortices_DIM; ++k) {
-        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
-        moved = point_vortices_larger(moved, whole.change[k] / s->usual[k]);
+        s->usual[k] = size[k] + 1e-3 * largest + 1e-300;
+        change[k] /= s->usual[k]; /* no number where both are infinite */
+        moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
     return moved;
 }
@@ -654,20 +628,17 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
 static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
-    point_vortices_PARALLEL
-    {
-        size_t row, rows = point_vortices_share(s->rows, &row);
-        for (int k = 0; k < point_vortices_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
-                    end = first + s->length + 2 * point_vortices_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
-                for (int d = 0; d < s->guess[stage].order; ++d) {
-                    const double *difference = s->guess[stage].difference[d][k];
-                    for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
-                }
+    point_vortices_EACH_PIECE
+    for (size_t r = 0; r < s->rows; ++r)
+        for (int k = 0; k < point_vortices_DIM; ++k) {
+            const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
+                end = first + s->length + 2 * point_vortices_HALO;
+            for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
+            for (int d = 0; d < s->guess[stage].order; ++d) {
+                const double *difference = s->guess[stage].difference[d][k];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
             }
-    }
+        }
 }
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best
@@ -676,29 +647,26 @@ static void point_vortices_remember(point_vortices_solver *s, double *const *fro
 {
     point_vortices_guess *guess = &s->guess[stage];
     double size[point_vortices_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
-    point_vortices_PARALLEL
-    {
-        size_t row, rows = point_vortices_share(s->rows, &row);
+    point_vortices_EACH_PIECE
+    for (size_t r = 0; r < s->rows; ++r) {
         double own[point_vortices_DIFFERENCES] = { 0.0 };
-        for (int k = 0; k < point_vortices_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
-                    end = first + s->length + 2 * point_vortices_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = from[k];
-                for (ptrdiff_t i = first; i < end; ++i) {
-                    double next = y[i] - x[i];
-                    for (int d = 0; d < guess->count; ++d) {
-                        const double last = guess->difference[d][k][i];
-                        guess->difference[d][k][i] = next;
-                        next -= last;
-                        own[d] = fabs(next) > own[d] ? fabs(next) : own[d];
-                    }
-                    if (guess->count < point_vortices_DIFFERENCES)
-                        guess->difference[guess->count][k][i] = next;
+        for (int k = 0; k < point_vortices_DIM; ++k) {
+            const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
+                end = first + s->length + 2 * point_vortices_HALO;
+            const double *restrict y = s->y[now][k], *restrict x = from[k];
+            for (ptrdiff_t i = first; i < end; ++i) {
+                double next = y[i] - x[i];
+                for (int d = 0; d < guess->count; ++d) {
+                    const double last = guess->difference[d][k][i];
+                    guess->difference[d][k][i] = next;
+                    next -= last;
+                    point_vortices_raise(own + d, fabs(next));
                 }
+                if (guess->count < point_vortices_DIFFERENCES) guess->difference[guess->count][k][i] = next;
             }
+        }
         point_vortices_ONE_BY_ONE
-        for (int d = 0; d < point_vortices_DIFFERENCES; ++d) size[d] = point_vortices_larger(size[d], own[d]);
+        for (int d = 0; d < point_vortices_DIFFERENCES; ++d) point_vortices_raise(size + d, own[d]);
     }
     guess->order = 1;
     for (int d = 0; d < guess->count; ++d)
@@ -722,119 +690,80 @@ static void point_vortices_forget(point_vortices_solver *s)
 #define point_vortices_SOLVED 1e-6
 #define point_vortices_USEFUL 0.9 /* and how well it has to */
 
-/* The sum over some sites of a b. */
-static double point_vortices_product(const double *restrict a, const double *restrict b, ptrdiff_t from,
-    ptrdiff_t to)
+/* The sum of x y over all sites and fields, in usual sizes. Those of pieces are added in their order: the
+   bits do not depend on threads. */
+static double point_vortices_product(const point_vortices_solver *s, double *const *x, double *const *y)
 {
-    double lanes[point_vortices_WIDTH] = { 0.0 }, sum = 0.0;
-    const ptrdiff_t whole = to - (to - from) % point_vortices_WIDTH;
-    for (ptrdiff_t i = from; i < whole; i += point_vortices_WIDTH)
-        for (int l = 0; l < point_vortices_WIDTH; ++l) lanes[l] += a[i + l] * b[i + l];
-    for (ptrdiff_t i = whole; i < to; ++i) sum += a[i] * b[i];
-    for (int l = 0; l < point_vortices_WIDTH; ++l) sum += lanes[l];
+    const size_t units = point_vortices_units(s);
+    double sum = 0.0;
+    point_vortices_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        const point_vortices_piece at = point_vortices_piece_of(s, unit);
+        const ptrdiff_t whole = at.to - (at.to - at.from) % point_vortices_WIDTH;
+        s->sums[unit] = 0.0;
+        for (int k = 0; k < point_vortices_DIM; ++k) {
+            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
+            double lanes[point_vortices_WIDTH] = { 0.0 };
+            for (ptrdiff_t i = at.from; i < whole; i += point_vortices_WIDTH)
+                for (int l = 0; l < point_vortices_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
+            for (ptrdiff_t i = whole; i < at.to; ++i) *lanes += one[i] * other[i];
+            for (int l = 1; l < point_vortices_WIDTH; ++l) *lanes += lanes[l];
+            s->sums[unit] += *lanes / s->usual[k] / s->usual[k];
+        }
+    }
+    for (size_t unit = 0; unit < units; ++unit) sum += s->sums[unit];
     return sum;
 }
 
-/* The products of some directions from the first on with v, over all sites and fields, in usual sizes. Those
-   of pieces are added in their order: the bits do not depend on threads. */
-static void point_vortices_products(const point_vortices_solver *s, int first, int count, double *const *v,
-    double *products)
+/* to = a x + b y, with the copied ends. */
+static void point_vortices_combine(const point_vortices_solver *s, double *const *to, double a,
+    double *const *x, double b, double *const *y)
 {
     const size_t units = point_vortices_units(s);
-    point_vortices_PARALLEL
-    {
-        size_t unit, end = point_vortices_share(units, &unit);
-        for (; unit < end; ++unit) {
-            const point_vortices_piece at = point_vortices_piece_of(s, unit);
-            for (int d = 0; d < count; ++d) {
-                double sum = 0.0;
-                for (int k = 0; k < point_vortices_DIM; ++k)
-                    sum += point_vortices_product(s->space[first + d][k] + at.row.at[0], v[k] + at.row.at[0],
-                        at.from, at.to) /
-                        s->usual[k] / s->usual[k];
-                s->sums[unit * (point_vortices_DIRECTIONS + 1) + (size_t)d] = sum;
-            }
+    point_vortices_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        const point_vortices_piece at = point_vortices_piece_of(s, unit);
+        for (int k = 0; k < point_vortices_DIM; ++k) {
+            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
+            double *sum = to[k] + at.row.at[0];
+            point_vortices_EACH_SITE
+            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = a * one[i] + b * other[i];
         }
     }
-    for (int d = 0; d < count; ++d) products[d] = 0.0;
+}
+
+/* to = v - what a sweep, or its transpose, does to that variation of s->y[now]. */
+static void point_vortices_multiply(const point_vortices_solver *s, const double *coef, int now,
+    double *const *v, double *const *to)
+{
+    const size_t units = point_vortices_units(s);
+    point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit)
-        for (int d = 0; d < count; ++d)
-            products[d] += s->sums[unit * (point_vortices_DIRECTIONS + 1) + (size_t)d];
-}
-
-/* to = own from + some of the first directions by their weights, with the copied ends. */
-static void point_vortices_combine(const point_vortices_solver *s, double *const *to, double own,
-    double *const *from, int count, const double *weights)
-{
-    point_vortices_PARALLEL
-    {
-        size_t unit, end = point_vortices_share(point_vortices_units(s), &unit);
-        for (; unit < end; ++unit) {
-            const point_vortices_piece at = point_vortices_piece_of(s, unit);
-            for (int k = 0; k < point_vortices_DIM; ++k) {
-                const double *start = from[k] + at.row.at[0];
-                double *sum = to[k] + at.row.at[0];
-                point_vortices_EACH_SITE
-                for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = own * start[i];
-                for (int d = 0; d < count; ++d) {
-                    const double *restrict direction = s->space[d][k] + at.row.at[0], by = weights[d];
-                    point_vortices_EACH_SITE
-                    for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by * direction[i];
-                }
-            }
-        }
-    }
-}
-
-/* to = a - b; with coefficients b is first made what a sweep does to a, or its transpose. */
-static void point_vortices_subtract(point_vortices_solver *s, const double *coef, int now, double *const *a,
-    double *const *b, double *const *to)
-{
-    point_vortices_PARALLEL
-    {
-        size_t first, end = point_vortices_share(point_vortices_units(s), &first);
-        if (coef != NULL) point_vortices_slope_rows(s, coef, 1, now, a, b, first, end);
-        for (size_t unit = first; unit < end; ++unit) {
-            const point_vortices_piece at = point_vortices_piece_of(s, unit);
-            for (int k = 0; k < point_vortices_DIM; ++k) {
-                const double *one = a[k] + at.row.at[0], *other = b[k] + at.row.at[0];
-                double *left = to[k] + at.row.at[0];
-                point_vortices_EACH_SITE
-                for (ptrdiff_t i = at.from; i < at.to; ++i) left[i] = one[i] - other[i];
-            }
-        }
-    }
+        point_vortices_slope_rows(s, coef, 1, s->y[now], v, to, unit, unit + 1);
+    point_vortices_combine(s, to, 1.0, v, -1.0, to);
 }
 
 /* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES,
-   after Y. Saad and M. H. Schultz, without a restart. The matrix is 1 - (what a sweep does to a variation of
-   s->y[now]). s->y[1 - now] is used, and may be where it goes. The length of s->space[0]; not finite if this
-   is of no use. */
+   after Y. Saad and M. H. Schultz, without a restart. The matrix is that of point_vortices_multiply. The
+   length of s->space[0]; not finite if this is of no use. */
 static double point_vortices_krylov(point_vortices_solver *s, const double *coef, int now,
     double *const *from, double *const *to)
 {
-    double matrix[point_vortices_DIRECTIONS][point_vortices_DIRECTIONS], again[point_vortices_DIRECTIONS],
-        cosine[point_vortices_DIRECTIONS], sine[point_vortices_DIRECTIONS];
-    double side[point_vortices_DIRECTIONS + 1], length;
+    double matrix[point_vortices_DIRECTIONS][point_vortices_DIRECTIONS], cosine[point_vortices_DIRECTIONS],
+        sine[point_vortices_DIRECTIONS], side[point_vortices_DIRECTIONS + 1];
+    const double length = sqrt(point_vortices_product(s, s->space[0], s->space[0]));
     int count = 0;
-    point_vortices_products(s, 0, 1, s->space[0], &length);
-    side[0] = length = sqrt(length);
-    if (length > 0.0) point_vortices_combine(s, s->space[0], 1.0 / length, s->space[0], 0, side);
+    side[0] = length;
+    if (length > 0.0) point_vortices_combine(s, s->space[0], 1.0 / length, s->space[0], 0.0, s->space[0]);
     while (count < point_vortices_DIRECTIONS && fabs(side[count]) > point_vortices_SOLVED * length) {
-        double *column = matrix[count], *const *next = s->space[count + 1], left;
-        point_vortices_subtract(s, coef, now, s->space[count], s->y[1 - now], next);
-        point_vortices_products(s, 0, count + 1, next, column);
-        for (int k = 0; k <= count; ++k) again[k] = -column[k];
-        point_vortices_combine(s, next, 1.0, next, count + 1, again);
-        point_vortices_products(s, 0, count + 1, next, again); /* twice is enough */
+        double *column = matrix[count], *const *next = s->space[count + 1];
+        point_vortices_multiply(s, coef, now, s->space[count], next);
         for (int k = 0; k <= count; ++k) {
-            column[k] += again[k];
-            again[k] = -again[k];
+            column[k] = point_vortices_product(s, s->space[k], next);
+            point_vortices_combine(s, next, 1.0, next, -column[k], s->space[k]);
         }
-        point_vortices_combine(s, next, 1.0, next, count + 1, again);
-        point_vortices_products(s, count + 1, 1, next, &left);
-        left = sqrt(left);
-        if (left > 0.0) point_vortices_combine(s, next, 1.0 / left, next, 0, again);
+        const double left = sqrt(point_vortices_product(s, next, next));
+        if (left > 0.0) point_vortices_combine(s, next, 1.0 / left, next, 0.0, next);
         for (int k = 0; k < count; ++k) {
             const double above = column[k];
             column[k] = cosine[k] * above + sine[k] * column[k + 1];
@@ -854,8 +783,8 @@ static double point_vortices_krylov(point_vortices_solver *s, const double *coef
         for (int j = k + 1; j < count; ++j) side[k] -= matrix[j][k] * side[j];
         side[k] /= matrix[k][k];
     }
-    for (int k = 0; k < count; ++k) side[k] = -side[k];
-    point_vortices_combine(s, to, 1.0, from, count, side);
+    point_vortices_combine(s, to, 1.0, from, 0.0, from);
+    for (int k = 0; k < count; ++k) point_vortices_combine(s, to, 1.0, to, -side[k], s->space[k]);
     return length;
 }
 
@@ -880,7 +809,7 @@ static double point_vortices_distance(const point_vortices_solver *s, int side, 
 static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
 {
     if (!isfinite(point_vortices_relaxed(s, coef, 1, now))) return HUGE_VAL;
-    point_vortices_subtract(s, NULL, now, s->y[now], s->y[1 - now], s->space[0]);
+    point_vortices_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
     if (!isfinite(point_vortices_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
     ++s->sweeps;
     return point_vortices_relaxed(s, NULL, 1, now);
@@ -931,11 +860,9 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
         }
         if (status != point_vortices_OK) return status;
         point_vortices_remember(s, s->x, stage, now);
-        point_vortices_PARALLEL
-        {
-            size_t first, end = point_vortices_share(units, &first);
-            point_vortices_increment_rows(s, coef, far, now, first, end);
-        }
+        point_vortices_EACH_PIECE
+        for (size_t unit = 0; unit < units; ++unit)
+            point_vortices_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
     }
     return point_vortices_all_hold(s, s->x) ? point_vortices_OK : point_vortices_NOT_FINITE;
 }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7ba610a704a4154e6ebdb88e975b14eef58ae1c18143f623bd022eba59afc222
+ * body-sha256: a44a9bab1edb20951c8eb00dfd7880e5261cecfd47476517f40ab10014c9e797
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -326,8 +326,7 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
     const size_t block = sine_gordon_block(rows, width);
-    double *end = aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < sine_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) s->before[k] = aligned + (sine_gordon_ARRAYS + k) * block;

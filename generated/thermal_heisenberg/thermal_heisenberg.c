@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The stages;
  *   Krylov spaces; Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 5ff8c08258a4098250cf3ead502950a4f65cb07a6e21c2a4e04bc7ad3b957605
+ * body-sha256: d4b5edc4ca464e4f9f30080ec6207d4d09c64a005fd82df71a855ed182a6a4b5
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -137,39 +137,6 @@ static inline thermal_heisenberg_piece thermal_heisenberg_piece_of(const thermal
     return piece;
 }
 
-/* The largest change of y and the largest y, of each field; what is no number is left out. */
-typedef struct {
-    double change[thermal_heisenberg_DIM], size[thermal_heisenberg_DIM];
-} thermal_heisenberg_extent;
-
-enum { thermal_heisenberg_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
-
-/* Takes in what fields were and are in a piece. */
-static inline void thermal_heisenberg_measure(double *const *was, double *const *is,
-    const thermal_heisenberg_piece *at, thermal_heisenberg_extent *extent)
-{
-    for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
-        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
-        double change[thermal_heisenberg_WIDTH] = { 0.0 }, size[thermal_heisenberg_WIDTH] = { 0.0 };
-        const ptrdiff_t whole = at->to - (at->to - at->from) % thermal_heisenberg_WIDTH;
-        for (ptrdiff_t i = at->from; i < whole; i += thermal_heisenberg_WIDTH)
-            for (int l = 0; l < thermal_heisenberg_WIDTH; ++l) {
-                const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
-                change[l] = moved > change[l] ? moved : change[l];
-                size[l] = value > size[l] ? value : size[l];
-            }
-        for (ptrdiff_t i = whole; i < at->to; ++i) {
-            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
-            change[0] = moved > change[0] ? moved : change[0];
-            size[0] = value > size[0] ? value : size[0];
-        }
-        for (int l = 0; l < thermal_heisenberg_WIDTH; ++l) {
-            extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
-        }
-    }
-}
-
 /* The polynomial with these coefficients, the constant first. */
 static inline double thermal_heisenberg_polynomial(const double *coefficients, int count, double s)
 {
@@ -197,28 +164,6 @@ static double thermal_heisenberg_phi0(double s)
     }
     const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
     return (1.0 - c) / s;
-}
-
-/* The derivative of (1 - w cot w)/s, w = sqrt(s)/2. */
-static double thermal_heisenberg_phi1(double s)
-{
-    static const double near[9] = { 0.001388888888888889, 6.613756613756614e-05, 2.48015873015873e-06,
-        8.35070279514724e-08, 2.6420950693437467e-09, 8.029521918410807e-11, 2.372776207425808e-12,
-        6.868849645022276e-14, 1.9573818287022555e-15 };
-    static const double rest[21] = { 0.000105641107053347, 1.127474056575369e-06, 1.0071425779972354e-08,
-        8.297149161666418e-11, 6.500241069349487e-13, 4.917631233414605e-15, 3.626082737318807e-17,
-        2.6220313397614337e-19, 1.8672661690734246e-21, 1.3136241807166533e-23, 9.149803514708191e-26,
-        6.320715596201077e-28, 4.336129588468787e-30, 2.957088865245744e-32, 2.0063496139822866e-34,
-        1.3552363725840395e-36, 9.118512779314688e-39, 6.114032687969605e-41, 4.0868535472481875e-43,
-        2.7242422235187686e-45, 1.8114038279637677e-47 };
-    if (fabs(s) < 0.25) return thermal_heisenberg_polynomial(near, 9, s);
-    if (fabs(s) < 16.0) {
-        const double pole = 1.0 / (39.47841760435743 - s);
-        return 2.0 * pole * pole + thermal_heisenberg_polynomial(rest, 21, s);
-    }
-    const double w = 0.5 * sqrt(fabs(s)), c = w / (s > 0.0 ? tan(w) : tanh(w));
-    const double phi0 = (1.0 - c) / s;
-    return (0.5 * s * phi0 * phi0 - 1.5 * phi0 + 0.125) / s;
 }
 
 /* y at a site from x there and y around it */
@@ -272,21 +217,20 @@ static inline void thermal_heisenberg_relax(const double *coef, const thermal_he
     }
 }
 
-/* A sweep, from s->y[now] to the other, for the pieces of rows from first on, before end. */
+/* A sweep, for the pieces of rows from first on, before end. */
 static void thermal_heisenberg_relax_rows(const thermal_heisenberg_solver *s, const double *coef, int far,
-    int now, thermal_heisenberg_extent *extent, size_t first, size_t end)
+    double *const *y, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-        at.row.x = s->y[now];
+        at.row.x = y;
         at.row.start = s->x;
-        at.row.out = s->y[1 - now];
+        at.row.out = to;
         thermal_heisenberg_relax(coef, &at.row, at.from, at.to);
-        thermal_heisenberg_ends(s->y[1 - now][0], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->y[1 - now][1], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->y[1 - now][2], s->length, at.from, at.to);
-        thermal_heisenberg_measure(s->y[now], s->y[1 - now], &at, extent);
+        thermal_heisenberg_ends(to[0], s->length, at.from, at.to);
+        thermal_heisenberg_ends(to[1], s->length, at.from, at.to);
+        thermal_heisenberg_ends(to[2], s->length, at.from, at.to);
     }
 }
 
@@ -320,211 +264,17 @@ static inline void thermal_heisenberg_increment(const double *coef, const therma
 
 /* The end of a stage, for the pieces of rows from first on, before end. */
 static void thermal_heisenberg_increment_rows(const thermal_heisenberg_solver *s, const double *coef, int far,
-    int now, size_t first, size_t end)
+    double *const *y, double *const *to, size_t first, size_t end)
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-        at.row.x = s->y[now];
-        at.row.out = s->x;
-        thermal_heisenberg_increment(coef, &at.row, at.from, at.to);
-        thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-        thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-    }
-}
-
-/* how y at a site follows y around it */
-static inline void thermal_heisenberg_slope(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
-{
-    double *restrict out_x = row->out[0], *restrict out_y = row->out[1], *restrict out_z = row->out[2];
-    const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
-    const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1], *varied_z_0 = row->varied[2];
-    const double *restrict start_x = row->start[0], *restrict start_y = row->start[1], *restrict start_z =
-        row->start[2], *restrict T_row = row->x[3], *restrict dw_0_row = row->x[4], *restrict dw_1_row =
-        row->x[5], *restrict dw_2_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
-        *restrict z_row = row->x[2];
-    thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double T = T_row[i], dw_0 = dw_0_row[i], dw_1 = dw_1_row[i], dw_2 = dw_2_row[i], x = x_row[i],
-            y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
-        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
-        const double t1 = sqrt(2.0 * (T * c0));
-        const double t2 = w0 * (c1 * z_row[i + 1]) + w1 * (c1 * z_row[i - 1]);
-        const double t3 = w1 * (c1 * y_row[i - 1]) + w0 * (c1 * y_row[i + 1]);
-        const double t4 = w1 * (c1 * x_row[i - 1]) + w0 * (c1 * x_row[i + 1]);
-        const double t5 = dw_0 * t1 + c2 * (c0 * (y * t2 - z * t3) - t4);
-        const double t6 = dw_2 * t1 + c2 * (c0 * (x * t3 - y * t4) - t2);
-        const double t7 = dw_1 * t1 + c2 * (c0 * (z * t4 - x * t2) - t3);
-        const double t8 = t6 * t6 + (t7 * t7 + t5 * t5);
-        const double t9 = thermal_heisenberg_phi0(t8);
-        const double t10 = t5 * t9;
-        const double t11 = 0.5 * t5;
-        const double t12 = t6 * t9;
-        const double t13 = 0.5 * t7;
-        const double t14 = t5 * t12 - t13;
-        const double t15 = 0.5 * t6;
-        const double t16 = t7 * t10 - t15;
-        const double t17 = t6 * t12;
-        const double t18 = t7 * t9;
-        const double t19 = t7 * t18;
-        const double t20 = 1.0 / (1.0 - (t17 + t19));
-        const double t21 = t16 * t20;
-        const double t22 = t11 + t7 * t12 - t14 * t21;
-        const double t23 = t15 + t5 * t18;
-        const double t24 = t23 * t20;
-        const double t25 = t5 * t10;
-        const double t26 = 1.0 / (1.0 - (t17 + t25) - t23 * t21);
-        const double t27 = t24 * t26;
-        const double t28 = t22 * t27 - t14 * t20;
-        const double t29 = t13 + t6 * t10;
-        const double t30 = t29 * t20;
-        const double t31 = start_y[i] - start_x[i] * t21;
-        const double t32 = t6 * t18 - t11 - t23 * t30;
-        const double t33 = t32 * t26;
-        const double t34 = start_z[i] - start_x[i] * t30 - t31 * t33;
-        const double t35 = 1.0 / (1.0 - (t25 + t19) - t14 * t30 - t22 * t33);
-        const double t36 = t35 * t35;
-        const double t37 = t28 * t34 * t36;
-        const double t38 = t26 * t26;
-        const double t39 = t28 * t35;
-        const double t40 = t22 * t37 - t31 * t39;
-        const double t41 = t34 * t35;
-        const double t42 = t31 - t22 * t41;
-        const double t43 = t38 * (t32 * t40 - t24 * t42);
-        const double t44 = t37 + t43;
-        const double t45 = t26 * t42;
-        const double t46 = t26 * t40;
-        const double t47 = t21 * t43 - t20 * t45 - t30 * t46;
-        const double t48 = t33 * t37 + t27 * t41;
-        const double t49 = t14 * t37 - t23 * t46 - start_x[i] * t39;
-        const double t50 = t20 * t49;
-        const double t51 = start_x[i] * (t27 + t33 * t39) + (t23 * t43 - t14 * t48);
-        const double t52 = t20 * t51;
-        const double t53 = t6 * t50 + (t5 * t44 + t7 * t52);
-        const double t54 = t30 * t37;
-        const double t55 = t20 * t41 + t21 * t48;
-        const double t56 = t54 - t55;
-        const double t57 = thermal_heisenberg_phi1(t8);
-        const double t58 = t20 * t20;
-        const double t59 = t58 * (t29 * t49 + (start_x[i] - (t14 * t41 + t23 * t45) + t16 * t51));
-        const double t60 = t43 + t59;
-        const double t61 = t7 * t48 + t5 * t56 + t6 * t60;
-        const double t62 = t37 + t59;
-        const double t63 = t6 * t46 + t5 * t47 + t7 * t62;
-        const double t64 = t57 * (t6 * t61 + (t5 * t53 + t7 * t63));
-        const double t65 = c2 * (t10 * t44 + t18 * t47 + (0.5 * (t48 - t46) + t9 * t53)
-            + (t12 * t56 + 2.0 * (t5 * t64)));
-        const double t66 = c0 * t65;
-        const double t67 = c2 * (t12 * t48 + t10 * t52 + (0.5 * (t55 - t54 + t50) + t18 * t62)
-            + (t9 * t63 + 2.0 * (t7 * t64)));
-        const double t68 = c0 * t67;
-        const double t69 = c2 * (t18 * t46 + 0.5 * (t47 - t52) + (t10 * t50 + t12 * t60)
-            + (t9 * t61 + 2.0 * (t6 * t64)));
-        const double t70 = y * t66 - x * t68 - t69;
-        const double t71 = c0 * t69;
-        const double t72 = z * t68 - t65 - y * t71;
-        const double t73 = varied_y_0[i] * (t2 * t66 - t4 * t71) + varied_x_0[i - 1] * (c1 * (w1 * t72))
-            + (varied_x_0[i] * (t3 * t71 - t2 * t68) + varied_x_0[i + 1] * (c1 * (w0 * t72)));
-        const double t74 = x * t71 - (t67 + z * t66);
-        const double t75 = varied_y_0[i + 1] * (c1 * (w0 * t74)) + varied_y_0[i - 1] * (c1 * (w1 * t74))
-            + (varied_z_0[i] * (t4 * t68 - t3 * t66) + varied_z_0[i + 1] * (c1 * (w0 * t70)));
-        const double t76 = t22 * t26;
-        const double t77 = t76 * t34 * t36;
-        const double t78 = t26 * t41 + t33 * t77;
-        const double t79 = t21 * t78;
-        const double t80 = t30 * t77;
-        const double t81 = t79 - t80;
-        const double t82 = t76 * t35;
-        const double t83 = t31 * t82 - t22 * t77;
-        const double t84 = t26 * t83;
-        const double t85 = t38 * (t42 + t32 * t83);
-        const double t86 = t85 - t77;
-        const double t87 = t21 * t85 - t30 * t84;
-        const double t88 = start_x[i] * t82 - (t14 * t77 + t23 * t84);
-        const double t89 = t20 * t88;
-        const double t90 = t14 * t78 - start_x[i] * (t26 + t33 * t82) + t23 * t85;
-        const double t91 = t20 * t90;
-        const double t92 = t5 * t86 + (t6 * t89 + t7 * t91);
-        const double t93 = t58 * (t29 * t88 + t16 * t90);
-        const double t94 = t85 + t93;
-        const double t95 = t5 * t81 - t7 * t78 + t6 * t94;
-        const double t96 = t93 - t77;
-        const double t97 = t5 * t87 + (t6 * t84 + t7 * t96);
-        const double t98 = t57 * (t6 * t95 + (t5 * t92 + t7 * t97));
-        const double t99 = c2 * (t12 * t81 - 0.5 * (t78 + t84) + (t10 * t86 + t18 * t87)
-            + (t9 * t92 + 2.0 * (t5 * t98)));
-        const double t100 = c0 * t99;
-        const double t101 = c2 * (0.5 * (t80 - t79 + t89) - t12 * t78 + (t10 * t91 + t18 * t96)
-            + (t9 * t97 + 2.0 * (t7 * t98)));
-        const double t102 = c0 * t101;
-        const double t103 = c2 * (t18 * t84 + t10 * t89 + (0.5 * (t87 - t91) + t12 * t94)
-            + (t9 * t95 + 2.0 * (t6 * t98)));
-        const double t104 = y * t100 - x * t102 - t103;
-        const double t105 = c0 * t103;
-        const double t106 = z * t102 - t99 - y * t105;
-        const double t107 = varied_y_0[i] * (t2 * t100 - t4 * t105) + varied_x_0[i - 1] * (c1 * (w1 * t106))
-            + (varied_x_0[i] * (t3 * t105 - t2 * t102) + varied_x_0[i + 1] * (c1 * (w0 * t106)));
-        const double t108 = x * t105 - (t101 + z * t100);
-        const double t109 = varied_y_0[i + 1] * (c1 * (w0 * t108)) + varied_y_0[i - 1] * (c1 * (w1 * t108))
-            + (varied_z_0[i] * (t4 * t102 - t3 * t100) + varied_z_0[i + 1] * (c1 * (w0 * t104)));
-        const double t110 = t34 * t36;
-        const double t111 = t30 * t110;
-        const double t112 = t33 * t110;
-        const double t113 = t21 * t112;
-        const double t114 = t111 - t113;
-        const double t115 = t22 * t110 - t31 * t35;
-        const double t116 = t38 * (t32 * t115);
-        const double t117 = t110 + t116;
-        const double t118 = t26 * t115;
-        const double t119 = t21 * t116 - t30 * t118;
-        const double t120 = t14 * t110 - t23 * t118 - start_x[i] * t35;
-        const double t121 = t20 * t120;
-        const double t122 = start_x[i] * (t33 * t35) + (t23 * t116 - t14 * t112);
-        const double t123 = t20 * t122;
-        const double t124 = t6 * t121 + (t5 * t117 + t7 * t123);
-        const double t125 = t58 * (t29 * t120 + t16 * t122);
-        const double t126 = t110 + t125;
-        const double t127 = t6 * t118 + t5 * t119 + t7 * t126;
-        const double t128 = t116 + t125;
-        const double t129 = t7 * t112 + t5 * t114 + t6 * t128;
-        const double t130 = t57 * (t5 * t124 + (t7 * t127 + t6 * t129));
-        const double t131 = c2 * (t12 * t114 + t10 * t117 + (0.5 * (t112 - t118) + t18 * t119)
-            + (t9 * t124 + 2.0 * (t5 * t130)));
-        const double t132 = c0 * t131;
-        const double t133 = c2 * (t18 * t118 + 0.5 * (t119 - t123) + (t12 * t128 + t9 * t129)
-            + (t10 * t121 + 2.0 * (t6 * t130)));
-        const double t134 = c2 * (t12 * t112 + t10 * t123 + (t18 * t126 + t9 * t127)
-            + (0.5 * (t113 - t111 + t121) + 2.0 * (t7 * t130)));
-        const double t135 = c0 * t134;
-        const double t136 = y * t132 - t133 - x * t135;
-        const double t137 = c0 * t133;
-        const double t138 = z * t135 - (t131 + y * t137);
-        const double t139 = varied_y_0[i] * (t2 * t132 - t4 * t137) + varied_x_0[i - 1] * (c1 * (w1 * t138))
-            + (varied_x_0[i] * (t3 * t137 - t2 * t135) + varied_x_0[i + 1] * (c1 * (w0 * t138)));
-        const double t140 = x * t137 - z * t132 - t134;
-        const double t141 = varied_y_0[i + 1] * (c1 * (w0 * t140)) + varied_y_0[i - 1] * (c1 * (w1 * t140))
-            + (varied_z_0[i] * (t4 * t135 - t3 * t132) + varied_z_0[i + 1] * (c1 * (w0 * t136)));
-        out_x[i] = varied_z_0[i - 1] * (c1 * (w1 * t70)) + (t73 + t75);
-        out_y[i] = varied_z_0[i - 1] * (c1 * (w1 * t104)) + (t107 + t109);
-        out_z[i] = varied_z_0[i - 1] * (c1 * (w1 * t136)) + (t139 + t141);
-    }
-}
-
-/* How a sweep follows s->y[now] along v, for the pieces of rows from first on, before end. */
-static void thermal_heisenberg_slope_rows(const thermal_heisenberg_solver *s, const double *coef, int far,
-    int now, double *const *v, double *const *to, size_t first, size_t end)
-{
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-        at.row.x = s->y[now];
-        at.row.start = s->x;
-        at.row.varied = v;
+        at.row.x = y;
         at.row.out = to;
-        thermal_heisenberg_slope(coef, &at.row, at.from, at.to);
+        thermal_heisenberg_increment(coef, &at.row, at.from, at.to);
+        thermal_heisenberg_ends(to[0], s->length, at.from, at.to);
+        thermal_heisenberg_ends(to[1], s->length, at.from, at.to);
+        thermal_heisenberg_ends(to[2], s->length, at.from, at.to);
     }
 }
 
@@ -676,35 +426,24 @@ thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver
 }
 
 /* ---- The lattice ---- */
+/* Before a loop over pieces: they are worked at in parallel. */
 #ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define thermal_heisenberg_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define thermal_heisenberg_THREADS (size_t)omp_get_num_threads()
-#define thermal_heisenberg_THREAD (size_t)omp_get_thread_num()
+#define thermal_heisenberg_EACH_PIECE _Pragma("omp parallel for if (s->sites > 4096)")
 #define thermal_heisenberg_ONE_BY_ONE _Pragma("omp critical")
 #else
-#define thermal_heisenberg_PARALLEL
-#define thermal_heisenberg_THREADS (size_t)1
-#define thermal_heisenberg_THREAD (size_t)0
+#define thermal_heisenberg_EACH_PIECE
 #define thermal_heisenberg_ONE_BY_ONE
 #endif
 
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t thermal_heisenberg_share(size_t units, size_t *first)
-{
-    const size_t threads = thermal_heisenberg_THREADS, own = thermal_heisenberg_THREAD,
-        each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
 enum {
+    thermal_heisenberg_SIDES = 3, /* y before and after a sweep, and varied */
     thermal_heisenberg_LEAD = (thermal_heisenberg_HALO + 7) / 8 * 8,
     thermal_heisenberg_BUFFER = 256,
-    thermal_heisenberg_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+    thermal_heisenberg_IMPLICIT = (thermal_heisenberg_SIDES /* arrays for y, its guesses and its variations */
         + thermal_heisenberg_DIRECTIONS + 1
-        ) * thermal_heisenberg_DIM,
+        ) * thermal_heisenberg_DIM
+        + 1 /* for sums over pieces */
+        ,
     thermal_heisenberg_RESERVED = thermal_heisenberg_ARRAYS + thermal_heisenberg_DIM
         + thermal_heisenberg_IMPLICIT
 };
@@ -729,19 +468,12 @@ static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXE
 /* Doubles from one array to the next. */
 static size_t thermal_heisenberg_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 
-/* The doubles of sums over what is worked at in one go. */
-static size_t thermal_heisenberg_sums(size_t rows, size_t length)
-{
-    return rows * (length / thermal_heisenberg_PIECE + 1) * (thermal_heisenberg_DIRECTIONS + 1);
-}
-
 size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
 {
     ptrdiff_t width = 0;
     const size_t rows = sizes == NULL ? 0 : thermal_heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = thermal_heisenberg_RESERVED * thermal_heisenberg_block(rows, width);
-    doubles += thermal_heisenberg_sums(rows, sizes[thermal_heisenberg_AXES - 1]);
     return doubles * sizeof(double) + rows * thermal_heisenberg_LINES * sizeof(ptrdiff_t) + 64;
 }
 
@@ -773,11 +505,13 @@ static void thermal_heisenberg_put_parameter(const thermal_heisenberg_solver *s,
 static void thermal_heisenberg_place_middle(thermal_heisenberg_solver *s, double *memory, size_t block)
 {
     for (int k = 0; k < thermal_heisenberg_ARRAYS; ++k)
-        for (int side = 0; side < 2; ++side)
-            s->y[side][k] = k < thermal_heisenberg_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
-    memory += 2 * thermal_heisenberg_DIM * block;
+        for (int side = 0; side < thermal_heisenberg_SIDES; ++side)
+            s->y[side][k] = k < thermal_heisenberg_DIM
+                ? memory + (size_t)(thermal_heisenberg_SIDES * k + side) * block : s->x[k];
+    memory += thermal_heisenberg_SIDES * thermal_heisenberg_DIM * block;
     for (int d = 0; d <= thermal_heisenberg_DIRECTIONS; ++d)
         for (int k = 0; k < thermal_heisenberg_DIM; ++k, memory += block) s->space[d][k] = memory;
+    s->sums = memory;
 }
 
 static void thermal_heisenberg_prepare_step(const thermal_heisenberg_params *params, double h, double *coef)
@@ -819,10 +553,7 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + thermal_heisenberg_LEAD;
     const size_t block = thermal_heisenberg_block(rows, width);
-    double *end = aligned - thermal_heisenberg_LEAD + thermal_heisenberg_RESERVED * block;
-    s->sums = end;
-    end += thermal_heisenberg_sums(rows, length);
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - thermal_heisenberg_LEAD + thermal_heisenberg_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < thermal_heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
@@ -880,36 +611,63 @@ static void thermal_heisenberg_copy(double *const to[thermal_heisenberg_DIM],
 }
 
 /* ---- The stages ---- */
-static double thermal_heisenberg_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
+enum { thermal_heisenberg_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
+
+static inline void thermal_heisenberg_raise(double *largest, double value)
+{
+    *largest = value > *largest ? value : *largest;
+}
+
+/* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no
+   number is left out. */
+static void thermal_heisenberg_measure(const thermal_heisenberg_solver *s, int now, size_t unit,
+    double *change, double *size)
+{
+    const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+    const ptrdiff_t whole = at.to - (at.to - at.from) % thermal_heisenberg_WIDTH;
+    for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
+        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after =
+            s->y[1 - now][k] + at.row.at[0];
+        double changes[thermal_heisenberg_WIDTH] = { 0.0 }, sizes[thermal_heisenberg_WIDTH] = { 0.0 };
+        for (ptrdiff_t i = at.from; i < whole; i += thermal_heisenberg_WIDTH)
+            for (int l = 0; l < thermal_heisenberg_WIDTH; ++l) {
+                thermal_heisenberg_raise(changes + l, fabs(after[i + l] - before[i + l]));
+                thermal_heisenberg_raise(sizes + l, fabs(after[i + l]));
+            }
+        for (ptrdiff_t i = whole; i < at.to; ++i) {
+            thermal_heisenberg_raise(changes, fabs(after[i] - before[i]));
+            thermal_heisenberg_raise(sizes, fabs(after[i]));
+        }
+        for (int l = 1; l < thermal_heisenberg_WIDTH; ++l) {
+            thermal_heisenberg_raise(changes, changes[l]);
+            thermal_heisenberg_raise(sizes, sizes[l]);
+        }
+        thermal_heisenberg_ONE_BY_ONE
+        {
+            thermal_heisenberg_raise(change + k, *changes);
+            thermal_heisenberg_raise(size + k, *sizes);
+        }
+    }
+}
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
    is not. */
 static double thermal_heisenberg_relaxed(thermal_heisenberg_solver *s, const double *coef, int far, int now)
 {
     const size_t units = thermal_heisenberg_units(s);
-    thermal_heisenberg_extent whole = { { 0.0 }, { 0.0 } };
-    thermal_heisenberg_PARALLEL
-    {
-        thermal_heisenberg_extent own = { { 0.0 }, { 0.0 } };
-        size_t first, end = thermal_heisenberg_share(units, &first);
-        const int measured = coef != NULL;
-        if (measured) thermal_heisenberg_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; !measured && unit < end; ++unit) {
-            const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-            thermal_heisenberg_measure(s->y[now], s->y[1 - now], &at, &own);
-        }
-        thermal_heisenberg_ONE_BY_ONE
-        for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
-            whole.change[k] = thermal_heisenberg_larger(whole.change[k], own.change[k]);
-            whole.size[k] = thermal_heisenberg_larger(whole.size[k], own.size[k]);
-        }
+    double change[thermal_heisenberg_DIM] = { 0.0 }, size[thermal_heisenberg_DIM] = { 0.0 }, largest = 0.0,
+        moved = 0.0;
+    thermal_heisenberg_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        if (coef != NULL)
+            thermal_heisenberg_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        thermal_heisenberg_measure(s, now, unit, change, size);
     }
-    double largest = 0.0, moved = 0.0;
-    for (int k = 0; k < thermal_heisenberg_DIM; ++k)
-        largest = thermal_heisenberg_larger(largest, whole.size[k]);
+    for (int k = 0; k < thermal_heisenberg_DIM; ++k) thermal_heisenberg_raise(&largest, size[k]);
     for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
-        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
-        moved = thermal_heisenberg_larger(moved, whole.change[k] / s->usual[k]);
+        s->usual[k] = size[k] + 1e-3 * largest + 1e-300;
+        change[k] /= s->usual[k]; /* no number where both are infinite */
+        moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
     return moved;
 }
@@ -954,121 +712,86 @@ static thermal_heisenberg_status thermal_heisenberg_middle(thermal_heisenberg_so
 #define thermal_heisenberg_SOLVED 1e-6
 #define thermal_heisenberg_USEFUL 0.9 /* and how well it has to */
 
-/* The sum over some sites of a b. */
-static double thermal_heisenberg_product(const double *restrict a, const double *restrict b, ptrdiff_t from,
-    ptrdiff_t to)
+/* The sum of x y over all sites and fields, in usual sizes. Those of pieces are added in their order: the
+   bits do not depend on threads. */
+static double thermal_heisenberg_product(const thermal_heisenberg_solver *s, double *const *x,
+    double *const *y)
 {
-    double lanes[thermal_heisenberg_WIDTH] = { 0.0 }, sum = 0.0;
-    const ptrdiff_t whole = to - (to - from) % thermal_heisenberg_WIDTH;
-    for (ptrdiff_t i = from; i < whole; i += thermal_heisenberg_WIDTH)
-        for (int l = 0; l < thermal_heisenberg_WIDTH; ++l) lanes[l] += a[i + l] * b[i + l];
-    for (ptrdiff_t i = whole; i < to; ++i) sum += a[i] * b[i];
-    for (int l = 0; l < thermal_heisenberg_WIDTH; ++l) sum += lanes[l];
+    const size_t units = thermal_heisenberg_units(s);
+    double sum = 0.0;
+    thermal_heisenberg_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+        const ptrdiff_t whole = at.to - (at.to - at.from) % thermal_heisenberg_WIDTH;
+        s->sums[unit] = 0.0;
+        for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
+            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
+            double lanes[thermal_heisenberg_WIDTH] = { 0.0 };
+            for (ptrdiff_t i = at.from; i < whole; i += thermal_heisenberg_WIDTH)
+                for (int l = 0; l < thermal_heisenberg_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
+            for (ptrdiff_t i = whole; i < at.to; ++i) *lanes += one[i] * other[i];
+            for (int l = 1; l < thermal_heisenberg_WIDTH; ++l) *lanes += lanes[l];
+            s->sums[unit] += *lanes / s->usual[k] / s->usual[k];
+        }
+    }
+    for (size_t unit = 0; unit < units; ++unit) sum += s->sums[unit];
     return sum;
 }
 
-/* The products of some directions from the first on with v, over all sites and fields, in usual sizes. Those
-   of pieces are added in their order: the bits do not depend on threads. */
-static void thermal_heisenberg_products(const thermal_heisenberg_solver *s, int first, int count,
-    double *const *v, double *products)
+/* to = a x + b y, with the copied ends. */
+static void thermal_heisenberg_combine(const thermal_heisenberg_solver *s, double *const *to, double a,
+    double *const *x, double b, double *const *y)
 {
     const size_t units = thermal_heisenberg_units(s);
-    thermal_heisenberg_PARALLEL
-    {
-        size_t unit, end = thermal_heisenberg_share(units, &unit);
-        for (; unit < end; ++unit) {
-            const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-            for (int d = 0; d < count; ++d) {
-                double sum = 0.0;
-                for (int k = 0; k < thermal_heisenberg_DIM; ++k)
-                    sum += thermal_heisenberg_product(s->space[first + d][k] + at.row.at[0],
-                        v[k] + at.row.at[0], at.from, at.to) /
-                        s->usual[k] / s->usual[k];
-                s->sums[unit * (thermal_heisenberg_DIRECTIONS + 1) + (size_t)d] = sum;
-            }
+    thermal_heisenberg_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+        for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
+            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
+            double *sum = to[k] + at.row.at[0];
+            thermal_heisenberg_EACH_SITE
+            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = a * one[i] + b * other[i];
+            thermal_heisenberg_ends(sum, s->length, at.from, at.to);
         }
     }
-    for (int d = 0; d < count; ++d) products[d] = 0.0;
+}
+
+/* to = v - what a sweep, which makes s->y[1 - now], does to that variation of s->y[now], by a difference. */
+static void thermal_heisenberg_multiply(const thermal_heisenberg_solver *s, const double *coef, int now,
+    double *const *v, double *const *to)
+{
+    const size_t units = thermal_heisenberg_units(s);
+    const double by = 0x1p-26 * sqrt((double)(thermal_heisenberg_DIM * s->sites));
+    thermal_heisenberg_combine(s, s->y[2], 1.0, s->y[now], by, v);
+    thermal_heisenberg_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit)
-        for (int d = 0; d < count; ++d)
-            products[d] += s->sums[unit * (thermal_heisenberg_DIRECTIONS + 1) + (size_t)d];
-}
-
-/* to = own from + some of the first directions by their weights, with the copied ends. */
-static void thermal_heisenberg_combine(const thermal_heisenberg_solver *s, double *const *to, double own,
-    double *const *from, int count, const double *weights)
-{
-    thermal_heisenberg_PARALLEL
-    {
-        size_t unit, end = thermal_heisenberg_share(thermal_heisenberg_units(s), &unit);
-        for (; unit < end; ++unit) {
-            const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-            for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
-                const double *start = from[k] + at.row.at[0];
-                double *sum = to[k] + at.row.at[0];
-                thermal_heisenberg_EACH_SITE
-                for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = own * start[i];
-                for (int d = 0; d < count; ++d) {
-                    const double *restrict direction = s->space[d][k] + at.row.at[0], by = weights[d];
-                    thermal_heisenberg_EACH_SITE
-                    for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by * direction[i];
-                }
-                thermal_heisenberg_ends(sum, s->length, at.from, at.to);
-            }
-        }
-    }
-}
-
-/* to = a - b; with coefficients b is first made what a sweep does to a, or its transpose. */
-static void thermal_heisenberg_subtract(thermal_heisenberg_solver *s, const double *coef, int now,
-    double *const *a, double *const *b, double *const *to)
-{
-    thermal_heisenberg_PARALLEL
-    {
-        size_t first, end = thermal_heisenberg_share(thermal_heisenberg_units(s), &first);
-        if (coef != NULL) thermal_heisenberg_slope_rows(s, coef, 1, now, a, b, first, end);
-        for (size_t unit = first; unit < end; ++unit) {
-            const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-            for (int k = 0; k < thermal_heisenberg_DIM; ++k) {
-                const double *one = a[k] + at.row.at[0], *other = b[k] + at.row.at[0];
-                double *left = to[k] + at.row.at[0];
-                thermal_heisenberg_EACH_SITE
-                for (ptrdiff_t i = at.from; i < at.to; ++i) left[i] = one[i] - other[i];
-            }
-        }
-    }
+        thermal_heisenberg_relax_rows(s, coef, 1, s->y[2], to, unit, unit + 1);
+    thermal_heisenberg_combine(s, to, 1.0 / by, s->y[1 - now], -1.0 / by, to);
+    thermal_heisenberg_combine(s, to, 1.0, v, 1.0, to);
 }
 
 /* to = from - what solves matrix(v) = s->space[0], as well as a space of so many directions allows: GMRES,
-   after Y. Saad and M. H. Schultz, without a restart. The matrix is 1 - (what a sweep does to a variation of
-   s->y[now]). s->y[1 - now] is used, and may be where it goes. The length of s->space[0]; not finite if this
-   is of no use. */
+   after Y. Saad and M. H. Schultz, without a restart. The matrix is that of thermal_heisenberg_multiply. The
+   length of s->space[0]; not finite if this is of no use. */
 static double thermal_heisenberg_krylov(thermal_heisenberg_solver *s, const double *coef, int now,
     double *const *from, double *const *to)
 {
     double matrix[thermal_heisenberg_DIRECTIONS][thermal_heisenberg_DIRECTIONS],
-        again[thermal_heisenberg_DIRECTIONS], cosine[thermal_heisenberg_DIRECTIONS],
-        sine[thermal_heisenberg_DIRECTIONS];
-    double side[thermal_heisenberg_DIRECTIONS + 1], length;
+        cosine[thermal_heisenberg_DIRECTIONS], sine[thermal_heisenberg_DIRECTIONS],
+        side[thermal_heisenberg_DIRECTIONS + 1];
+    const double length = sqrt(thermal_heisenberg_product(s, s->space[0], s->space[0]));
     int count = 0;
-    thermal_heisenberg_products(s, 0, 1, s->space[0], &length);
-    side[0] = length = sqrt(length);
-    if (length > 0.0) thermal_heisenberg_combine(s, s->space[0], 1.0 / length, s->space[0], 0, side);
+    side[0] = length;
+    if (length > 0.0) thermal_heisenberg_combine(s, s->space[0], 1.0 / length, s->space[0], 0.0, s->space[0]);
     while (count < thermal_heisenberg_DIRECTIONS && fabs(side[count]) > thermal_heisenberg_SOLVED * length) {
-        double *column = matrix[count], *const *next = s->space[count + 1], left;
-        thermal_heisenberg_subtract(s, coef, now, s->space[count], s->y[1 - now], next);
-        thermal_heisenberg_products(s, 0, count + 1, next, column);
-        for (int k = 0; k <= count; ++k) again[k] = -column[k];
-        thermal_heisenberg_combine(s, next, 1.0, next, count + 1, again);
-        thermal_heisenberg_products(s, 0, count + 1, next, again); /* twice is enough */
+        double *column = matrix[count], *const *next = s->space[count + 1];
+        thermal_heisenberg_multiply(s, coef, now, s->space[count], next);
         for (int k = 0; k <= count; ++k) {
-            column[k] += again[k];
-            again[k] = -again[k];
+            column[k] = thermal_heisenberg_product(s, s->space[k], next);
+            thermal_heisenberg_combine(s, next, 1.0, next, -column[k], s->space[k]);
         }
-        thermal_heisenberg_combine(s, next, 1.0, next, count + 1, again);
-        thermal_heisenberg_products(s, count + 1, 1, next, &left);
-        left = sqrt(left);
-        if (left > 0.0) thermal_heisenberg_combine(s, next, 1.0 / left, next, 0, again);
+        const double left = sqrt(thermal_heisenberg_product(s, next, next));
+        if (left > 0.0) thermal_heisenberg_combine(s, next, 1.0 / left, next, 0.0, next);
         for (int k = 0; k < count; ++k) {
             const double above = column[k];
             column[k] = cosine[k] * above + sine[k] * column[k + 1];
@@ -1088,8 +811,8 @@ static double thermal_heisenberg_krylov(thermal_heisenberg_solver *s, const doub
         for (int j = k + 1; j < count; ++j) side[k] -= matrix[j][k] * side[j];
         side[k] /= matrix[k][k];
     }
-    for (int k = 0; k < count; ++k) side[k] = -side[k];
-    thermal_heisenberg_combine(s, to, 1.0, from, count, side);
+    thermal_heisenberg_combine(s, to, 1.0, from, 0.0, from);
+    for (int k = 0; k < count; ++k) thermal_heisenberg_combine(s, to, 1.0, to, -side[k], s->space[k]);
     return length;
 }
 
@@ -1114,7 +837,7 @@ static double thermal_heisenberg_distance(const thermal_heisenberg_solver *s, in
 static double thermal_heisenberg_corrected(thermal_heisenberg_solver *s, const double *coef, int now)
 {
     if (!isfinite(thermal_heisenberg_relaxed(s, coef, 1, now))) return HUGE_VAL;
-    thermal_heisenberg_subtract(s, NULL, now, s->y[now], s->y[1 - now], s->space[0]);
+    thermal_heisenberg_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
     if (!isfinite(thermal_heisenberg_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
     ++s->sweeps;
     return thermal_heisenberg_relaxed(s, NULL, 1, now);
@@ -1150,11 +873,8 @@ static thermal_heisenberg_status thermal_heisenberg_newton(thermal_heisenberg_so
 static thermal_heisenberg_status thermal_heisenberg_stages(thermal_heisenberg_solver *s, int far)
 {
     const size_t units = thermal_heisenberg_units(s);
-    thermal_heisenberg_PARALLEL
-    {
-        size_t first, end = thermal_heisenberg_share(units, &first);
-        thermal_heisenberg_draw_rows(s, s->steps, 0, first, end);
-    }
+    thermal_heisenberg_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_draw_rows(s, s->steps, 0, unit, unit + 1);
     const double *coef = s->coef;
     int now = 0;
     thermal_heisenberg_predict(s, s->x);
@@ -1168,11 +888,9 @@ static thermal_heisenberg_status thermal_heisenberg_stages(thermal_heisenberg_so
         status = thermal_heisenberg_newton(s, coef, range, &now);
     }
     if (status != thermal_heisenberg_OK) return status;
-    thermal_heisenberg_PARALLEL
-    {
-        size_t first, end = thermal_heisenberg_share(units, &first);
-        thermal_heisenberg_increment_rows(s, coef, far, now, first, end);
-    }
+    thermal_heisenberg_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit)
+        thermal_heisenberg_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
     return thermal_heisenberg_all_hold(s, s->x) ? thermal_heisenberg_OK : thermal_heisenberg_NOT_FINITE;
 }
 

@@ -2,7 +2,7 @@
  * thermal_heisenberg.h: the declarations; thermal_heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9634e8ae451ecc935c20633b8766dd9bb067fcb671bdf96c891382bd4bbbf8dd
+ * body-sha256: e3ee8836661a107b4ba6b00d257d5110634c50d0bbf2129a3c3b4a3a5c37231b
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -46,8 +46,8 @@ typedef struct {
     double *x[thermal_heisenberg_ARRAYS];
     ptrdiff_t *lines;                       /* of each row, where it is and where those beside it are */
     double *before[thermal_heisenberg_DIM]; /* the fields before the steps that are being made */
-    /* the middle of a stage, before and after a sweep, with the parameters at sites */
-    double *y[2][thermal_heisenberg_ARRAYS];
+    /* the middle of a stage, before and after a sweep, and varied; with the parameters at sites */
+    double *y[3][thermal_heisenberg_ARRAYS];
     size_t sweeps;                        /* that stages took since thermal_heisenberg_init */
     int stiff;                            /* whether sweeps have failed */
     double usual[thermal_heisenberg_DIM]; /* the sizes of the fields of y */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b5e748198bb523dee83a42a1e36d0e2297e21ec54744e0a83e310b00c62fc0f1
+ * body-sha256: 3795f9852211c6757d14a7a08d13121ec2275eaadbb8313c64fab641401e0a30
  */
 #include "toda.h"
 #include <float.h>
@@ -327,8 +327,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
-    double *end = aligned - toda_LEAD + toda_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - toda_LEAD + toda_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < toda_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < toda_DIM; ++k) s->before[k] = aligned + (toda_ARRAYS + k) * block;

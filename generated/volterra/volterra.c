@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3cd97ebc01c73e4ecb5f7b77b0e2c2fb450e0bb5d7dc0b7fe214e4743fc5d31f
+ * body-sha256: c27f867e46346761cfdad137d9a00bcf2a7899d74e17c4b73f24c27f97db6d07
  */
 #include "volterra.h"
 #include <float.h>
@@ -338,8 +338,7 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
     const size_t block = volterra_block(rows, width);
-    double *end = aligned - volterra_LEAD + volterra_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - volterra_LEAD + volterra_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < volterra_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < volterra_DIM; ++k) s->before[k] = aligned + (volterra_ARRAYS + k) * block;

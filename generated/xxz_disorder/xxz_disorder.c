@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c904ebc1ede422a55cc9a63d4db0a22cb34c326405c5fe38632e7d40b9f21788
+ * body-sha256: e34b868d23586c17280d91db7418ae6b5d5d47e0cbba6525d70c9cf3f4324de2
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -388,8 +388,7 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
     const size_t block = xxz_disorder_block(rows, width);
-    double *end = aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block;
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block);
     s->lines[0] = 0;
     for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) s->before[k] = aligned + (xxz_disorder_ARRAYS + k) * block;

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
+from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
 from phigen.symbolic.entire import ENTIRE
@@ -26,9 +27,10 @@ _CLOSED = (
 )
 
 
-def used(program: Program) -> list[str]:
-    """The functions of `SPECIAL` that the kernels call, in order."""
-    ops = {e.op for e in topological([e for kernel in program.kernels for e in kernel.roots])}
+def used(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
+    """The functions of `SPECIAL` that the kernels call, in order, but those that are ``unprinted``."""
+    kernels = [kernel for kernel in program.kernels if kernel not in unprinted]
+    ops = {e.op for e in topological([e for kernel in kernels for e in kernel.roots])}
     return [name for name in SPECIAL if name in ops]
 
 

@@ -128,6 +128,13 @@ def test_cotangents_go_back_through_such_steps(name: str, sizes: tuple[int, ...]
     )
 
 
+def test_short_code_follows_sweeps_by_differences_and_solves_stages_to_round_off_too() -> None:
+    x, compilation = start("sheet", (9, 8)), compiled("sheet")
+    short = lattice_solver_of(compile_spec(compilation.spec, profile="small"), "c")
+    reference = lattice_solver_of(compilation, "numpy").integrate(x, 0.2, 5, 5).x[-1]
+    np.testing.assert_allclose(short.integrate(x, 0.2, 5, 5).x[-1], reference, rtol=0, atol=1e-13)
+
+
 @pytest.mark.parametrize("target", ["numpy", "c"])
 @pytest.mark.parametrize("profile", ["fast", "small"])
 def test_equations_without_a_solution_are_told(target: str, profile: str) -> None:

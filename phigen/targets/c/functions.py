@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from fractions import Fraction
 
 from phigen.lanes.functions import NEAR_FUNCTIONS
+from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
 from phigen.symbolic.economised import economised
@@ -52,16 +53,16 @@ _SMALL = {
 }
 
 
-def called(program: Program) -> list[str]:
-    """The functions of phigen's own that kernels call: φ and its derivatives, those of `ENTIRE`, and for a splitting
-    those that its flows call."""
+def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
+    """The functions of phigen's own that kernels call, but those ``unprinted``: φ and its derivatives, `ENTIRE`,
+    and for a splitting those that its flows call."""
     step = program.step
     flows = (
         (*step.flows, *step.tangents, *step.transposed) if isinstance(step, Splitting) else ()
     )  # loops over sites have their own
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
-    phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program)]
+    phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program, unprinted)]
     polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []
     return [*polynomial, *phis, *(render("c", "small.c", _values(program, f)) for f in small)]
 

@@ -15,6 +15,21 @@
 #endif
 
 /* ---- The lattice ---- */
+#if PHI_SERIES
+/* Before a loop over pieces: they are worked at in parallel. */
+#ifdef _OPENMP
+#if PHI_PAIRS
+#define PHI_EACH_PIECE _Pragma("omp parallel for if (s->sites > 512)")
+#else
+#define PHI_EACH_PIECE _Pragma("omp parallel for if (s->sites > 4096)")
+#endif
+#define PHI_ONE_BY_ONE _Pragma("omp critical")
+#else
+#define PHI_EACH_PIECE
+#define PHI_ONE_BY_ONE
+#endif
+
+#endif
 #if PHI_SHARED
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
@@ -26,16 +41,10 @@ int omp_get_thread_num(void);
 #endif
 #define PHI_THREADS (size_t)omp_get_num_threads()
 #define PHI_THREAD (size_t)omp_get_thread_num()
-#if PHI_SERIES
-#define PHI_ONE_BY_ONE _Pragma("omp critical")
-#endif
 #else
 #define PHI_PARALLEL
 #define PHI_THREADS (size_t)1
 #define PHI_THREAD (size_t)0
-#if PHI_SERIES
-#define PHI_ONE_BY_ONE
-#endif
 #endif
 
 /* The part of so many units that a thread works at, from *first on; returns its end. */
@@ -46,7 +55,6 @@ static size_t phi_share(size_t units, size_t *first)
     return *first + each + (own < more);
 }
 
-#if !PHI_SERIES || PHI_ADJOINT
 /* Until all threads are here. */
 static void phi_wait(void)
 {
@@ -58,9 +66,14 @@ static void phi_wait(void)
 }
 
 #endif
-#endif
 enum {
-#if !PHI_SERIES
+#if PHI_SERIES
+#if PHI_SLOPES
+    PHI_SIDES = 2, /* y before and after a sweep */
+#else
+    PHI_SIDES = 3, /* y before and after a sweep, and varied */
+#endif
+#else
     PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
 #if PHI_NEAR
     PHI_FAR_STEPS = 64, /* steps by functions for large arguments, after one that needed them */
@@ -69,7 +82,7 @@ enum {
     PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
     PHI_BUFFER = 256,
 #if PHI_SERIES
-    PHI_IMPLICIT = (2 /* arrays for y, its guesses and its variations */
+    PHI_IMPLICIT = (PHI_SIDES /* arrays for y, its guesses and its variations */
 #if PHI_GUESSES
         + PHI_STAGES * PHI_DIFFERENCES
 #endif
@@ -82,7 +95,11 @@ enum {
         + PHI_DIM + 1
 #endif
 #endif
-        ) * PHI_DIM,
+        ) * PHI_DIM
+#if PHI_KRYLOV
+        + 1 /* for sums over pieces */
+#endif
+        ,
 #endif
     PHI_RESERVED = PHI_ARRAYS + PHI_DIM
 #if PHI_COMPENSATED
@@ -134,19 +151,6 @@ static size_t phi_block(size_t rows, ptrdiff_t width)
 static size_t phi_block(size_t rows, ptrdiff_t width) { return rows * (size_t)width; }
 #endif
 
-#if PHI_KRYLOV
-/* The doubles of sums over what is worked at in one go. */
-static size_t phi_sums(size_t rows, size_t length)
-{
-#if PHI_ONE_ROW
-    return rows * (length / PHI_PIECE + 1) * (PHI_DIRECTIONS + 1);
-#else
-    (void)length;
-    return rows * (PHI_DIRECTIONS + 1);
-#endif
-}
-
-#endif
 #if PHI_GRAPH
 size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds)
 #else
@@ -161,9 +165,6 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
     if (rows == 0) return 0;
 #endif
     size_t doubles = PHI_RESERVED * phi_block(rows, width);
-#if PHI_KRYLOV
-    doubles += phi_sums(rows, sizes[PHI_AXES - 1]);
-#endif
 #if PHI_BANDED
     phi_matrix matrix;
     doubles += phi_matrix_of(sizes[0], NULL, &matrix);
@@ -230,12 +231,12 @@ static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_L
 static void phi_place_middle(phi_solver *s, double *memory, size_t block)
 {
     for (int k = 0; k < PHI_ARRAYS; ++k)
-        for (int side = 0; side < 2; ++side)
-            s->y[side][k] = k < PHI_DIM ? memory + (size_t)(2 * k + side) * block : s->x[k];
+        for (int side = 0; side < PHI_SIDES; ++side)
+            s->y[side][k] = k < PHI_DIM ? memory + (size_t)(PHI_SIDES * k + side) * block : s->x[k];
 #if PHI_ADJOINT
     memcpy(s->y[2], s->x, sizeof s->x);
 #endif
-    memory += 2 * PHI_DIM * block;
+    memory += PHI_SIDES * PHI_DIM * block;
 #if PHI_GUESSES
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         for (int d = 0; d < PHI_DIFFERENCES; ++d)
@@ -251,6 +252,7 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
 #if PHI_KRYLOV
     for (int d = 0; d <= PHI_DIRECTIONS; ++d)
         for (int k = 0; k < PHI_DIM; ++k, memory += block) s->space[d][k] = memory;
+    s->sums = memory;
 #endif
 }
 
@@ -348,12 +350,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
     const size_t block = phi_block(rows, width);
-    double *end = aligned - PHI_LEAD + PHI_RESERVED * block;
-#if PHI_KRYLOV
-    s->sums = end;
-    end += phi_sums(rows, length);
-#endif
-    s->lines = (ptrdiff_t *)(void *)end;
+    s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + PHI_RESERVED * block);
 #if PHI_ONE_ROW
     s->lines[0] = 0;
 #else

@@ -36,11 +36,7 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept, 
 #endif
         memset(side[f] - PHI_LEAD, 0, g->block * sizeof **side);
     }
-    PHI_PARALLEL
-    {
-        size_t first, end = phi_share(phi_units(s), &first);
-        phi_pull_rows(s, PHI_ADVANCE_BACK, coef, g->bar, side, side, first, end);
-    }
+    phi_pull(s, PHI_ADVANCE_BACK, coef, g->bar, side, side);
     int now = 0;
     s->side = side;
     phi_predict(s, side, stage);
@@ -57,11 +53,7 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept, 
     phi_remember(s, side, stage, now);
 #endif
     memcpy(m, s->y[now], sizeof *m * PHI_DIM);
-    PHI_PARALLEL
-    {
-        size_t first, end = phi_share(phi_units(s), &first);
-        phi_pull_rows(s, PHI_RELAX_BACK, coef, m, g->bar, g->bar, first, end);
-    }
+    phi_pull(s, PHI_RELAX_BACK, coef, m, g->bar, g->bar);
     return PHI_OK;
 }
 

@@ -89,9 +89,9 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
         phi_ends(s->v[k], sites, 0, sites);
     }
 #if PHI_ADJOINT
-    phi_slope_rows(s, coef, 1, s->side != NULL ? 2 : now, s->v, s->y[1 - now], 0, phi_units(s));
+    phi_slope_rows(s, coef, 1, s->y[s->side != NULL ? 2 : now], s->v, s->y[1 - now], 0, phi_units(s));
 #else
-    phi_slope_rows(s, coef, 1, now, s->v, s->y[1 - now], 0, phi_units(s));
+    phi_slope_rows(s, coef, 1, s->y[now], s->v, s->y[1 - now], 0, phi_units(s));
 #endif
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {

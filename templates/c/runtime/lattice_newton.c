@@ -41,7 +41,7 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
     phi_eliminate(s, now);
 #else
     if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
-    phi_subtract(s, NULL, now, s->y[now], s->y[1 - now], s->space[0]);
+    phi_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
 #if PHI_SITE_BLOCKS
     phi_invert_blocks(s, coef, now);
 #endif
@@ -83,34 +83,26 @@ static phi_status phi_newton(phi_solver *s, const double *coef, double range, in
 /* A tangent vector after a stage whose y is s->y[now]: dy = (what a sweep does to dy) + side is solved, and moves it. */
 static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
 {
-    double *v[PHI_DIM], *side[PHI_DIM], *dy[PHI_DIM], *rest[PHI_DIM], size, before = HUGE_VAL;
+    const size_t units = phi_units(s);
+    double *v[PHI_DIM], *side[PHI_DIM], *dy[PHI_DIM], before = HUGE_VAL;
     phi_vector(s, number, v);
     phi_vector(s, s->vectors, side);
     phi_vector(s, s->vectors + 1, dy);
-    memcpy(rest, s->y[1 - now], sizeof rest);
-    PHI_PARALLEL
-    {
-        size_t first, end = phi_share(phi_units(s), &first);
-        phi_side_rows(s, coef, 1, now, v, side, first, end);
-    }
+    PHI_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) phi_side_rows(s, coef, 1, s->y[now], v, side, unit, unit + 1);
 #if PHI_SITE_BLOCKS
     phi_invert_blocks(s, coef, now);
 #endif
-    phi_combine(s, dy, 1.0, side, 0, NULL);
-    phi_combine(s, s->space[0], 1.0, side, 0, NULL);
-    phi_products(s, 0, 1, s->space[0], &size);
-    size = sqrt(size);
+    const double size = sqrt(phi_product(s, side, side));
+    phi_combine(s, dy, 1.0, side, 0.0, side);
     for (int correction = 0; correction < PHI_MOST_ITERATIONS; ++correction) {
-        phi_subtract(s, coef, now, dy, rest, s->space[0]);
-        phi_subtract(s, NULL, now, s->space[0], side, s->space[0]);
+        phi_multiply(s, coef, now, dy, s->space[0]);
+        phi_combine(s, s->space[0], 1.0, s->space[0], -1.0, side);
         const double left = phi_krylov(s, coef, now, dy, dy);
         if (!isfinite(left)) return PHI_NO_CONVERGENCE;
         if (left <= 0x1p-54 * size || (left > 0.5 * before && left <= PHI_CARRIED * size)) {
-            PHI_PARALLEL
-            {
-                size_t first, end = phi_share(phi_units(s), &first);
-                phi_follow_rows(s, coef, 1, now, dy, v, first, end);
-            }
+            PHI_EACH_PIECE
+            for (size_t unit = 0; unit < units; ++unit) phi_follow_rows(s, coef, 1, s->y[now], dy, v, unit, unit + 1);
             return PHI_OK;
         }
         before = left;

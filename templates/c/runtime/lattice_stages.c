@@ -11,9 +11,50 @@
 #endif
 
 /* ---- The stages ---- */
-static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b; }
+enum { PHI_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
+
+static inline void phi_raise(double *largest, double value) { *largest = value > *largest ? value : *largest; }
+
+/* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no number is left out. */
+static void phi_measure(const phi_solver *s, int now, size_t unit, double *change, double *size)
+{
+    const phi_piece at = phi_piece_of(s, unit);
+    const ptrdiff_t whole = at.to - (at.to - at.from) % PHI_WIDTH;
+    for (int k = 0; k < PHI_DIM; ++k) {
+        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after = s->y[1 - now][k] + at.row.at[0];
+        double changes[PHI_WIDTH] = { 0.0 }, sizes[PHI_WIDTH] = { 0.0 };
+        for (ptrdiff_t i = at.from; i < whole; i += PHI_WIDTH)
+            for (int l = 0; l < PHI_WIDTH; ++l) {
+                phi_raise(changes + l, fabs(after[i + l] - before[i + l]));
+                phi_raise(sizes + l, fabs(after[i + l]));
+            }
+        for (ptrdiff_t i = whole; i < at.to; ++i) {
+            phi_raise(changes, fabs(after[i] - before[i]));
+            phi_raise(sizes, fabs(after[i]));
+        }
+        for (int l = 1; l < PHI_WIDTH; ++l) {
+            phi_raise(changes, changes[l]);
+            phi_raise(sizes, sizes[l]);
+        }
+        PHI_ONE_BY_ONE
+        {
+            phi_raise(change + k, *changes);
+            phi_raise(size + k, *sizes);
+        }
+    }
+}
 
 #if PHI_ADJOINT
+/* to = from, or 0, with what v gives by the transpose of a kernel where y is s->y[2]. */
+static void phi_pull(const phi_solver *s, int kernel, const double *coef, double *const *v, double *const *from, double *const *to)
+{
+    PHI_PARALLEL
+    {
+        size_t first, end = phi_share(phi_units(s), &first);
+        phi_pull_rows(s, kernel, coef, v, from, to, first, end);
+    }
+}
+
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. Where there is
    s->side, y is the cotangent of that in s->y[2], and a sweep adds to this side the transpose of what one does there. */
 #else
@@ -22,33 +63,23 @@ static double phi_larger(double a, double b) { return isnan(a) || a > b ? a : b;
 static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 {
     const size_t units = phi_units(s);
-    phi_extent whole = { { 0.0 }, { 0.0 } };
-    PHI_PARALLEL
-    {
-        phi_extent own = { { 0.0 }, { 0.0 } };
-        size_t first, end = phi_share(units, &first);
+    double change[PHI_DIM] = { 0.0 }, size[PHI_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
 #if PHI_ADJOINT
-        if (coef != NULL && s->side != NULL) phi_pull_rows(s, PHI_SLOPE_BACK, coef, s->y[now], s->side, s->y[1 - now], first, end);
-        const int measured = coef != NULL && s->side == NULL;
-#else
-        const int measured = coef != NULL;
-#endif
-        if (measured) phi_relax_rows(s, coef, far, now, &own, first, end);
-        for (size_t unit = first; !measured && unit < end; ++unit) {
-            const phi_piece at = phi_piece_of(s, unit);
-            phi_measure(s->y[now], s->y[1 - now], &at, &own);
-        }
-        PHI_ONE_BY_ONE
-        for (int k = 0; k < PHI_DIM; ++k) {
-            whole.change[k] = phi_larger(whole.change[k], own.change[k]);
-            whole.size[k] = phi_larger(whole.size[k], own.size[k]);
-        }
+    if (coef != NULL && s->side != NULL) {
+        phi_pull(s, PHI_SLOPE_BACK, coef, s->y[now], s->side, s->y[1 - now]);
+        coef = NULL;
     }
-    double largest = 0.0, moved = 0.0;
-    for (int k = 0; k < PHI_DIM; ++k) largest = phi_larger(largest, whole.size[k]);
+#endif
+    PHI_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        if (coef != NULL) phi_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        phi_measure(s, now, unit, change, size);
+    }
+    for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
     for (int k = 0; k < PHI_DIM; ++k) {
-        s->usual[k] = whole.size[k] + 1e-3 * largest + 1e-300;
-        moved = phi_larger(moved, whole.change[k] / s->usual[k]);
+        s->usual[k] = size[k] + 1e-3 * largest + 1e-300;
+        change[k] /= s->usual[k]; /* no number where both are infinite */
+        moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
     return moved;
 }
@@ -87,19 +118,16 @@ static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *no
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
 static void phi_predict(const phi_solver *s, double *const *x, int stage)
 {
-    PHI_PARALLEL
-    {
-        size_t row, rows = phi_share(s->rows, &row);
-        for (int k = 0; k < PHI_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
-                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
-                for (int d = 0; d < s->guess[stage].order; ++d) {
-                    const double *difference = s->guess[stage].difference[d][k];
-                    for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
-                }
+    PHI_EACH_PIECE
+    for (size_t r = 0; r < s->rows; ++r)
+        for (int k = 0; k < PHI_DIM; ++k) {
+            const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+            for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
+            for (int d = 0; d < s->guess[stage].order; ++d) {
+                const double *difference = s->guess[stage].difference[d][k];
+                for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
             }
-    }
+        }
 }
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
@@ -107,27 +135,25 @@ static void phi_remember(phi_solver *s, double *const *from, int stage, int now)
 {
     phi_guess *guess = &s->guess[stage];
     double size[PHI_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
-    PHI_PARALLEL
-    {
-        size_t row, rows = phi_share(s->rows, &row);
+    PHI_EACH_PIECE
+    for (size_t r = 0; r < s->rows; ++r) {
         double own[PHI_DIFFERENCES] = { 0.0 };
-        for (int k = 0; k < PHI_DIM; ++k)
-            for (size_t r = row; r < rows; ++r) {
-                const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
-                const double *restrict y = s->y[now][k], *restrict x = from[k];
-                for (ptrdiff_t i = first; i < end; ++i) {
-                    double next = y[i] - x[i];
-                    for (int d = 0; d < guess->count; ++d) {
-                        const double last = guess->difference[d][k][i];
-                        guess->difference[d][k][i] = next;
-                        next -= last;
-                        own[d] = fabs(next) > own[d] ? fabs(next) : own[d];
-                    }
-                    if (guess->count < PHI_DIFFERENCES) guess->difference[guess->count][k][i] = next;
+        for (int k = 0; k < PHI_DIM; ++k) {
+            const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+            const double *restrict y = s->y[now][k], *restrict x = from[k];
+            for (ptrdiff_t i = first; i < end; ++i) {
+                double next = y[i] - x[i];
+                for (int d = 0; d < guess->count; ++d) {
+                    const double last = guess->difference[d][k][i];
+                    guess->difference[d][k][i] = next;
+                    next -= last;
+                    phi_raise(own + d, fabs(next));
                 }
+                if (guess->count < PHI_DIFFERENCES) guess->difference[guess->count][k][i] = next;
             }
+        }
         PHI_ONE_BY_ONE
-        for (int d = 0; d < PHI_DIFFERENCES; ++d) size[d] = phi_larger(size[d], own[d]);
+        for (int d = 0; d < PHI_DIFFERENCES; ++d) phi_raise(size + d, own[d]);
     }
     guess->order = 1;
     for (int d = 0; d < guess->count; ++d)
@@ -155,25 +181,22 @@ static void phi_forget(phi_solver *s)
 /* Keep the y of a stage, and x where its transpose reads that; returns where the next are kept. */
 static double *phi_keep_stage(const phi_solver *s, int now, double *to)
 {
-    const size_t block = phi_block(s->rows, s->width);
+    const size_t block = phi_block(s->rows, s->width), units = phi_units(s);
 #if PHI_STARTS
     double *const *const kept[] = { s->y[now], s->x };
 #else
     double *const *const kept[] = { s->y[now] };
 #endif
-    PHI_PARALLEL
-    {
-        size_t unit, end = phi_share(phi_units(s), &unit);
-        for (; unit < end; ++unit) {
-            const phi_piece at = phi_piece_of(s, unit);
-            for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k) {
-                double *row = to + k * block + PHI_LEAD + at.row.at[0];
-                const double *from = kept[k / PHI_DIM][k % PHI_DIM] + at.row.at[0];
-                memcpy(row + at.from, from + at.from, (size_t)(at.to - at.from) * sizeof *row);
+    PHI_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) {
+        const phi_piece at = phi_piece_of(s, unit);
+        for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k) {
+            double *row = to + k * block + PHI_LEAD + at.row.at[0];
+            const double *from = kept[k / PHI_DIM][k % PHI_DIM] + at.row.at[0];
+            memcpy(row + at.from, from + at.from, (size_t)(at.to - at.from) * sizeof *row);
 #if PHI_HALO
-                phi_ends(row, s->length, at.from, at.to);
+            phi_ends(row, s->length, at.from, at.to);
 #endif
-            }
         }
     }
     return to + PHI_KEPT * PHI_DIM * block;
@@ -188,11 +211,8 @@ static phi_status phi_stages(phi_solver *s, int far)
     double *kept = s->kept;
 #endif
 #if PHI_NOISE
-    PHI_PARALLEL
-    {
-        size_t first, end = phi_share(units, &first);
-        phi_draw_rows(s, s->steps, 0, first, end);
-    }
+    PHI_EACH_PIECE
+    for (size_t unit = 0; unit < units; ++unit) phi_draw_rows(s, s->steps, 0, unit, unit + 1);
 #endif
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
 #if PHI_RENEWED
@@ -226,11 +246,8 @@ static phi_status phi_stages(phi_solver *s, int far)
 #if PHI_GUESSES
         phi_remember(s, s->x, stage, now);
 #endif
-        PHI_PARALLEL
-        {
-            size_t first, end = phi_share(units, &first);
-            phi_increment_rows(s, coef, far, now, first, end);
-        }
+        PHI_EACH_PIECE
+        for (size_t unit = 0; unit < units; ++unit) phi_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
     }
     return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }

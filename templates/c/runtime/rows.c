@@ -212,40 +212,6 @@ static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
 #endif
     return piece;
 }
-
-#if PHI_SERIES
-/* The largest change of y and the largest y, of each field; what is no number is left out. */
-typedef struct {
-    double change[PHI_DIM], size[PHI_DIM];
-} phi_extent;
-
-enum { PHI_WIDTH = 32 }; /* largest values that are kept apart, so that loops vectorise */
-
-/* Takes in what fields were and are in a piece. */
-static inline void phi_measure(double *const *was, double *const *is, const phi_piece *at, phi_extent *extent)
-{
-    for (int k = 0; k < PHI_DIM; ++k) {
-        const double *restrict before = was[k] + at->row.at[0], *restrict after = is[k] + at->row.at[0];
-        double change[PHI_WIDTH] = { 0.0 }, size[PHI_WIDTH] = { 0.0 };
-        const ptrdiff_t whole = at->to - (at->to - at->from) % PHI_WIDTH;
-        for (ptrdiff_t i = at->from; i < whole; i += PHI_WIDTH)
-            for (int l = 0; l < PHI_WIDTH; ++l) {
-                const double value = fabs(after[i + l]), moved = fabs(after[i + l] - before[i + l]);
-                change[l] = moved > change[l] ? moved : change[l];
-                size[l] = value > size[l] ? value : size[l];
-            }
-        for (ptrdiff_t i = whole; i < at->to; ++i) {
-            const double value = fabs(after[i]), moved = fabs(after[i] - before[i]);
-            change[0] = moved > change[0] ? moved : change[0];
-            size[0] = value > size[0] ? value : size[0];
-        }
-        for (int l = 0; l < PHI_WIDTH; ++l) {
-            extent->change[k] = change[l] > extent->change[k] ? change[l] : extent->change[k];
-            extent->size[k] = size[l] > extent->size[k] ? size[l] : extent->size[k];
-        }
-    }
-}
-#endif
 #if PHI_BANDED
 
 /* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what couples the

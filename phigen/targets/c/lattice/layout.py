@@ -137,8 +137,9 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BY_HAND": step.is_by_hand and program.offers("by-hand") and not program.compensated,
         "WAVES": waves(program, step),
         "COMPENSATED": program.compensated,
-        "SHARED": program.profile == "fast"
-        or bool(step.equation or step.adjoint or program.extras.tangent or program.noise),
+        "SLOPES": program.profile == "fast" or program.extras.tangent or banded or step.adjoint is not None,
+        "SHARED": bool(step.adjoint)
+        or (step.equation is None and (program.profile == "fast" or bool(program.extras.tangent or program.noise))),
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }

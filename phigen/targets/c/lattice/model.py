@@ -23,12 +23,11 @@ def declarations(program: Program, step: Sweeps) -> str:
         ("COEFFICIENTS", max(1, step.row * rows_of(step)), "numbers that depend on params and h only"),
     ]
     if step.equation:
-        stages = len(program.fractions)
+        stages, has = len(program.fractions), switches(program, step, layout)
         sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
         kept = max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // stages))
-        sizes += [("DIRECTIONS", DIRECTIONS, "of a Krylov space")] if switches(program, step, layout)["KRYLOV"] else []
-        guesses = switches(program, step, layout)["GUESSES"]
-        sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if guesses else []
+        sizes += [("DIRECTIONS", DIRECTIONS, "of a Krylov space")] if has["KRYLOV"] else []
+        sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if has["GUESSES"] else []
     if step.partners:
         every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
         swept = [sweep.gather for sweep in every if sweep.gather]

@@ -32,8 +32,9 @@ from phigen.targets.rendering import render
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
     layout, name, member = layout_of(program, step), program.name, members(program)
+    followed = switches(program, step, layout)["SLOPES"]
     found = [
-        *functions.called(program),
+        *functions.called(program, [step.equation.slope] if step.equation and not followed else ()),
         *functions.phi_lanes(program, set(rows.near)),
     ]
     found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
@@ -49,7 +50,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         found += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
         )
-    for kernel in (step.equation.slope, *step.equation.tangents) if step.equation else ():
+    for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and followed else ():
         found += _of_equation(program, layout, kernel, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field) if k.roots]
     sites = [p for p in program.parameters if p.at == "sites"]
@@ -276,29 +277,25 @@ def _of_equation(
         ]
         yield from (loop.text(program) for loop in loops)
         lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in calls_over_sites(loops)]
-    out = "s->x" if moves else "to" if varied else "s->block" if kernel.name == BLOCK else "s->y[1 - now]"
     reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = v;"] * varied
     titles = {
-        "relax": "A sweep, from s->y[now] to the other",
+        "relax": "A sweep",
         "increment": "The end of a stage",
-        "slope": "How a sweep follows s->y[now] along v",
-        BLOCK: "How a sweep follows s->y[now] at the site itself",
+        "slope": "How a sweep follows y along v",
+        BLOCK: "How a sweep follows y at the site itself",
         "side": "How a sweep follows x along v",
-        "follow": "How the end of a stage follows s->y[now] along v, added",
+        "follow": "How the end of a stage follows y along v, added",
     }
     changed = relaxing or moves or kernel.name == "follow"
-    ends = _copied_ends(program, layout, range(program.dimension), out) if changed else []
-    measured = [f"{name}_measure(s->y[now], s->y[1 - now], &at, extent);"] if relaxing else []
-    setup = ["at.row.x = s->y[now];", *reads, f"at.row.out = {out};"]
+    ends = _copied_ends(program, layout, range(program.dimension), "to") if changed else []
+    setup = ["at.row.x = y;", *reads, "at.row.out = to;"]
     yield over_rows(
         program,
         layout,
-        [Case([*gathered, *_either(lines), *ends, *measured], setup, has_ends(program, [kernel]))],
+        [Case([*gathered, *_either(lines), *ends], setup, has_ends(program, [kernel]))],
         title=titles[kernel.name],
         head=f"{kernel.name}_rows",
-        arguments="const double *coef, int far, int now"
-        + f", {name}_extent *extent" * relaxing
-        + ", double *const *v, double *const *to" * varied,
+        arguments=f"const double *coef, int far, double *const *y, {'double *const *v, ' * varied}double *const *to",
         unused=["far"] * (len(forms) == 1),
     )
 
