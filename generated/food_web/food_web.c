@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6be22c3d509dcc34615acc39f6f7272203c8bc340c606b1067ec07921b4ae2c4
+ * body-sha256: 9766de5f6c7a40ba0af404b0b903be0ba5a1bdec223837d797c71a32ac3cc7d4
  */
 #include "food_web.h"
 #include <float.h>
@@ -175,39 +175,21 @@ static inline double food_web_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* what all other sites b add to the forces of H_1 at a site a, by bonds that begin there */
-static inline void food_web_gather1_a(const double *coef, const food_web_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+/* what all other sites b add to the forces of H_1 at a site a */
+static inline void food_web_gather1(const double *coef, const food_web_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     (void)coef;
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->middle[i]; ++k) {
+        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             if (row->colours[row->other[k]] != row->chosen) continue;
             const ptrdiff_t j = row->other[k];
-            const double k_b_ = k_row[j], x_b_ = x_row[j], A = row->at_bonds[0][k];
+            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
             sum0 += A * x_b_ * (1.0 - k_b_ / x_b_);
         }
         row->gathered[0][i] = sum0;
-    }
-}
-
-/* what all other sites b add to the forces of H_1 at a site a, by bonds that end there */
-static inline void food_web_gather1_b(const double *coef, const food_web_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    (void)coef;
-    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
-            if (row->colours[row->other[k]] != row->chosen) continue;
-            const ptrdiff_t j = row->other[k];
-            const double k_b_ = k_row[j], x_b_ = x_row[j], A = row->at_bonds[0][k];
-            sum0 += A * x_b_ * (-1.0 + k_b_ / x_b_);
-        }
-        row->gathered[0][i] += sum0;
     }
 }
 
@@ -233,14 +215,13 @@ static void food_web_sweep_rows(const food_web_solver *s, int flow, const double
     for (size_t unit = first; unit < end; ++unit) {
         food_web_piece at = food_web_piece_of(s, unit);
         at.row.chosen = colour;
-        food_web_gather1_a(coef, &at.row, at.from, at.to);
-        food_web_gather1_b(coef, &at.row, at.from, at.to);
+        food_web_gather1(coef, &at.row, at.from, at.to);
         food_web_sweep1(coef, &at.row, at.from, at.to);
     }
 }
 
-/* what a site b adds to the forces at a site a, by bonds that begin there */
-static inline void food_web_bond_forces_a(const food_web_params *params, const food_web_row *row,
+/* what a site b adds to the forces at a site a */
+static inline void food_web_bond_forces(const food_web_params *params, const food_web_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
     (void)params;
@@ -248,30 +229,13 @@ static inline void food_web_bond_forces_a(const food_web_params *params, const f
     for (ptrdiff_t i = from; i < to; ++i) {
         const double x_a_ = x_row[i];
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->middle[i]; ++k) {
+        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double k_b_ = k_row[j], x_b_ = x_row[j], A = row->at_bonds[0][k];
+            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
             sum0 += x_b_ * (A * x_a_) * (1.0 - k_b_ / x_b_);
         }
         row->gathered[0][i] = sum0;
-    }
-}
-
-/* what a site b adds to the forces at a site a, by bonds that end there */
-static inline void food_web_bond_forces_b(const food_web_params *params, const food_web_row *row,
-    ptrdiff_t from, ptrdiff_t to)
-{
-    (void)params;
-    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double x_a_ = x_row[i];
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->middle[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double k_b_ = k_row[j], x_b_ = x_row[j], A = row->at_bonds[0][k];
-            sum0 += -(x_a_ * (A * x_b_) * (1.0 - k_b_ / x_b_));
-        }
-        row->gathered[0][i] += sum0;
     }
 }
 
@@ -293,8 +257,7 @@ static void food_web_vector_field_row(const food_web_params *params, const food_
     ptrdiff_t to, double *restrict out, size_t apart)
 {
     (void)apart;
-    food_web_bond_forces_a(params, row, from, to);
-    food_web_bond_forces_b(params, row, from, to);
+    food_web_bond_forces(params, row, from, to);
     food_web_EACH_SITE
     for (ptrdiff_t i = from; i < to; ++i) {
         out[i - from] = row->gathered[0][i];

@@ -1,8 +1,10 @@
 """Parts of H on a graph: forces and motions are sums over the bonds that meet at a site.
 
 Where a bond couples what a term needs unchanged at both of its ends, or a term mixes what does not commute, sites are
-coloured when the bonds are known, so that no bond connects two of one colour. Such a part is that of one colour, the
-sum of its terms that begin at sites of the colour, and the flows of all colours follow one another.
+coloured when the bonds are known, so that no bond connects two of one colour. Such a part is that of one colour: the
+sum of its terms over the bonds that begin at sites of the colour or, for some terms, end there. The flows of all
+colours follow one another. What a term is at the other end may be another one seen from here, as x[a]*y[b] and
+y[a]*x[b] are of a cross product: they are one part, where each is taken at the end that makes them commute.
 """
 
 from __future__ import annotations
@@ -31,15 +33,17 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 
 #: Where coordinates of a part are: at any site; at those of its colour; at those of other colours.
 ANYWHERE, INSIDE, OUTSIDE = 0, 1, 2
-#: Parts of all sites, and of those of one colour.
-WHOLE, ONE_COLOUR = 0, 1
+#: Terms of all sites, and of those of one colour, where bonds begin or where they end.
+WHOLE, BEGINS, ENDS_THERE = 0, 1, 2
+#: The end of a bond that has the colour.
+_CHOSEN_END = {BEGINS: "a", ENDS_THERE: "b"}
 
 _OTHER = {"a": "b", "b": "a"}
 
 
 @dataclass
 class GraphSearch(PartSearch):
-    """The search for parts on a graph: terms have in place of a colour `WHOLE` or `ONE_COLOUR`."""
+    """The search for parts on a graph: terms have in place of a colour `WHOLE`, `BEGINS` or `ENDS_THERE`."""
 
     _along_bonds: set[tuple[str, str]] = field(default_factory=set)
 
@@ -53,19 +57,28 @@ class GraphSearch(PartSearch):
     # --- what commutes
 
     def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
-        for kind in (WHOLE, ONE_COLOUR):
+        for kind in (WHOLE, self._end_of(term)):
             if self._commute((term, kind), (term, kind)):
                 return [(term, kind)]
             if self._is_own(term):
                 break
         return []
 
+    def _end_of(self, term: Summand) -> int:
+        """The end of a bond that is to have the colour: another one for a term with its ends swapped."""
+        listed = self.cell.places(term.expression).values()
+        at = {end: sorted(f for f, o in listed if o == (end,) and f in self.cell.fields) for end in ENDS}
+        return ENDS_THERE if at["b"] > at["a"] else BEGINS
+
     def _commute(self, a: tuple[Summand, int], b: tuple[Summand, int]) -> bool:
-        return a[1] == b[1] and super()._commute(a, b)
+        return (a[1] == WHOLE) == (b[1] == WHOLE) and super()._commute(a, b)
 
     def _support(self, term: tuple[Summand, int]) -> list[Coordinate]:
         summand, kind = term
-        where: dict[Offset, int] = {(): INSIDE, ("a",): INSIDE, ("b",): OUTSIDE} if kind == ONE_COLOUR else {}
+        where: dict[Offset, int] = {}
+        if kind != WHOLE:
+            end = _CHOSEN_END[kind]
+            where = {(): INSIDE, (end,): INSIDE, (_OTHER[end],): OUTSIDE}
         places = self.cell.places(summand.expression).values()
         return sorted({(f, where.get(o, ANYWHERE)) for f, o in places if f in self.cell.fields})
 
@@ -80,14 +93,14 @@ class GraphSearch(PartSearch):
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
         """The flow of a sum of terms that commute."""
-        return replace(super().flow(part, more), by_colour=part[0][1] == ONE_COLOUR)
+        return replace(super().flow(part, more), by_colour=part[0][1] != WHOLE)
 
     def _motions(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
     ) -> Iterator[SiteMotion]:
         terms = [s for s, _ in part]
-        places = (INSIDE, OUTSIDE) if part[0][1] == ONE_COLOUR else (ANYWHERE,)
-        found = {place: _Motion(self.cell, terms, place) for place in places}
+        places = (ANYWHERE,) if part[0][1] == WHOLE else (INSIDE, OUTSIDE)
+        found = {place: _Motion(self.cell, part, place) for place in places}
         for place, motion in found.items():
             across = {INSIDE: OUTSIDE, OUTSIDE: INSIDE}.get(place, place)
             moving = {"a": motion.rates.keys(), "b": found[across].rates.keys()}
@@ -102,7 +115,7 @@ class _Motion:
     """How a site moves in a part: ``rates`` with symbols for the ``forces``, which read sums that are ``gathered``."""
 
     cell: Cell
-    terms: Sequence[Summand]
+    part: Sequence[tuple[Summand, int]]
     place: int
     rates: dict[str, Expression] = field(default_factory=dict)
     forces: dict[str, Expression] = field(default_factory=dict)
@@ -110,7 +123,7 @@ class _Motion:
 
     def __post_init__(self) -> None:
         rates: dict[str, list[Expression]] = {}
-        sums, sites = self._bond_forces(), [s for s in self.terms if not s.bond]
+        sums, sites = self._bond_forces(), [s for s, _ in self.part if not s.bond]
         for (f, g), entry in self.cell.bracket.items():
             own = ZERO if self.place == OUTSIDE else gradient(total(s.expression for s in sites), [g])[0]
             if self.place == INSIDE and not own.is_zero:
@@ -129,18 +142,19 @@ class _Motion:
 
     def _bond_forces(self) -> list[BondSum]:
         """The forces of bonds: here the end that their energy has in this part."""
-        density = total(s.expression for s in self.terms if s.bond)
-        if density.is_zero:
-            return []
-        ends = {ANYWHERE: {"a": "", "b": ""}, INSIDE: {"a": "here"}, OUTSIDE: {"b": "there"}}[self.place]
-        return [BondSum(_forces_at(self.cell, density, end), end, chosen) for end, chosen in ends.items()]
+        found, chosen = [], {ANYWHERE: "", INSIDE: "here", OUTSIDE: "there"}[self.place]
+        for end in ENDS:
+            wanted = {ANYWHERE: None, INSIDE: end, OUTSIDE: _OTHER[end]}[self.place]
+            density = total(s.expression for s, kind in self.part if s.bond and _CHOSEN_END.get(kind) == wanted)
+            found += [] if density.is_zero else [BondSum(_forces_at(self.cell, density, end), end, chosen)]
+        return found
 
     def _bond_motions(self, rates: dict[str, list[Expression]]) -> list[BondSum]:
         """What brackets along bonds add to the rates: monomials of what is here, times sums of what is there."""
         chosen = "there" if self.place == OUTSIDE else ""
         values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}
         numbers: dict[tuple[str, str], Symbol] = {}
-        for f, end, rate in bond_rates(self.cell, total(s.expression for s in self.terms if not s.bond)):
+        for f, end, rate in bond_rates(self.cell, total(s.expression for s, _ in self.part if not s.bond)):
             for monomial, factor in _monomials(self.cell, rate):
                 key = (f, str(monomial))
                 if key not in numbers:

@@ -13,6 +13,7 @@ from phigen.symbolic.expression import ONE, ZERO, gradient, substitute
 from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
 from phigen.targets.c.kernels import FUNCTIONS, lane_calls
+from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.names import SiteNames, pointers
 from phigen.targets.c.layout import comment
@@ -186,8 +187,8 @@ def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     early = list[str]()
     gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
-    for own in gather.kernels if gather else ():
-        early.append(f"    {name}_{own.name}(params, row, from, to);")
+    for own, _ in over_ends(gather) if gather else ():
+        early.append(f"    {name}_{own.kernel.name}(params, row, from, to);")
     shared = " + 0.5 * row->gathered[0][i]" * bool(kernel.name == "energy" and early)
     for s in code.stores:
         place = {0: "i - from", 1: "(ptrdiff_t)apart + i - from"}.get(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
 
 from phigen.scheme.kernel import Kernel
@@ -15,7 +15,7 @@ from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "part", "far", "now"})
+_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "side", "part", "far", "now"})
 
 
 class SiteNames:
@@ -32,6 +32,7 @@ class SiteNames:
         sums: Sequence[str] = (),
         seeds: Mapping[str, Sequence[str]] = MappingProxyType({}),
         here: str = "a",
+        opposite: Set[str] = frozenset(),
     ) -> None:
         self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
@@ -76,7 +77,8 @@ class SiteNames:
             elif s in layout.step.sites.places:
                 self._bind_site(s)
             elif s in layout.step.sites.at_bonds:
-                self._other.append(f"{self.scope[s]} = row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
+                side = "side * " if s in opposite else ""
+                self._other.append(f"{self.scope[s]} = {side}row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
             else:
                 self._first.append(f"{self.scope[s]} = params->{member[s]}")
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
+from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.loops import Loop, in_loops
 from phigen.targets.c.lattice.names import SiteNames, pointers
@@ -24,10 +25,10 @@ def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> 
     calls = in_loops(program, energy=gather is layout.partners.energy)
     kind = "double" if source == "coef" else f"{program.name}_params"
     arguments = f"const {kind} *{source}, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
-    for number, ends in enumerate(gather.ends):
+    for number, (ends, opposite) in enumerate(over_ends(gather)):
         unused = [] if set(ends.kernel.inputs[source]) & lower(ends.kernel).used else [f"(void){source};"]
         if layout.graph:
-            text = _over_bonds(program, layout, ends, calls, unused, first=number == 0)
+            text = _over_bonds(program, layout, ends, calls, unused, first=number == 0, opposite=opposite)
         else:
             targets = [f"g{k}" for k in range(len(gather.names))]
             sums = pointers([("double *restrict ", f"{t} = row->gathered[{k}]") for k, t in enumerate(targets)])
@@ -52,12 +53,20 @@ def bonds_of(ends: Ends) -> tuple[str, list[str]]:
 
 
 def _over_bonds(
-    program: Program, layout: Layout, ends: Ends, calls: Mapping[str, str], begin: Sequence[str], *, first: bool
+    program: Program,
+    layout: Layout,
+    ends: Ends,
+    calls: Mapping[str, str],
+    begin: Sequence[str],
+    *,
+    first: bool,
+    opposite: Set[str],
 ) -> str:
-    """A loop over sites a, in it one over the bonds that they have to sites b."""
+    """A loop over sites a, in it one over the bonds that they have to sites b; parameters that are ``opposite`` have
+    the other sign where the site is the end of the bond."""
     kernel = ends.kernel
     code = lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), calls)
+    names = SiteNames(program, layout, kernel, code, set(), calls, opposite=opposite)
     other, own = names.of_pair()
     count = len(code.stores)
     sums = [f"double {', '.join(f'sum{k} = 0.0' for k in range(count))};"]
@@ -66,6 +75,7 @@ def _over_bonds(
     out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
     loop, passed = bonds_of(ends)
     reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
+    reads += ["const double side = k < row->middle[i] ? 1.0 : -1.0;"] * bool(opposite)
     inner = [*passed, *reads, *other, *values, *added]
     return "\n".join(
         [

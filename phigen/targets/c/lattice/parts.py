@@ -12,6 +12,7 @@ from phigen.scheme.steps import VARIED, Sweep, Sweeps
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
+from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches
 from phigen.targets.c.lattice.loops import (
     BLOCK,
@@ -267,8 +268,8 @@ def _of_equation(
     """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
     name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
     varied = kernel.name in VARIED
-    gathers = layout.gathered(kernel).kernels if kernel.inputs["gathered"] else ()
-    gathered = [f"{name}_{own.name}(&s->params, &at.row, at.from, at.to);" for own in gathers]
+    gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
+    gathered = [f"{name}_{own.kernel.name}(&s->params, &at.row, at.from, at.to);" for own, _ in gathers]
     lines = {}
     for form, calls in forms.items():
         loops = [

@@ -1,0 +1,32 @@
+"""What bonds add up at both of their ends, as one loop where it differs in the signs of parameters only."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+from phigen.scheme.steps import Ends, Gather
+from phigen.symbolic.expression import substitute, symbol
+from phigen.symbolic.verdict import PROVED, decide_zero
+
+
+def over_ends(gather: Gather) -> list[tuple[Ends, frozenset[str]]]:
+    """The loops over the bonds of a site, each with the parameters that have the opposite sign seen from the end b.
+
+    As the direction of a bond has: where what bonds add at that end is what they add at a with some signs changed,
+    which is proved, one loop is for both.
+    """
+    apart = [(e, frozenset[str]()) for e in gather.ends]
+    if len(apart) != 2 or gather.ends[0].chosen != gather.ends[1].chosen:
+        return apart
+    first, other = gather.ends
+    listed = [p for p in first.kernel.inputs.get("bonds", ()) if p in other.kernel.inputs.get("bonds", ())]
+    for opposite in (c for size in range(1, 1 + len(listed)) for c in combinations(listed, size)):
+        turned = substitute(other.kernel.roots, {p: -symbol(p) for p in opposite})
+        differences = [("", a - b) for a, b in zip(first.kernel.roots, turned, strict=True)]
+        if decide_zero("", differences).verdict == PROVED:
+            name = first.kernel.name.removesuffix(f"_{first.end}")
+            purpose = first.kernel.purpose.partition(", by bonds that ")[0]
+            kernel = replace(first.kernel, name=name, purpose=purpose)
+            return [(replace(first, kernel=kernel, end=""), frozenset(opposite))]
+    return apart
