@@ -12,9 +12,9 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
- *   once; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
- *   Ensembles
- * body-sha256: 745de8c061d3745252db4f2e455d10cf31d0db4768101a1f7336825890c6c683
+ *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
+ *   Groups of members; Ensembles
+ * body-sha256: 7ddc93e5cb9ba9dcd8ebae9ddebdec19130ea90fce190681fde8eea9fa3f2bbf
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -2640,25 +2640,40 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
 typedef struct {
     kowalevski_top_lanes y[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
         increment[kowalevski_top_DIM], residual[kowalevski_top_DIM];
+    kowalevski_top_lanes unit[kowalevski_top_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     kowalevski_top_lanes inverse[kowalevski_top_DIM * kowalevski_top_DIM],
         slope[kowalevski_top_DIM * kowalevski_top_DIM], gain[kowalevski_top_DIM * kowalevski_top_DIM];
 } kowalevski_top_model;
 
-/* kowalevski_top_size in all lanes, summed over the components. */
-static void kowalevski_top_sizes(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
-    kowalevski_top_lanes delta[restrict kowalevski_top_DIM], kowalevski_top_lanes size)
+/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
+   kowalevski_top_size. */
+static void kowalevski_top_measure(kowalevski_top_model *model)
 {
     kowalevski_top_lanes norm = { 0.0 };
-    memset(size, 0, kowalevski_top_LANES * sizeof size[0]);
     for (int i = 0; i < kowalevski_top_DIM; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-            norm[lane] = kowalevski_top_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
-                ? kowalevski_top_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            const double least = kowalevski_top_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            norm[lane] = least > norm[lane] ? least : norm[lane];
+        }
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Take a correction from y; its size, summed over the components. */
+static void kowalevski_top_take(kowalevski_top_model *model,
+    kowalevski_top_lanes delta[restrict kowalevski_top_DIM], kowalevski_top_lanes size)
+{
+    memset(size, 0, kowalevski_top_LANES * sizeof size[0]);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            model->y[i][lane] -= delta[i][lane];
+        }
     }
 }
 
@@ -2674,6 +2689,17 @@ static double kowalevski_top_largest(const kowalevski_top_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
+/* Each lane of most becomes the larger one, in the same order. */
+static void kowalevski_top_keep_largest(kowalevski_top_lanes most, const kowalevski_top_lanes size)
+{
+    uint64_t bits[kowalevski_top_LANES], bits_of_most[kowalevski_top_LANES];
+    memcpy(bits, size, sizeof bits);
+    memcpy(bits_of_most, most, sizeof bits);
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+        bits_of_most[lane] = bits[lane] > bits_of_most[lane] ? bits[lane] : bits_of_most[lane];
+    memcpy(most, bits_of_most, sizeof bits);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
 {
@@ -2685,9 +2711,7 @@ static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_l
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
                 delta[i][lane] += model->inverse[i * kowalevski_top_DIM + j][lane] * model->residual[j][lane];
         }
-    kowalevski_top_sizes(model->y, delta, size);
-    for (int i = 0; i < kowalevski_top_DIM; ++i)
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+    kowalevski_top_take(model, delta, size);
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points
@@ -2755,33 +2779,15 @@ static void kowalevski_top_linearise_stage(kowalevski_top_lanes coef[restrict], 
 static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model,
     int matrices)
 {
-    if (matrices)
+    if (matrices) {
         kowalevski_top_linearise_stage(coef, model);
-    else
+        kowalevski_top_measure(model);
+    } else {
         kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
-   foreseen. */
-typedef struct {
-    int fits; /* the fit that weight is of; -1 for none */
-    kowalevski_top_lanes coef[kowalevski_top_COEFFICIENTS], weight[kowalevski_top_WINDOW][kowalevski_top_DIM];
-} kowalevski_top_table;
-
-/* kowalevski_top_near for the guesses of all lanes, seen from one value. */
-static int kowalevski_top_near_lanes(kowalevski_top_lanes y[restrict kowalevski_top_DIM],
-    const double last[kowalevski_top_DIM])
-{
-    kowalevski_top_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < kowalevski_top_DIM; ++i) {
-        size += fabs(last[i]);
-        kowalevski_top_EACH_LANE
-        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
     }
-    return kowalevski_top_largest(distance) <= kowalevski_top_REACH * size;
 }
+
+/* ---- The residuals of a block ---- */
 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
@@ -2819,6 +2825,30 @@ static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevsk
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+}
+
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    kowalevski_top_lanes coef[kowalevski_top_COEFFICIENTS], weight[kowalevski_top_WINDOW][kowalevski_top_DIM];
+} kowalevski_top_table;
+
+/* kowalevski_top_near for the points of all stages and lanes, seen from one value. */
+static int kowalevski_top_near_lanes(kowalevski_top_model *model, const double last[kowalevski_top_DIM])
+{
+    kowalevski_top_lanes most = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < kowalevski_top_DIM; ++i) size += fabs(last[i]);
+    kowalevski_top_lanes distance = { 0.0 };
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
+            distance[lane] += fabs(model->y[i][lane] - last[i]);
+    }
+    kowalevski_top_keep_largest(most, distance);
+    return kowalevski_top_largest(most) <= kowalevski_top_REACH * size;
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
@@ -2916,7 +2946,7 @@ static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *
 {
     if (s->blocks.use_recurrences) kowalevski_top_foresee(&s->history, table->weight, model->y);
     else kowalevski_top_guess_by_runge_kutta(s, table, model);
-    return kowalevski_top_near_lanes(model->y, s->x);
+    return kowalevski_top_near_lanes(model, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -2932,7 +2962,7 @@ static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_model model;
-    kowalevski_top_lanes sizes;
+    kowalevski_top_lanes largest;
     double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
@@ -2943,8 +2973,8 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         kowalevski_top_chain(&model, x, carry);
-        kowalevski_top_correct(&model, sizes);
-        const double size = kowalevski_top_largest(sizes);
+        kowalevski_top_correct(&model, largest);
+        const double size = kowalevski_top_largest(largest);
         s->evaluations += kowalevski_top_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = kowalevski_top_remaining(size, bend, bound);
@@ -2953,7 +2983,7 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!kowalevski_top_near_lanes(model.y, s->x)) return 0;
+    if (!kowalevski_top_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < kowalevski_top_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);

@@ -12,9 +12,9 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
- *   once; Newton's method in lanes; Blocks of steps; Members of an ensemble; Groups of members;
- *   Ensembles
- * body-sha256: abba261456f848c006d942ee257168e8bb2963f827c0361d087b27370b6ecf81
+ *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
+ *   Groups of members; Ensembles
+ * body-sha256: c2bf39d7ab6ed27df7da68a7fe4583929c83c46572b22063d19c4171f46f8d1b
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -791,25 +791,40 @@ static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
 typedef struct {
     lotka_volterra_lanes y[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
         increment[lotka_volterra_DIM], residual[lotka_volterra_DIM];
+    lotka_volterra_lanes unit[lotka_volterra_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     lotka_volterra_lanes inverse[lotka_volterra_DIM * lotka_volterra_DIM],
         slope[lotka_volterra_DIM * lotka_volterra_DIM], gain[lotka_volterra_DIM * lotka_volterra_DIM];
 } lotka_volterra_model;
 
-/* lotka_volterra_size in all lanes, summed over the components. */
-static void lotka_volterra_sizes(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
-    lotka_volterra_lanes delta[restrict lotka_volterra_DIM], lotka_volterra_lanes size)
+/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
+   lotka_volterra_size. */
+static void lotka_volterra_measure(lotka_volterra_model *model)
 {
     lotka_volterra_lanes norm = { 0.0 };
-    memset(size, 0, lotka_volterra_LANES * sizeof size[0]);
     for (int i = 0; i < lotka_volterra_DIM; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            norm[lane] = lotka_volterra_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
-                ? lotka_volterra_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+            const double least = lotka_volterra_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            norm[lane] = least > norm[lane] ? least : norm[lane];
+        }
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Take a correction from y; its size, summed over the components. */
+static void lotka_volterra_take(lotka_volterra_model *model,
+    lotka_volterra_lanes delta[restrict lotka_volterra_DIM], lotka_volterra_lanes size)
+{
+    memset(size, 0, lotka_volterra_LANES * sizeof size[0]);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            model->y[i][lane] -= delta[i][lane];
+        }
     }
 }
 
@@ -825,6 +840,17 @@ static double lotka_volterra_largest(const lotka_volterra_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
+/* Each lane of most becomes the larger one, in the same order. */
+static void lotka_volterra_keep_largest(lotka_volterra_lanes most, const lotka_volterra_lanes size)
+{
+    uint64_t bits[lotka_volterra_LANES], bits_of_most[lotka_volterra_LANES];
+    memcpy(bits, size, sizeof bits);
+    memcpy(bits_of_most, most, sizeof bits);
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+        bits_of_most[lane] = bits[lane] > bits_of_most[lane] ? bits[lane] : bits_of_most[lane];
+    memcpy(most, bits_of_most, sizeof bits);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
 {
@@ -836,9 +862,7 @@ static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_l
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
                 delta[i][lane] += model->inverse[i * lotka_volterra_DIM + j][lane] * model->residual[j][lane];
         }
-    lotka_volterra_sizes(model->y, delta, size);
-    for (int i = 0; i < lotka_volterra_DIM; ++i)
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+    lotka_volterra_take(model, delta, size);
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points
@@ -870,33 +894,15 @@ static void lotka_volterra_linearise_stage(lotka_volterra_lanes coef[restrict], 
 static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model,
     int matrices)
 {
-    if (matrices)
+    if (matrices) {
         lotka_volterra_linearise_stage(coef, model);
-    else
+        lotka_volterra_measure(model);
+    } else {
         lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
-   foreseen. */
-typedef struct {
-    int fits; /* the fit that weight is of; -1 for none */
-    lotka_volterra_lanes coef[lotka_volterra_COEFFICIENTS], weight[lotka_volterra_WINDOW][lotka_volterra_DIM];
-} lotka_volterra_table;
-
-/* lotka_volterra_near for the guesses of all lanes, seen from one value. */
-static int lotka_volterra_near_lanes(lotka_volterra_lanes y[restrict lotka_volterra_DIM],
-    const double last[lotka_volterra_DIM])
-{
-    lotka_volterra_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < lotka_volterra_DIM; ++i) {
-        size += fabs(last[i]);
-        lotka_volterra_EACH_LANE
-        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
     }
-    return lotka_volterra_largest(distance) <= lotka_volterra_REACH * size;
 }
+
+/* ---- The residuals of a block ---- */
 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
@@ -934,6 +940,30 @@ static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_vol
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+}
+
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    lotka_volterra_lanes coef[lotka_volterra_COEFFICIENTS], weight[lotka_volterra_WINDOW][lotka_volterra_DIM];
+} lotka_volterra_table;
+
+/* lotka_volterra_near for the points of all stages and lanes, seen from one value. */
+static int lotka_volterra_near_lanes(lotka_volterra_model *model, const double last[lotka_volterra_DIM])
+{
+    lotka_volterra_lanes most = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < lotka_volterra_DIM; ++i) size += fabs(last[i]);
+    lotka_volterra_lanes distance = { 0.0 };
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
+            distance[lane] += fabs(model->y[i][lane] - last[i]);
+    }
+    lotka_volterra_keep_largest(most, distance);
+    return lotka_volterra_largest(most) <= lotka_volterra_REACH * size;
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
@@ -1031,7 +1061,7 @@ static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *
 {
     if (s->blocks.use_recurrences) lotka_volterra_foresee(&s->history, table->weight, model->y);
     else lotka_volterra_guess_by_runge_kutta(s, table, model);
-    return lotka_volterra_near_lanes(model->y, s->x);
+    return lotka_volterra_near_lanes(model, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -1047,7 +1077,7 @@ static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
     lotka_volterra_model model;
-    lotka_volterra_lanes sizes;
+    lotka_volterra_lanes largest;
     double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
@@ -1058,8 +1088,8 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         lotka_volterra_chain(&model, x, carry);
-        lotka_volterra_correct(&model, sizes);
-        const double size = lotka_volterra_largest(sizes);
+        lotka_volterra_correct(&model, largest);
+        const double size = lotka_volterra_largest(largest);
         s->evaluations += lotka_volterra_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = lotka_volterra_remaining(size, bend, bound);
@@ -1068,7 +1098,7 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!lotka_volterra_near_lanes(model.y, s->x)) return 0;
+    if (!lotka_volterra_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < lotka_volterra_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);

@@ -12,9 +12,9 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
- *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; Blocks of steps;
- *   Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 24d82067f331de7f0a64a273284cf497537f693ea9aeb07134a85689210ed552
+ *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
+ *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
+ * body-sha256: 8278b60e6c8028934653abf92134e5d8b118fd822e6f9209e6f4aba9610fbd2f
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1106,6 +1106,7 @@ static void nambu_pendulum_invert_lanes(nambu_pendulum_lanes matrix[restrict 9],
 typedef struct {
     nambu_pendulum_lanes y[nambu_pendulum_DIM], displacement[nambu_pendulum_DIM],
         increment[nambu_pendulum_DIM], residual[nambu_pendulum_DIM];
+    nambu_pendulum_lanes unit[nambu_pendulum_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     nambu_pendulum_lanes inverse[nambu_pendulum_DIM * nambu_pendulum_DIM],
         slope[nambu_pendulum_DIM * nambu_pendulum_DIM], gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
@@ -1115,20 +1116,34 @@ typedef struct {
         increment_y[nambu_pendulum_DIM * nambu_pendulum_DIM];
 } nambu_pendulum_model;
 
-/* nambu_pendulum_size in all lanes, summed over the components. */
-static void nambu_pendulum_sizes(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
-    nambu_pendulum_lanes delta[restrict nambu_pendulum_DIM], nambu_pendulum_lanes size)
+/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
+   nambu_pendulum_size. */
+static void nambu_pendulum_measure(nambu_pendulum_model *model)
 {
     nambu_pendulum_lanes norm = { 0.0 };
-    memset(size, 0, nambu_pendulum_LANES * sizeof size[0]);
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            norm[lane] = nambu_pendulum_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
-                ? nambu_pendulum_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            const double least = nambu_pendulum_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            norm[lane] = least > norm[lane] ? least : norm[lane];
+        }
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Take a correction from y; its size, summed over the components. */
+static void nambu_pendulum_take(nambu_pendulum_model *model,
+    nambu_pendulum_lanes delta[restrict nambu_pendulum_DIM], nambu_pendulum_lanes size)
+{
+    memset(size, 0, nambu_pendulum_LANES * sizeof size[0]);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            model->y[i][lane] -= delta[i][lane];
+        }
     }
 }
 
@@ -1144,6 +1159,17 @@ static double nambu_pendulum_largest(const nambu_pendulum_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
+/* Each lane of most becomes the larger one, in the same order. */
+static void nambu_pendulum_keep_largest(nambu_pendulum_lanes most, const nambu_pendulum_lanes size)
+{
+    uint64_t bits[nambu_pendulum_LANES], bits_of_most[nambu_pendulum_LANES];
+    memcpy(bits, size, sizeof bits);
+    memcpy(bits_of_most, most, sizeof bits);
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+        bits_of_most[lane] = bits[lane] > bits_of_most[lane] ? bits[lane] : bits_of_most[lane];
+    memcpy(most, bits_of_most, sizeof bits);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
 {
@@ -1155,9 +1181,7 @@ static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_l
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
                 delta[i][lane] += model->inverse[i * nambu_pendulum_DIM + j][lane] * model->residual[j][lane];
         }
-    nambu_pendulum_sizes(model->y, delta, size);
-    for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+    nambu_pendulum_take(model, delta, size);
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points
@@ -1619,31 +1643,14 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     else nambu_pendulum_begin_at(coef, model->y, model->middle, &e);
     nambu_pendulum_extend(coef, &e, nambu_pendulum_NEGLIGIBLE);
     nambu_pendulum_check_ends(coef, &e, wrong);
-    if (matrices) nambu_pendulum_linearise_paths(coef, model, &e, hessian);
+    if (matrices) {
+        nambu_pendulum_linearise_paths(coef, model, &e, hessian);
+        nambu_pendulum_measure(model);
+    }
     nambu_pendulum_read_ends(model, &e, wrong);
 }
 
-/* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
-   foreseen. */
-typedef struct {
-    int fits; /* the fit that weight is of; -1 for none */
-    nambu_pendulum_lanes coef[nambu_pendulum_COEFFICIENTS], weight[nambu_pendulum_WINDOW][nambu_pendulum_DIM];
-} nambu_pendulum_table;
-
-/* nambu_pendulum_near for the guesses of all lanes, seen from one value. */
-static int nambu_pendulum_near_lanes(nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
-    const double last[nambu_pendulum_DIM])
-{
-    nambu_pendulum_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
-        size += fabs(last[i]);
-        nambu_pendulum_EACH_LANE
-        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return nambu_pendulum_largest(distance) <= nambu_pendulum_REACH * size;
-}
+/* ---- The residuals of a block ---- */
 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
@@ -1681,6 +1688,30 @@ static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pen
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+}
+
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    nambu_pendulum_lanes coef[nambu_pendulum_COEFFICIENTS], weight[nambu_pendulum_WINDOW][nambu_pendulum_DIM];
+} nambu_pendulum_table;
+
+/* nambu_pendulum_near for the points of all stages and lanes, seen from one value. */
+static int nambu_pendulum_near_lanes(nambu_pendulum_model *model, const double last[nambu_pendulum_DIM])
+{
+    nambu_pendulum_lanes most = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) size += fabs(last[i]);
+    nambu_pendulum_lanes distance = { 0.0 };
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
+            distance[lane] += fabs(model->y[i][lane] - last[i]);
+    }
+    nambu_pendulum_keep_largest(most, distance);
+    return nambu_pendulum_largest(most) <= nambu_pendulum_REACH * size;
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
@@ -1778,7 +1809,7 @@ static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *
 {
     if (s->blocks.use_recurrences) nambu_pendulum_foresee(&s->history, table->weight, model->y);
     else nambu_pendulum_guess_by_runge_kutta(s, table, model);
-    return nambu_pendulum_near_lanes(model->y, s->x);
+    return nambu_pendulum_near_lanes(model, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -1794,7 +1825,7 @@ static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
     nambu_pendulum_model model;
-    nambu_pendulum_lanes sizes;
+    nambu_pendulum_lanes largest;
     double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
@@ -1805,8 +1836,8 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         nambu_pendulum_chain(&model, x, carry);
-        nambu_pendulum_correct(&model, sizes);
-        const double size = nambu_pendulum_largest(sizes);
+        nambu_pendulum_correct(&model, largest);
+        const double size = nambu_pendulum_largest(largest);
         s->evaluations += nambu_pendulum_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = nambu_pendulum_remaining(size, bend, bound);
@@ -1815,7 +1846,7 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!nambu_pendulum_near_lanes(model.y, s->x)) return 0;
+    if (!nambu_pendulum_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);

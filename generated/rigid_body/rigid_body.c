@@ -13,9 +13,9 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
- *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes;
- *   Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 3fa75687a62bb27a43732833226dd2650bf87628957df26fb7f6944f749c7b1a
+ *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
+ *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
+ * body-sha256: ce59b897ba19e258ff99756ae03753a1d209e77547a19c293e3509daf3f8455c
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1181,25 +1181,40 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 typedef struct {
     rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
         residual[rigid_body_DIM];
+    rigid_body_lanes unit[rigid_body_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], slope[rigid_body_DIM * rigid_body_DIM],
         gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
-/* rigid_body_size in all lanes, summed over the components. */
-static void rigid_body_sizes(rigid_body_lanes y[restrict rigid_body_DIM],
-    rigid_body_lanes delta[restrict rigid_body_DIM], rigid_body_lanes size)
+/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
+   rigid_body_size. */
+static void rigid_body_measure(rigid_body_model *model)
 {
     rigid_body_lanes norm = { 0.0 };
-    memset(size, 0, rigid_body_LANES * sizeof size[0]);
     for (int i = 0; i < rigid_body_DIM; ++i)
-        for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            norm[lane] = rigid_body_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane]
-                ? rigid_body_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            const double least = rigid_body_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            norm[lane] = least > norm[lane] ? least : norm[lane];
+        }
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Take a correction from y; its size, summed over the components. */
+static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[restrict rigid_body_DIM],
+    rigid_body_lanes size)
+{
+    memset(size, 0, rigid_body_LANES * sizeof size[0]);
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            model->y[i][lane] -= delta[i][lane];
+        }
     }
 }
 
@@ -1215,6 +1230,17 @@ static double rigid_body_largest(const rigid_body_lanes size)
     return isfinite(largest) ? largest : HUGE_VAL;
 }
 
+/* Each lane of most becomes the larger one, in the same order. */
+static void rigid_body_keep_largest(rigid_body_lanes most, const rigid_body_lanes size)
+{
+    uint64_t bits[rigid_body_LANES], bits_of_most[rigid_body_LANES];
+    memcpy(bits, size, sizeof bits);
+    memcpy(bits_of_most, most, sizeof bits);
+    for (int lane = 0; lane < rigid_body_LANES; ++lane)
+        bits_of_most[lane] = bits[lane] > bits_of_most[lane] ? bits[lane] : bits_of_most[lane];
+    memcpy(most, bits_of_most, sizeof bits);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
 {
@@ -1226,9 +1252,7 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
                 delta[i][lane] += model->inverse[i * rigid_body_DIM + j][lane] * model->residual[j][lane];
         }
-    rigid_body_sizes(model->y, delta, size);
-    for (int i = 0; i < rigid_body_DIM; ++i)
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+    rigid_body_take(model, delta, size);
 }
 
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points
@@ -1258,33 +1282,15 @@ static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_bo
 /* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model *model, int matrices)
 {
-    if (matrices)
+    if (matrices) {
         rigid_body_linearise_stage(coef, model);
-    else
+        rigid_body_measure(model);
+    } else {
         rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-}
-
-/* ---- Blocks of steps ---- */
-/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
-   foreseen. */
-typedef struct {
-    int fits; /* the fit that weight is of; -1 for none */
-    rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
-} rigid_body_table;
-
-/* rigid_body_near for the guesses of all lanes, seen from one value. */
-static int rigid_body_near_lanes(rigid_body_lanes y[restrict rigid_body_DIM],
-    const double last[rigid_body_DIM])
-{
-    rigid_body_lanes distance = { 0.0 };
-    double size = 0.0;
-    for (int i = 0; i < rigid_body_DIM; ++i) {
-        size += fabs(last[i]);
-        rigid_body_EACH_LANE
-        for (int lane = 0; lane < rigid_body_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
     }
-    return rigid_body_largest(distance) <= rigid_body_REACH * size;
 }
+
+/* ---- The residuals of a block ---- */
 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
@@ -1321,6 +1327,30 @@ static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], 
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+}
+
+/* ---- Blocks of steps ---- */
+/* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are
+   foreseen. */
+typedef struct {
+    int fits; /* the fit that weight is of; -1 for none */
+    rigid_body_lanes coef[rigid_body_COEFFICIENTS], weight[rigid_body_WINDOW][rigid_body_DIM];
+} rigid_body_table;
+
+/* rigid_body_near for the points of all stages and lanes, seen from one value. */
+static int rigid_body_near_lanes(rigid_body_model *model, const double last[rigid_body_DIM])
+{
+    rigid_body_lanes most = { 0.0 };
+    double size = 0.0;
+    for (int i = 0; i < rigid_body_DIM; ++i) size += fabs(last[i]);
+    rigid_body_lanes distance = { 0.0 };
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane)
+            distance[lane] += fabs(model->y[i][lane] - last[i]);
+    }
+    rigid_body_keep_largest(most, distance);
+    return rigid_body_largest(most) <= rigid_body_REACH * size;
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
@@ -1414,7 +1444,7 @@ static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid
 {
     if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, model->y);
     else rigid_body_guess_by_runge_kutta(s, table, model);
-    return rigid_body_near_lanes(model->y, s->x);
+    return rigid_body_near_lanes(model, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
@@ -1430,7 +1460,7 @@ static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
     rigid_body_model model;
-    rigid_body_lanes sizes;
+    rigid_body_lanes largest;
     double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!rigid_body_guess(s, table, &model)) return 0;
@@ -1440,8 +1470,8 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         rigid_body_chain(&model, x, carry);
-        rigid_body_correct(&model, sizes);
-        const double size = rigid_body_largest(sizes);
+        rigid_body_correct(&model, largest);
+        const double size = rigid_body_largest(largest);
         s->evaluations += rigid_body_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = rigid_body_remaining(size, bend, bound);
@@ -1449,7 +1479,7 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    if (!rigid_body_near_lanes(model.y, s->x)) return 0;
+    if (!rigid_body_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < rigid_body_DIM; ++i)
         if (!isfinite(x[i])) return 0;
     memcpy(s->x, x, sizeof x);

@@ -72,7 +72,7 @@ static void block_equals_steps(int steps, int foreseeing)
     }
     together.blocks.use_recurrences = foreseeing;
     for (int stage = 0; stage < STAGES; ++stage) OF(table.fits, stage) = -1;
-    F(refresh)(&together, &table);
+    for (int stage = 0; stage < STAGES; ++stage) F(refresh)(&together STAGE(stage), &table);
     singles = before = together;
     if (F(block)(&together, &table, 1) == 0) { /* as a rule one pass is too few for a march by Runge-Kutta */
         EXPECT(memcmp(together.x, before.x, sizeof before.x) == 0);
@@ -231,7 +231,7 @@ static void far_guesses_are_not_used(void)
     }
     EXPECT(!F(predict)(&OF(s.history, 0), value));
     s.blocks.use_recurrences = 1;
-    F(refresh)(&s, &table);
+    for (int stage = 0; stage < STAGES; ++stage) F(refresh)(&s STAGE(stage), &table);
     EXPECT(F(block)(&s, &table, 8) == 0);
     F(group_predict)(&group STAGE(0), guess);
     EXPECT(memcmp(guess, group.x, sizeof guess) == 0);

@@ -32,6 +32,11 @@ def _sums(kind: str) -> Callable[[Program], bool]:
     return lambda p: any(kind in kinds(path) for path in recurrences(p))
 
 
+def _full(lanes: Lanes | None) -> bool:
+    """Whether Newton matrices are inverted, not kept as factors."""
+    return isinstance(lanes, Blocks) and lanes.factors is None
+
+
 def _fast(program: Program) -> bool:
     return program.profile == "fast"
 
@@ -80,6 +85,7 @@ FEATURES = (
     Feature("PACKS", requires=("ENSEMBLE",), in_lanes=lambda lanes: isinstance(lanes, Packs), part="lanes"),
     Feature("FAR", requires=("PACKS",), in_lanes=lambda lanes: isinstance(lanes, Packs) and lanes.near),
     Feature("SPARSE", requires=("BLOCKS",), in_lanes=lambda lanes: isinstance(lanes, Blocks) and lanes.factors),
+    Feature("SWEPT", lambda p: len(p.fractions) > 1, ("BLOCKS",), _full),
     Feature("INVERSE_UNROLLED", lambda p: isinstance(p.step, Newton) and p.step.invert, ("BLOCKS",)),
     *(Feature(f"CALLS_{f.upper()}", in_lanes=_calls(f)) for f in ("exp", "expm1", "log", "sin", "cos")),
     *(Feature(f"TAYLOR_{kind.upper()}", _sums(kind)) for kind in ("product", "chain", "power")),

@@ -4,6 +4,7 @@
 #include <math.h>
 #include <string.h>
 
+#include "chain.c"
 #include "model.h"
 #include "newton_lanes.c"
 #include "solver.c"
@@ -15,74 +16,21 @@ typedef struct {
     phi_lanes coef[PHI_STAGES][PHI_COEFFICIENTS], weight[PHI_STAGES][PHI_WINDOW][PHI_DIM];
 } phi_table;
 
-typedef struct { phi_model stage[PHI_STAGES]; } phi_models; /* the stages of a step */
-
-/* phi_near for the guesses of all lanes, seen from one value. */
-static int phi_near_lanes(phi_lanes y[restrict PHI_DIM], const double last[PHI_DIM])
+/* phi_near for the points of all stages and lanes, seen from one value. */
+static int phi_near_lanes(phi_models *models, const double last[PHI_DIM])
 {
-    phi_lanes distance = { 0.0 };
+    phi_lanes most = { 0.0 };
     double size = 0.0;
-    for (int i = 0; i < PHI_DIM; ++i) {
-        size += fabs(last[i]);
-        PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_LANES; ++lane) distance[lane] += fabs(y[i][lane] - last[i]);
-    }
-    return phi_largest(distance) <= PHI_REACH * size;
-}
-
-/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
-{
-    double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
-#if PHI_SPARSE
-    double delta[PHI_DIM], gained[PHI_DIM];
-#endif
-    for (int i = 0; i < PHI_DIM; ++i) {
-        residual[i] = ((models->stage[0].y[i][0] - x[i]) + models->stage[0].displacement[i][0]) - carry[i];
-        sum[i] = x[i];
-        small[i] = carry[i];
-    }
-#if PHI_COMPOSED
-    for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
-        const int lane = k / PHI_STAGES, after = (k + 1) / PHI_STAGES % PHI_LANES;
-        phi_model *this_stage = &models->stage[k % PHI_STAGES], *next_stage = &models->stage[(k + 1) % PHI_STAGES];
-#else
-    phi_model *this_stage = &models->stage[0], *next_stage = &models->stage[0];
-    for (int lane = 0; lane < PHI_LANES; ++lane) {
-        const int after = (lane + 1) % PHI_LANES;
-#endif
-#if PHI_SPARSE
-        phi_substitute_lane(this_stage->factor, this_stage->slope, residual, lane, delta, gained);
+    for (int i = 0; i < PHI_DIM; ++i) size += fabs(last[i]);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_lanes distance = { 0.0 };
         for (int i = 0; i < PHI_DIM; ++i) {
-            const double change = this_stage->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next_stage->displacement[i][after] - this_stage->displacement[i][lane]) - change;
-            this_stage->residual[i][lane] = residual[i];
-            residual[i] = (((next_stage->y[i][after] - this_stage->y[i][lane]) + turn) + residual[i]) + gained[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
-            sum[i] = total;
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) distance[lane] += fabs(models->stage[stage].y[i][lane] - last[i]);
         }
-#else
-        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
-        for (int i = 0; i < PHI_DIM; ++i) {
-            this_stage->residual[i][lane] = residual[i];
-            for (int j = 0; j < PHI_DIM; j += 2) even[i] += this_stage->gain[i * PHI_DIM + j][lane] * residual[j];
-            for (int j = 1; j < PHI_DIM; j += 2) odd[i] += this_stage->gain[i * PHI_DIM + j][lane] * residual[j];
-        }
-        for (int i = 0; i < PHI_DIM; ++i) {
-            const double change = this_stage->increment[i][lane], total = sum[i] + change, added = total - sum[i];
-            const double turn = (next_stage->displacement[i][after] - this_stage->displacement[i][lane]) - change;
-            const double moved = (next_stage->y[i][after] - this_stage->y[i][lane]) + turn;
-            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
-            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
-            sum[i] = total;
-        }
-#endif
+        phi_keep_largest(most, distance);
     }
-    for (int i = 0; i < PHI_DIM; ++i) {
-        x[i] = sum[i] + small[i];
-        carry[i] = small[i] - (x[i] - sum[i]);
-    }
+    return phi_largest(most) <= PHI_REACH * size;
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
@@ -177,8 +125,17 @@ static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], do
 #if PHI_COMPOSED && !PHI_PATH
 enum {
     PHI_STRIDES = 2, /* of the Runge-Kutta method in a step: errors that all stages of it share */
-    PHI_MEETINGS = 4 /* evaluations of a stage until its point is nearly where alpha(y) = x */
+    PHI_MEETINGS = 3 /* evaluations of a stage until its point is nearly where alpha(y) = x */
 };
+
+/* Move the points of a stage by a part of what the stage before moves by. */
+static void phi_go_on(phi_model *model, phi_model *before, double part)
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] += part * before->increment[i][lane];
+    }
+}
 
 /* Guesses where no recurrence is known. The beginnings of all steps are those of Runge-Kutta steps, made one after the
    other; from there on each lane makes the stages of its own step, by iteration. */
@@ -199,6 +156,7 @@ static void phi_guess_by_runge_kutta(const phi_solver *s, phi_table *table, phi_
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = &models->stage[stage];
         memcpy(this_stage->y, begin, sizeof begin);
+        if (stage > 0) phi_go_on(this_stage, this_stage - 1, 0.5 * phi_fractions[stage] / phi_fractions[stage - 1]);
         for (int meeting = 0; meeting < PHI_MEETINGS; ++meeting) {
             phi_evaluate_lanes(table->coef[stage], this_stage->y, this_stage->displacement, this_stage->increment);
             for (int i = 0; i < PHI_DIM; ++i) {
@@ -262,16 +220,13 @@ static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
 {
 #if PHI_COMPOSED
     if (!s->blocks.use_recurrences) phi_guess_by_runge_kutta(s, table, models);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    for (int stage = 0; stage < PHI_STAGES; ++stage)
         if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], models->stage[stage].y);
-        if (!phi_near_lanes(models->stage[stage].y, s->x)) return 0;
-    }
-    return 1;
 #else
     if (s->blocks.use_recurrences) phi_foresee(&s->history[0], table->weight[0], models->stage[0].y);
     else phi_guess_by_runge_kutta(s, table, models);
-    return phi_near_lanes(models->stage[0].y, s->x);
 #endif
+    return phi_near_lanes(models, s->x);
 }
 
 /* Corrections below the first go on with the matrices of the last pass, as its error is then of third order. After the
@@ -281,16 +236,26 @@ static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
 #define PHI_ROUNDING 1e-10
 
 #if PHI_MONITOR
-/* The times that the stages of a block take, by their points. 0 unless all have the sign of their stage. */
-static int phi_elapse(const phi_solver *s, phi_table *table, phi_models *models, phi_lanes elapsed[PHI_STAGES][1])
+/* The times that the steps of a block take, by the points of their stages, and what their sums lost. 0 unless those of all
+   stages have the sign of the stage. */
+static int phi_elapse(const phi_solver *s, phi_table *table, phi_models *models, phi_lanes elapsed, phi_lanes lost)
 {
-    int good = 1;
+    phi_lanes wrong = { 0.0 };
+    memset(elapsed, 0, PHI_LANES * sizeof elapsed[0]);
+    memset(lost, 0, PHI_LANES * sizeof lost[0]);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        phi_elapsed_lanes(table->coef[stage], models->stage[stage].y, elapsed[stage]);
-        for (int lane = 0; lane < PHI_LANES; ++lane)
-            good = good && elapsed[stage][0][lane] * (phi_fractions[stage] * s->h) > 0.0;
+        phi_lanes one[1];
+        const double size = phi_fractions[stage] * s->h;
+        phi_elapsed_lanes(table->coef[stage], models->stage[stage].y, one);
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double sum = elapsed[lane] + one[0][lane], added = sum - elapsed[lane];
+            wrong[lane] += one[0][lane] * size > 0.0 ? 0.0 : 1.0;
+            lost[lane] += (elapsed[lane] - (sum - added)) + (one[0][lane] - added);
+            elapsed[lane] = sum;
+        }
     }
-    return good;
+    return !(phi_largest(wrong) > 0.0);
 }
 
 #endif
@@ -348,7 +313,10 @@ static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_models models;
+#if PHI_COMPOSED
     phi_lanes sizes;
+#endif
+    phi_lanes largest;
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!phi_guess(s, table, &models)) return 0;
@@ -357,17 +325,20 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         for (int stage = 0; stage < PHI_STAGES; ++stage) phi_update(table->coef[stage], &models.stage[stage], matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
+#if PHI_SWEPT
+        if (matrices) phi_turn_residuals(&models);
+#endif
         phi_chain(&models, x, carry);
 #if PHI_COMPOSED
-        double size = 0.0;
+        memset(largest, 0, sizeof largest);
         for (int stage = 0; stage < PHI_STAGES; ++stage) {
             phi_correct(&models.stage[stage], sizes);
-            size = fmax(size, phi_largest(sizes));
+            phi_keep_largest(largest, sizes);
         }
 #else
-        phi_correct(&models.stage[0], sizes);
-        const double size = phi_largest(sizes);
+        phi_correct(&models.stage[0], largest);
 #endif
+        const double size = phi_largest(largest);
         s->evaluations += PHI_STAGES * PHI_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = phi_remaining(size, bend, bound);
@@ -375,19 +346,20 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         if ((++passes >= most || !(size < previous)) && !solved) return 0;
         previous = size;
     }
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        if (!phi_near_lanes(models.stage[stage].y, s->x)) return 0;
+    if (!phi_near_lanes(&models, s->x)) return 0;
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(x[i])) return 0;
 #if PHI_MONITOR
-    phi_lanes elapsed[PHI_STAGES][1];
-    if (!phi_elapse(s, table, &models, elapsed)) return 0;
+    phi_lanes elapsed, lost;
+    if (!phi_elapse(s, table, &models, elapsed, lost)) return 0;
 #endif
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
 #if PHI_MONITOR
-    for (int lane = 0; lane < PHI_LANES; ++lane)
-        for (int stage = 0; stage < PHI_STAGES; ++stage) phi_pass(s, elapsed[stage][0][lane]);
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        s->t_carry += lost[lane];
+        phi_pass(s, elapsed[lane]);
+    }
 #endif
     phi_count(s, PHI_LANES);
 #if PHI_ATTITUDE

@@ -17,4 +17,15 @@ static double phi_largest(const phi_lanes size)
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
 }
+
+/* Each lane of most becomes the larger one, in the same order. */
+static void phi_keep_largest(phi_lanes most, const phi_lanes size)
+{
+    uint64_t bits[PHI_LANES], bits_of_most[PHI_LANES];
+    memcpy(bits, size, sizeof bits);
+    memcpy(bits_of_most, most, sizeof bits);
+    for (int lane = 0; lane < PHI_LANES; ++lane)
+        bits_of_most[lane] = bits[lane] > bits_of_most[lane] ? bits[lane] : bits_of_most[lane];
+    memcpy(most, bits_of_most, sizeof bits);
+}
 #endif

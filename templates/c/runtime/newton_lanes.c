@@ -21,6 +21,7 @@
 /* A stage in all lanes, linearised around y. */
 typedef struct {
     phi_lanes y[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM], residual[PHI_DIM];
+    phi_lanes unit[PHI_DIM]; /* by which corrections of y are measured */
 #if PHI_SPARSE
     /* of the Jacobian of alpha(y); that of the increment; what corrections take from the increment */
     phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];
@@ -34,18 +35,32 @@ typedef struct {
 #endif
 } phi_model;
 
-/* phi_size in all lanes, summed over the components. */
-static void phi_sizes(phi_lanes y[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM], phi_lanes size)
+/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in phi_size. */
+static void phi_measure(phi_model *model)
 {
     phi_lanes norm = { 0.0 };
-    memset(size, 0, PHI_LANES * sizeof size[0]);
     for (int i = 0; i < PHI_DIM; ++i)
-        for (int lane = 0; lane < PHI_LANES; ++lane)
-            norm[lane] = PHI_FLOOR_OF_LANES * fabs(y[i][lane]) > norm[lane] ? PHI_FLOOR_OF_LANES * fabs(y[i][lane]) : norm[lane];
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double least = PHI_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            norm[lane] = least > norm[lane] ? least : norm[lane];
+        }
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane)
-            size[lane] += fabs(delta[i][lane]) / (fabs(y[i][lane]) + norm[lane] + DBL_MIN);
+            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+    }
+}
+
+/* Take a correction from y; its size, summed over the components. */
+static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes size)
+{
+    memset(size, 0, PHI_LANES * sizeof size[0]);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            model->y[i][lane] -= delta[i][lane];
+        }
     }
 }
 
@@ -58,9 +73,7 @@ static void phi_correct(phi_model *model, phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];
     phi_substitute_lanes(model->factor, model->slope, model->residual, delta, model->gained);
-    phi_sizes(model->y, delta, size);
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+    phi_take(model, delta, size);
 }
 
 #else
@@ -75,9 +88,7 @@ static void phi_correct(phi_model *model, phi_lanes size)
             for (int lane = 0; lane < PHI_LANES; ++lane)
                 delta[i][lane] += model->inverse[i * PHI_DIM + j][lane] * model->residual[j][lane];
         }
-    phi_sizes(model->y, delta, size);
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] -= delta[i][lane];
+    phi_take(model, delta, size);
 }
 
 #endif
@@ -172,10 +183,12 @@ static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 /* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
 {
-    if (matrices)
+    if (matrices) {
         phi_linearise_stage(coef, model);
-    else
+        phi_measure(model);
+    } else {
         phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    }
 }
 
 #endif

@@ -1,0 +1,197 @@
+#ifndef PHI_FILE_CHAIN
+#define PHI_FILE_CHAIN
+#include <string.h>
+
+#include "model.h"
+#include "newton_lanes.c"
+
+/* ---- The residuals of a block ---- */
+#if PHI_SWEPT
+/* The stages of a step, and what a step makes of a residual of its first stage: one of the next step. */
+typedef struct {
+    phi_model stage[PHI_STAGES];
+    phi_lanes turn[PHI_DIM * PHI_DIM];
+} phi_models;
+
+/* Each stage makes 1 + gain of a residual. */
+static void phi_turn_residuals(phi_models *models)
+{
+    memset(models->turn, 0, sizeof models->turn);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int lane = 0; lane < PHI_LANES; ++lane) models->turn[i * PHI_DIM + i][lane] = 1.0;
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = &models->stage[stage];
+        for (int j = 0; j < PHI_DIM; ++j) {
+            phi_lanes column[PHI_DIM];
+            for (int i = 0; i < PHI_DIM; ++i) memcpy(column[i], models->turn[i * PHI_DIM + j], sizeof column[i]);
+            for (int i = 0; i < PHI_DIM; ++i) {
+                phi_lanes sum;
+                memcpy(sum, column[i], sizeof sum);
+                for (int k = 0; k < PHI_DIM; ++k) {
+                    PHI_EACH_LANE
+                    for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += this_stage->gain[i * PHI_DIM + k][lane] * column[k][lane];
+                }
+                memcpy(models->turn[i * PHI_DIM + j], sum, sizeof sum);
+            }
+        }
+    }
+}
+
+/* By how much the residual of a stage would change to that of the next, did it not turn. After the last stage comes the first
+   of the next lane; in the last lane it is of no use. */
+static void phi_shift(const phi_models *models, int stage, phi_lanes shift[restrict PHI_DIM])
+{
+    const phi_model *this_stage = &models->stage[stage], *next_stage = &models->stage[(stage + 1) % PHI_STAGES];
+    const int ahead = stage == PHI_STAGES - 1;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        phi_lanes y, displacement;
+        memcpy(y, next_stage->y[i], sizeof y);
+        memcpy(displacement, next_stage->displacement[i], sizeof displacement);
+        if (ahead) {
+            memmove(y, y + 1, sizeof y - sizeof y[0]);
+            memmove(displacement, displacement + 1, sizeof displacement - sizeof displacement[0]);
+        }
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double turn = (displacement[lane] - this_stage->displacement[i][lane]) - this_stage->increment[i][lane];
+            shift[i][lane] = (y[lane] - this_stage->y[i][lane]) + turn;
+        }
+    }
+}
+
+/* gained becomes gain times residual. */
+static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
+{
+    memset(gained, 0, PHI_DIM * sizeof gained[0]);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) gained[i][lane] += model->gain[i * PHI_DIM + j][lane] * residual[j][lane];
+        }
+}
+
+/* The residuals of the first stages of all steps: each step is affine in that of its first stage. */
+static void phi_first_residuals(phi_models *models, const double x[PHI_DIM], const double carry[PHI_DIM],
+    phi_lanes residual[restrict PHI_DIM])
+{
+    phi_lanes end[PHI_DIM], gained[PHI_DIM];
+    double first[PHI_DIM];
+    memset(end, 0, sizeof end);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = &models->stage[stage];
+        phi_shift(models, stage, this_stage->residual);
+        phi_gain(this_stage, end, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) end[i][lane] += gained[i][lane] + this_stage->residual[i][lane];
+        }
+    }
+    for (int i = 0; i < PHI_DIM; ++i)
+        first[i] = ((models->stage[0].y[i][0] - x[i]) + models->stage[0].displacement[i][0]) - carry[i];
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        double next[PHI_DIM];
+        for (int i = 0; i < PHI_DIM; ++i) {
+            residual[i][lane] = first[i];
+            next[i] = end[i][lane];
+            for (int j = 0; j < PHI_DIM; ++j) next[i] += models->turn[i * PHI_DIM + j][lane] * first[j];
+        }
+        memcpy(first, next, sizeof first);
+    }
+}
+
+/* The residuals of all stages along their linear models, in lanes, and where the steps lead. As X, the state with its carry,
+   gains increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+{
+    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
+    phi_first_residuals(models, x, carry, residual);
+    memset(sum, 0, sizeof sum);
+    memset(small, 0, sizeof small);
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_model *this_stage = &models->stage[stage];
+        phi_lanes gained[PHI_DIM];
+        phi_gain(this_stage, residual, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                const double change = this_stage->increment[i][lane], total = sum[i][lane] + change, added = total - sum[i][lane];
+                const double here = residual[i][lane];
+                small[i][lane] += ((sum[i][lane] - (total - added)) + (change - added)) - gained[i][lane];
+                sum[i][lane] = total;
+                residual[i][lane] = (here + gained[i][lane]) + this_stage->residual[i][lane];
+                this_stage->residual[i][lane] = here;
+            }
+        }
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        double whole = x[i], rest = carry[i];
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double total = whole + sum[i][lane], added = total - whole;
+            rest += ((whole - (total - added)) + (sum[i][lane] - added)) + small[i][lane];
+            whole = total;
+        }
+        x[i] = whole + rest;
+        carry[i] = rest - (x[i] - whole);
+    }
+}
+
+#else
+typedef struct { phi_model stage[PHI_STAGES]; } phi_models; /* the stages of a step */
+
+/* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
+static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+{
+    double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
+#if PHI_SPARSE
+    double delta[PHI_DIM], gained[PHI_DIM];
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) {
+        residual[i] = ((models->stage[0].y[i][0] - x[i]) + models->stage[0].displacement[i][0]) - carry[i];
+        sum[i] = x[i];
+        small[i] = carry[i];
+    }
+#if PHI_COMPOSED
+    for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
+        const int lane = k / PHI_STAGES, after = (k + 1) / PHI_STAGES % PHI_LANES;
+        phi_model *this_stage = &models->stage[k % PHI_STAGES], *next_stage = &models->stage[(k + 1) % PHI_STAGES];
+#else
+    phi_model *this_stage = &models->stage[0], *next_stage = &models->stage[0];
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const int after = (lane + 1) % PHI_LANES;
+#endif
+#if PHI_SPARSE
+        phi_substitute_lane(this_stage->factor, this_stage->slope, residual, lane, delta, gained);
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double change = this_stage->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next_stage->displacement[i][after] - this_stage->displacement[i][lane]) - change;
+            this_stage->residual[i][lane] = residual[i];
+            residual[i] = (((next_stage->y[i][after] - this_stage->y[i][lane]) + turn) + residual[i]) + gained[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - gained[i];
+            sum[i] = total;
+        }
+#else
+        double even[PHI_DIM] = { 0.0 }, odd[PHI_DIM] = { 0.0 }; /* two sums, so that no long chain of additions is waited for */
+        for (int i = 0; i < PHI_DIM; ++i) {
+            this_stage->residual[i][lane] = residual[i];
+            for (int j = 0; j < PHI_DIM; j += 2) even[i] += this_stage->gain[i * PHI_DIM + j][lane] * residual[j];
+            for (int j = 1; j < PHI_DIM; j += 2) odd[i] += this_stage->gain[i * PHI_DIM + j][lane] * residual[j];
+        }
+        for (int i = 0; i < PHI_DIM; ++i) {
+            const double change = this_stage->increment[i][lane], total = sum[i] + change, added = total - sum[i];
+            const double turn = (next_stage->displacement[i][after] - this_stage->displacement[i][lane]) - change;
+            const double moved = (next_stage->y[i][after] - this_stage->y[i][lane]) + turn;
+            residual[i] = ((moved + residual[i]) + odd[i]) + even[i];
+            small[i] += ((sum[i] - (total - added)) + (change - added)) - (even[i] + odd[i]);
+            sum[i] = total;
+        }
+#endif
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        x[i] = sum[i] + small[i];
+        carry[i] = small[i] - (x[i] - sum[i]);
+    }
+}
+
+#endif
+#endif
