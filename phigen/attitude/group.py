@@ -54,9 +54,14 @@ class Group:
         return MATRIX if self.matrices else "pose" if self.translation else QUATERNION
 
     @property
+    def rows(self) -> int:
+        """Of a matrix; 0 for quaternions."""
+        return len(self.matrices[0]) if self.matrices else 0
+
+    @property
     def size(self) -> int:
         """Numbers that an element consists of: 4, 4 + 3, or those of a square matrix."""
-        return len(self.matrices[0]) ** 2 if self.matrices else 7 if self.translation else 4
+        return self.rows**2 or (7 if self.translation else 4)
 
     @property
     def orthogonal(self) -> bool:
@@ -65,7 +70,7 @@ class Group:
 
     def generator(self, p: Sequence[Expression]) -> list[Expression]:
         """Σ p_i E_i, the entries row by row."""
-        size = range(len(self.matrices[0]))
+        size = range(self.rows)
         return [
             total(pi * m[i][j] for pi, m in zip(p, self.matrices, strict=True) if not (pi.is_zero or m[i][j].is_zero))
             for i in size

@@ -65,7 +65,7 @@ def cayley(group: Group, p: Sequence[Expression]) -> Flat:
 
 def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
     """P, …, P^{N−1}."""
-    rows = len(group.matrices[0])
+    rows = group.rows
     found = [group.generator(p)]
     while len(found) < rows - 1:
         found.append(multiplied(found[-1], found[0]))

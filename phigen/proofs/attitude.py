@@ -168,7 +168,7 @@ def _matrix_statements(system: System, chart: BiRealisation, attitude: Attitude)
 
 def representation_statement(system: System, algebra: LieAlgebra, group: Group) -> Statement:
     """[E_i, E_j] = ± Σ c_ij^k E_k: + where elements are multiplied from the left, for {x_i, x_j} = Σ c_ij^k x_k."""
-    n, size = range(algebra.dimension), range(len(group.matrices[0]))
+    n, size = range(algebra.dimension), range(group.rows)
     residuals = []
     for i, j in combinations(n, 2):
         a, b, row = group.matrices[i], group.matrices[j], algebra.bracket(i, j)
@@ -203,7 +203,7 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
     matrices = tuple(
         {(r, s): e for r, row in enumerate(m) for s, e in enumerate(row) if not e.is_zero} for m in group.matrices
     )
-    found = trilinear(algebra, Representation("", len(group.matrices[0]), matrices))
+    found = trilinear(algebra, Representation("", group.rows, matrices))
     terms = found or {}
     residuals = []
     for i in n:

@@ -116,7 +116,7 @@ class Attitude:
     @property
     def shape(self) -> tuple[int, ...]:
         """The shape of an attitude as an array."""
-        rows = len(self.group.matrices[0]) if self.group.matrices else 0
+        rows = self.group.rows
         return (rows, rows) if rows else (4,)
 
     @property

@@ -6,6 +6,7 @@ import hashlib
 import re
 import textwrap
 import unicodedata
+from collections.abc import Sequence
 
 from phigen.scheme.program import Program
 
@@ -46,6 +47,12 @@ def header_lines(program: Program, command: str) -> list[str]:
 
 def _kind(program: Program) -> str:
     return "An integrator on the leaves, with forces," if program.forced else "A Poisson Hamiltonian integrator"
+
+
+def sealed(lines: Sequence[str], body: str, mark: str = " * ", begin: str = "/*\n", end: str = " */\n") -> str:
+    """A file: lines as a comment, that of C unless told otherwise, with the checksum of the body that follows."""
+    text = "\n".join(f"{mark}{line}".rstrip() for line in [*lines, f"{CHECKSUM} {checksum(body)}"])
+    return f"{begin}{text}\n{end}{body}"
 
 
 def checksum(body: str) -> str:

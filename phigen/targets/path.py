@@ -17,19 +17,22 @@ from phigen.targets.reserved import Reserved
 
 Text = Callable[[Expression], str]
 
+#: Most terms of the expansion of a path; a path that needs more is cut into pieces.
+TERMS = 30
+
 
 @dataclass(frozen=True)
 class Syntax:
-    """How a target writes the pieces of a statement."""
+    """How a target writes the pieces of a statement; those that say nothing, as C does."""
 
     printer: Callable[[Scope], Printer]
-    covector: str  # component i of p
-    fixed: str  # the statement that defines fixed value i
-    first: str  # the statement that sets the first coefficient of series i
-    following: str  # the statement that sets coefficient k ≥ 1 of series i
     slope: str  # the statement that sets coefficient k + 1 of coordinate i
     sums: str  # what a sum over orders is called, by its {kind} or {Kind}
-    held: str = "f{i}"  # fixed value i
+    covector: str = "p[{i}]"  # component i of p
+    fixed: str = "f[{i}] = {value};"  # the statement that defines fixed value i
+    held: str = "f[{i}]"  # that value
+    first: str = "s[{i}][0] = {value};"  # the statement that sets the first coefficient of series i
+    following: str = "s[{i}][k] = {value};"  # the statement that sets coefficient k ≥ 1 of series i
 
 
 def statements(program: Program, path: Recurrences, syntax: Syntax) -> dict[str, list[str]]:

@@ -370,10 +370,10 @@ def test_modules_that_meet_declare_no_name_twice():
 
 def test_parts_are_left_out_by_lines_in_comments():
     text = (
-        "a\n// #if X\nb\n  // #if Y\n  c\n  // #else\n  d\n  // #endif\n// #endif\n/**\n * #if Y\n * e\n * #endif\n */"
+        "a\n// #if X\nb\n  // #if Y\n  c\n  // #else\n  d\n  // #endif\n// #endif\n/**\n * #if !Y\n * e\n * #endif\n */"
     )
-    assert resolved(text, {"X": True, "Y": False}) == ["a", "b", "  d", "/**", " */"]
-    assert resolved(text, {"X": False, "Y": True}) == ["a", "/**", " * e", " */"]
+    assert resolved(text, {"X": True, "Y": False}) == ["a", "b", "  d", "/**", " * e", " */"]
+    assert resolved(text, {"X": False, "Y": True}) == ["a", "/**", " */"]
     with pytest.raises(KeyError):
         resolved(text, {"X": True})
 

@@ -24,12 +24,9 @@ from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.lanes import remembered
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
-from phigen.targets.header import CHECKSUM, checksum, header_lines, plain
-from phigen.targets.path import Syntax, adjoint_program, statements, tangent_program
+from phigen.targets.header import header_lines, plain, sealed
+from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.rendering import render
-
-#: Most terms of the expansion of a path; a path that needs more is cut into pieces.
-TERMS = 30
 
 #: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
 #: with loops that are not as they call functions of the library, or with derivatives of paths, of which an evaluation
@@ -105,8 +102,7 @@ def _sealed(lines: Sequence[str], body: str) -> str:
     chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", body, re.MULTILINE)
     long = chapters and body.count("\n") > FEW_SCREENS
     contents = textwrap.wrap(f"Contents: {'; '.join(chapters)}", 100, subsequent_indent="  ") if long else []
-    text = "\n".join(f" * {line}".rstrip() for line in [*lines, *contents])
-    return f"/*\n{text}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"
+    return sealed([*lines, *contents], body)
 
 
 def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, str]:
@@ -186,8 +182,7 @@ def _of_noise(noise: Noise) -> Sizes:
 def _of_attitude(attitude: Attitude) -> Sizes:
     from phigen.scheme.attitude import SIZE_OF_COVECTOR
 
-    group, rate = attitude.group, attitude.rate
-    rows = len(group.matrices[0]) if group.matrices else 0
+    group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
     shown = f"numbers of an attitude, a matrix of {rows} rows" if rows else "numbers of an attitude, a quaternion"
     sizes = [("ATTITUDE_SIZE", rows**2 or 4, shown)]
     position = ", with the position" * bool(group.translation)
@@ -320,16 +315,8 @@ def _adjoint_path(program: Program, path: PathAdjoint) -> str:
 
 def _path(program: Program, path: Recurrences, kind: str) -> str:
     """The recurrences of a path, or of one with its variation."""
-    syntax = Syntax(
-        printer=printer,
-        covector="p[{i}]",
-        fixed="f[{i}] = {value};",
-        first="s[{i}][0] = {value};",
-        following="s[{i}][k] = {value};",
-        slope="s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);",
-        sums=f"{program.name}_taylor_{{kind}}",
-        held="f[{i}]",
-    )
+    slope = "s[{i}][k + 1] = s[{slope}][k] / (double)(k + 1);"
+    syntax = Syntax(printer, slope, sums=f"{program.name}_taylor_{{kind}}")
     found = statements(program, path, syntax)
     begin, rules = [*found["fixed"], *found["first"]], [*found["rules"], *found["slopes"]]
     return render(

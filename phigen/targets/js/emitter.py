@@ -13,38 +13,22 @@ from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import special
-from phigen.targets.header import CHECKSUM, checksum, header_lines
+from phigen.targets.features import switches
+from phigen.targets.header import header_lines, sealed
 from phigen.targets.js.functions import definitions
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
-from phigen.targets.path import Syntax, kinds, recurrences, statements, tangent_program
+from phigen.targets.path import TERMS, Syntax, statements, tangent_program
 from phigen.targets.rendering import render
 
-#: Switches of the runtime that are about attitudes.
-_ATTITUDES = ("ATTITUDE", "MATRICES", "QUATERNIONS", "NORMALISE", "POSITION", "SPATIAL", "UNIFORM", "EXPONENTIAL",
-              "TURNED_IN_STAGES", "TURNED_BY_COVECTOR")  # fmt: skip
-
-#: Most terms of the expansion of a path, as in the C target.
-TERMS = 30
-
-PATH_SYNTAX = Syntax(
-    printer=LANGUAGE.printer,
-    covector="p[{i}]",
-    fixed="f[{i}] = {value};",
-    first="s[{i}][0] = {value};",
-    following="s[{i}][k] = {value};",
-    slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);",
-    sums="taylor{Kind}",
-    held="f[{i}]",
-)
+PATH_SYNTAX = Syntax(LANGUAGE.printer, slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);", sums="taylor{Kind}")
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents. Raises `SpecError` as `expect_offered` does."""
     expect_offered(program)
     body = _lattice(program, program.step) if isinstance(program.step, Sweeps) else _system_of_coordinates(program)
-    head = "\n".join(f" * {line}".rstrip() for line in header_lines(program, command))
-    return {f"{program.name}.mjs": f"/*\n{head}\n * {CHECKSUM} {checksum(body)}\n */\n{body}"}
+    return {f"{program.name}.mjs": sealed(header_lines(program, command), body)}
 
 
 def expect_offered(program: Program) -> None:
@@ -61,12 +45,12 @@ def _lattice(program: Program, step: Sweeps) -> str:
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
     pieces = [lattice.tables(program, step), *early, *_functions(program)]
     model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
-    return f"{model}\n\n{assembled(lattice.modules(program, step), lattice.switches(program, step))}\n"
+    return f"{model}\n\n{assembled(lattice.modules(program, step), lattice.features(program, step))}\n"
 
 
 def _system_of_coordinates(program: Program) -> str:
     """The body of any other module."""
-    step, features = program.step, _features(program)
+    step, features = program.step, switches(program)
     assert not isinstance(step, Sweeps)
     chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
     modules = ["errors", "march", "solver", chosen]
@@ -87,47 +71,6 @@ def _system_of_coordinates(program: Program) -> str:
 def _functions(program: Program) -> list[str]:
     """Functions that the file defines itself."""
     return definitions(special.used(program), special.entire_used(program), LANGUAGE.printer)
-
-
-def _features(program: Program) -> dict[str, bool]:
-    """What the runtime is asked for."""
-    step = program.step
-    sums = {kind for path in recurrences(program) for kind in kinds(path)}
-    return {
-        "IMPLICIT": isinstance(step, Implicit),
-        "GAUGE": program.gauge is not None,
-        "HELD": bool(program.held),
-        "MONITOR": program.monitor is not None,
-        "EQUAL_IN_T": program.monitor is None,
-        "COMPOSED": len(program.fractions) > 1,
-        "SPLITTING": isinstance(step, Splitting),
-        "KICKS": isinstance(step, Splitting) and bool(step.schedule.multiples),
-        "TIMED": bool(program.time),
-        "NOISE": program.noise is not None,
-        "RENEWED": step.refresh is not None,
-        "MODIFIED": program.modified is not None,
-        "TANGENT": program.extras.tangent,
-        "KICKED": program.offers("kicks"),
-        **_of_attitude(program.attitude),
-        "ENSEMBLE": program.offers("ensemble"),
-        **{f"TAYLOR_{kind.upper()}": kind in sums for kind in ("product", "chain", "power")},
-    }
-
-
-def _of_attitude(attitude: Attitude | None) -> dict[str, bool]:
-    """What the runtime is asked for of attitudes."""
-    asked: dict[str, object] = {"ATTITUDE": attitude}
-    if attitude:
-        group, turn = attitude.group, attitude.turn
-        asked |= {
-            "MATRICES": group.matrices,
-            "QUATERNIONS": not group.matrices,
-            "NORMALISE": group.orthogonal,
-            "POSITION": group.translation,
-        }
-        asked |= {"SPATIAL": group.spatial, "UNIFORM": attitude.rate, "EXPONENTIAL": attitude.exponential}
-        asked |= {"TURNED_IN_STAGES": turn, "TURNED_BY_COVECTOR": turn and group.matrices and not attitude.cayley}
-    return dict.fromkeys(_ATTITUDES, False) | {name: bool(found) for name, found in asked.items()}
 
 
 def _model(program: Program) -> str:
@@ -172,8 +115,7 @@ def _system(program: Program) -> Mapping[str, object]:
 
 def _sizes(attitude: Attitude) -> Mapping[str, int]:
     """The numbers of arrays."""
-    group, rate = attitude.group, attitude.rate
-    rows = len(group.matrices[0]) if group.matrices else 0
+    group, rate, rows = attitude.group, attitude.rate, attitude.group.rows
     covector = len(group.matrices) + 1 if attitude.exponential else 0
     return {
         "attitude": rows**2 or 4,

@@ -11,6 +11,7 @@ from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol, kind_of
 from phigen.targets.code import lower
+from phigen.targets.features import switches
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
@@ -37,19 +38,14 @@ def modules(program: Program, step: Sweeps) -> list[str]:
     return [*MODULES, *noise, "sweeps", "krylov", *["site_tangent"] * program.extras.tangent]
 
 
-def switches(program: Program, step: Sweeps) -> dict[str, bool]:
-    """The switches of the runtime."""
-    return {
-        "TIMED": bool(program.time),
-        "RENEWED": step.refresh is not None,
-        "KICKS": bool(step.schedule.multiples),
+def features(program: Program, step: Sweeps) -> dict[str, bool]:
+    """The switches of the runtime, those of lattices among them."""
+    return switches(program) | {
         "COLOURS": step.sites.colours > 1,
         "GATHER": step.partners is not None,
         "GRAPH": _partners(step).graph,
         "SPLIT": step.equation is None,
         "BY_COLOUR": bool(step.by_colour),
-        "NOISE": program.noise is not None,
-        "TANGENT": program.extras.tangent,
     }
 
 

@@ -1,7 +1,7 @@
 """The runtime of a solver in JavaScript: modules of `templates/js/runtime`, put together for one system.
 
-They are JavaScript as they lie there. ``// #if NAME``, ``// #else`` and ``// #endif`` stand on lines of their own, in
-comments of several lines after ``*``; imports and exports are between the modules, and go.
+They are JavaScript as they lie there. ``// #if NAME`` or ``// #if !NAME``, ``// #else`` and ``// #endif`` stand on
+lines of their own, in comments of several lines after ``*``; imports and exports are between the modules, and go.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from collections.abc import Mapping
 
 from phigen import resources
 
-_DIRECTIVE = re.compile(r"\s*(?://|\*) #(if|else|endif)(?: (\w+))?")
+_DIRECTIVE = re.compile(r"\s*(?://|\*) #(if|else|endif)(?: (!?)(\w+))?")
 
 #: The modules whose classes are exported by the result.
 PUBLIC = ("errors", "solver", "lattice")
@@ -40,7 +40,7 @@ def resolved(text: str, features: Mapping[str, bool]) -> list[str]:
             if all(open_):
                 lines.append(line)
         elif found[1] == "if":
-            open_.append(features[found[2]])
+            open_.append(features[found[3]] != bool(found[2]))
         elif found[1] == "else":
             open_.append(not open_.pop())
         else:

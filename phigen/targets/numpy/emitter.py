@@ -29,16 +29,13 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
-from phigen.targets.header import CHECKSUM, checksum, header_lines, plain, sentence
+from phigen.targets.header import header_lines, plain, sealed, sentence
 from phigen.targets.names import Scope
 from phigen.targets.numpy.language import LANGUAGE
-from phigen.targets.path import Syntax, statements, tangent_program
+from phigen.targets.path import TERMS, Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
-
-#: Most terms of the expansion of a path, as in the C target.
-TERMS = 30
 
 _NOISE_ARGUMENTS = """ The random
     numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
@@ -54,21 +51,21 @@ _OF_TAU = """
     The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...)."""
 
 PATH_SYNTAX = Syntax(
-    printer=LANGUAGE.printer,
-    covector="p[:, {i}]",
-    fixed="f{i} = {value}",
-    first="s[{i}].append({value} + 0.0)",
-    following="s[{i}].append({value})",
+    LANGUAGE.printer,
     slope="s[{i}].append(s[{slope}][k] / (k + 1))",
     sums="_{kind}",
+    covector="p[:, {i}]",
+    fixed="f{i} = {value}",
+    held="f{i}",
+    first="s[{i}].append({value} + 0.0)",
+    following="s[{i}].append({value})",
 )
 
 
 def emit(program: Program, command: str) -> dict[str, str]:
     """The file name and its contents."""
     body = _body(program)
-    comment = "\n".join(f"# {line}".rstrip() for line in header_lines(program, command))
-    return {f"{program.name}.py": f"{comment}\n# {CHECKSUM} {checksum(body)}\n{body}"}
+    return {f"{program.name}.py": sealed(header_lines(program, command), body, "# ", "", "")}
 
 
 def _body(program: Program) -> str:
@@ -253,8 +250,7 @@ def _of_pullback(program: Program, step: Step) -> dict[str, object]:
 
 def _attitude(program: Program, attitude: Attitude) -> list[str]:
     """Attitudes: the kernels, and their use."""
-    group, step = attitude.group, program.step
-    rows = len(group.matrices[0]) if group.matrices else 0
+    group, step, rows = attitude.group, program.step, attitude.group.rows
     solved = "_path(stage[0], x, solved)[1]" if isinstance(step, Path) else "solved"
     shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
     values = {

@@ -1,6 +1,6 @@
 import { normalise, turnAdds } from "./attitude_quaternions.mjs";
 import { elementProduct } from "./attitude_quaternions.mjs"; // or all of them from attitude_matrices.mjs
-// #if UNIFORM
+// #if RATE_OF_GAUGE
 import { uniformMotion } from "./attitude_quaternions.mjs";
 import { TURNING, rate } from "./model.mjs";
 // #endif
@@ -71,7 +71,7 @@ export function beginAttitude(solver, first) {
   solver.firstElement = Float64Array.from(first);
   solver.turned = noTurn();
   solver.turnedCarry = new Float64Array(ELEMENT);
-  // #if UNIFORM
+  // #if RATE_OF_GAUGE
   solver.turningRate = new Float64Array(TURNING);
   // #if GAUGE
   rate(solver.params, solver.gauge, solver.x, solver.turningRate);
@@ -89,7 +89,7 @@ export function beginAttitude(solver, first) {
 export function currentElement(solver) {
   const found = new Float64Array(ELEMENT);
   let first = solver.firstElement;
-  // #if UNIFORM
+  // #if RATE_OF_GAUGE
   const moving = uniformMotion(solver.turningRate, solver.t - solver.attitudeFrom);
   const both = new Float64Array(ELEMENT);
   // #if SPATIAL
@@ -119,7 +119,7 @@ export function elementOf(steps, attitude, position) {
   const element = Float64Array.from(given);
   const largest = Math.max(...given.slice(0, ATTITUDE).map(Math.abs));
   if (!(largest > 0)) throw new StepError("BAD_ARGUMENT", steps, "the attitude is 0");
-  // #if QUATERNIONS
+  // #if !MATRICES
   for (let i = 0; i < 4; i++) element[i] /= largest;
   const length = Math.hypot(...element.subarray(0, 4));
   for (let i = 0; i < 4; i++) element[i] /= length;

@@ -66,7 +66,7 @@ export function normalise(g, carry) {
 }
 
 // #endif
-// #if UNIFORM
+// #if RATE_OF_GAUGE
 /** The element of the motion with a constant rate, for some time. */
 export function uniformMotion(turning, t) {
   const element = new Float64Array(ELEMENT);

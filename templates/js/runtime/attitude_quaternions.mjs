@@ -1,4 +1,4 @@
-// #if UNIFORM
+// #if RATE_OF_GAUGE
 import { ELEMENT } from "./model.mjs";
 // #endif
 
@@ -63,7 +63,7 @@ export function normalise(q, carry) {
   for (let i = 0; i < 4; i++) carry[i] -= excess * q[i];
 }
 
-// #if UNIFORM
+// #if RATE_OF_GAUGE
 /** The element of the motion with a constant rate, for some time. */
 export function uniformMotion(turning, t) {
   const element = new Float64Array(ELEMENT);

@@ -60,7 +60,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  // #if HELD
+  // #if GAUGE
   prepare(params, new Float64Array(GAUGE.length), 1e-100, table);
   // #else
   prepare(params, 1e-100, table);
@@ -113,13 +113,14 @@ export class Solver {
   h = NaN;
   /** @type {Readonly<Parameters>} */
   params;
+  // #if MONITOR
+  /** e = -H(x0): K = monitor (H + e) is 0 along the trajectory. */
+  gauge;
+  // #else
   // #if GAUGE
   /** Multiples of the Casimirs in GAUGE that are taken from H. */
   gauge;
   // #endif
-  // #if MONITOR
-  /** e = -H(x0): K = monitor (H + e) is 0 along the trajectory. */
-  gauge;
   // #endif
   // #if RENEWED
   /** What depends on parameters and step size only, then on the time of the step too, for each stage. */
@@ -136,13 +137,13 @@ export class Solver {
   firstElement;
   turned;
   turnedCarry;
-  // #if UNIFORM
+  // #if RATE_OF_GAUGE
   /** The gradient of the Casimirs that are taken from H, by which the body turns too, and since when. */
   turningRate;
   attitudeFrom;
   // #endif
   // #endif
-  // #if EQUAL_IN_T
+  // #if !MONITOR
   /** Steps and time when h was set: time is counted from there, so that no error adds up. */
   #stepsBefore = 0;
   #timeBefore = 0;
@@ -162,12 +163,13 @@ export class Solver {
    * #if TIMED
    * @param {number} [options.t0] the time of x0, 0 by default
    * #endif
+   * #if MONITOR
+   * @param {ArrayLike<number>} [options.gauge] an e of one's own: the step is an exact Poisson map for each
+   * #else
    * #if GAUGE
    * @param {ArrayLike<number>} [options.gauge] multiples of one's own: the step is an exact Poisson map
    *   for each
    * #endif
-   * #if MONITOR
-   * @param {ArrayLike<number>} [options.gauge] an e of one's own: the step is an exact Poisson map for each
    * #endif
    * #if ATTITUDE
    * @param {ArrayLike<number>} [options.attitude0] the attitude at x0, a quaternion (w, x, y, z) of any
@@ -186,7 +188,7 @@ export class Solver {
     // #if NOISE
     Object.assign(this, drawsOf(options));
     // #endif
-    // #if HELD
+    // #if GAUGE
     const { gauge } = options;
     this.gauge = gauge ? finite(gauge, GAUGE.length, "gauge") : chooseGauge(this.params, this.x);
     // #endif
@@ -234,7 +236,7 @@ export class Solver {
     if (!Number.isFinite(h)) throw new StepError("BAD_ARGUMENT", this.steps, `the step is ${h}`);
     if (Object.is(h, this.h)) return;
     FRACTIONS.forEach((fraction, stage) => {
-      // #if HELD
+      // #if GAUGE
       prepare(this.params, this.gauge, fraction * h, this.coef[stage]);
       // #else
       prepare(this.params, fraction * h, this.coef[stage]);
@@ -244,7 +246,7 @@ export class Solver {
       // #endif
     });
     this.h = h;
-    // #if EQUAL_IN_T
+    // #if !MONITOR
     this.#timeBefore = this.t;
     this.#stepsBefore = this.steps;
     // #endif
@@ -332,7 +334,7 @@ export class Solver {
       throw new StepError(status, this.steps);
     }
     this.steps++;
-    // #if EQUAL_IN_T
+    // #if !MONITOR
     this.t = this.#timeBefore + (this.steps - this.#stepsBefore) * h;
     // #endif
     return this;
@@ -398,12 +400,12 @@ export class Solver {
     // #if IMPLICIT
     for (const history of this.history) history.move(this.x, x);
     // #endif
-    // #if UNIFORM
+    // #if RATE_OF_GAUGE
     const element = currentElement(this);
     // #endif
     this.x.set(x);
     this.carry.set(carry);
-    // #if UNIFORM
+    // #if RATE_OF_GAUGE
     beginAttitude(this, elementOf(this.steps, element.subarray(0, ATTITUDE), element.subarray(ATTITUDE)));
     // #endif
     return this;
@@ -509,7 +511,7 @@ export class Solver {
   }
   // #else
   modifiedHamiltonian(h, x = this.x) {
-    // #if HELD
+    // #if GAUGE
     modified(this.params, this.gauge, h, x, number);
     // #else
     modified(this.params, h, x, number);

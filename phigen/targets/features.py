@@ -1,0 +1,65 @@
+"""What a solver may have: the switches of the runtimes that lie in files, and what each asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting, Sweeps
+from phigen.targets.path import kinds, recurrences
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A switch of a runtime: ``when`` a program has it, if it has also what it ``requires``; ``part`` is the name by
+    which users leave it out."""
+
+    name: str
+    when: Callable[[Program], object] = lambda program: True
+    requires: tuple[str, ...] = ()
+    part: str = ""
+
+
+def _sums(kind: str) -> Callable[[Program], bool]:
+    return lambda p: any(kind in kinds(path) for path in recurrences(p))
+
+
+#: What all languages know, each after what it requires.
+FEATURES = (
+    Feature("NEWTON", lambda p: isinstance(p.step, Newton)),
+    Feature("PATH", lambda p: isinstance(p.step, Path)),
+    Feature("EXPLICIT", lambda p: isinstance(p.step, Explicit)),
+    Feature("SPLITTING", lambda p: isinstance(p.step, Splitting)),
+    Feature("IMPLICIT", lambda p: isinstance(p.step, Implicit)),
+    Feature("COMPOSED", lambda p: len(p.fractions) > 1),
+    Feature("KICKS", lambda p: isinstance(p.step, Splitting | Sweeps) and p.step.schedule.multiples),
+    Feature("TIMED", lambda p: p.time),
+    Feature("NOISE", lambda p: p.noise),
+    Feature("RENEWED", lambda p: p.step.refresh),
+    Feature("GAUGE", lambda p: p.held),
+    Feature("MONITOR", lambda p: p.monitor),
+    Feature("ATTITUDE", lambda p: p.attitude),
+    Feature("MATRICES", lambda p: p.attitude and p.attitude.group.matrices),
+    Feature("NORMALISE", lambda p: p.attitude and p.attitude.group.orthogonal),
+    Feature("EXPONENTIAL", lambda p: p.attitude and p.attitude.exponential),
+    Feature("TURNED_IN_STAGES", lambda p: p.attitude and p.attitude.turn),
+    Feature("TURNED_BY_COVECTOR", lambda p: p.attitude and not p.attitude.cayley, ("TURNED_IN_STAGES", "MATRICES")),
+    Feature("POSITION", lambda p: p.attitude and p.attitude.group.translation),
+    Feature("SPATIAL", lambda p: p.attitude and p.attitude.group.spatial),
+    Feature("RATE_OF_GAUGE", lambda p: p.attitude and p.attitude.rate),
+    Feature("TANGENT", lambda p: p.extras.tangent),
+    Feature("MODIFIED", lambda p: p.modified),
+    Feature("KICKED", part="kicks"),
+    Feature("ENSEMBLE", part="ensemble"),
+    *(Feature(f"TAYLOR_{kind.upper()}", _sums(kind)) for kind in ("product", "chain", "power")),
+)
+
+
+def switches(program: Program, further: Iterable[Feature] = ()) -> dict[str, bool]:
+    """Whether the program has each of the features, and of those that only one language knows."""
+    found: dict[str, bool] = {}
+    for feature in (*FEATURES, *further):
+        asked = bool(feature.when(program)) and program.offers(feature.part)
+        found[feature.name] = asked and all(found[name] for name in feature.requires)
+    return found
