@@ -346,6 +346,13 @@ def test_transposes_of_flows_compute_nothing_that_is_known_or_unused():
     assert [all(unused) for unused in found] == alone
 
 
+def test_c_defines_functions_of_flows_only_where_flows_call_them():
+    damped = f"phigen: 1\nname: t\nscheme: splitting\nadjoint: true\n{SWING}{SHORT}forces: {{vector: {{p: -w*p}}}}\n"
+    text = files(compile_spec(spec.loads(damped)), "c")["t.c"]
+    assert "] = expm1(" in text  # a coefficient
+    assert "t_expm1" not in text
+
+
 def test_steps_that_forget_what_was_before_are_pulled_back_too():
     """Where a guess misleads, a step is made again without: then the solver remembers fewer steps than it has made."""
     both = Extras(tangent=True, adjoint=True)

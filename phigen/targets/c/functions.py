@@ -57,9 +57,9 @@ def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
     """The functions of phigen's own that kernels call, but those ``unprinted``: φ and its derivatives, `ENTIRE`,
     and for a splitting those that its flows call."""
     step = program.step
-    flows = (
-        (*step.flows, *step.tangents, *step.transposed) if isinstance(step, Splitting) else ()
-    )  # loops over sites have their own
+    flows: tuple[Kernel, ...] = ()  # loops over sites have their own
+    if isinstance(step, Splitting):
+        flows = (*step.flows, *step.tangents, *(step.adjoint.steps if step.adjoint else ()))
     used = {e.op for e in topological([e for kernel in flows for e in kernel.roots])}
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program, unprinted)]
