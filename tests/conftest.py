@@ -1,4 +1,6 @@
+import atexit
 import gc
+import os
 import re
 import signal
 
@@ -21,6 +23,10 @@ def pytest_addoption(parser):
 def pytest_configure(config):
     # What is compiled is kept for the tests that follow: there is much to go through, and little of it is garbage.
     gc.set_threshold(200_000, 20, 100)
+    if hasattr(config, "workerinput"):
+        # A worker's last act, after what else is to be done at its end: to let go of millions of nodes and frames one
+        # by one would take seconds.
+        atexit.register(os._exit, 0)
     # In the background of a shell interrupts are ignored, and children would ignore them as well.
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -45,6 +51,10 @@ def _is_slow(item):
     thinned = [(QUICK, NAMES)] if item.get_closest_marker("corpus") else []
     thinned += [(mark.args, mark.kwargs["of"]) for mark in item.iter_markers("few")]
     return item.get_closest_marker("slow") or any(given & {*of} - {*few} for few, of in thinned)
+
+
+def pytest_sessionfinish():
+    gc.freeze()  # pytest goes through all there is five times, to find what was not closed
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -85,9 +95,9 @@ def compiled_solvers(request, tmp_path_factory):
 @pytest.fixture(scope="module")
 def as_users_compile(request, compiled_solvers):
     """With --all, C is compiled with the flags users get: where the C of the whole corpus is what is tested."""
-    flags = _optimised("-O3") if request.config.option.all else (*_optimised("-Og"), *WARNINGS)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(toolchain, "BASE_FLAGS", flags)
+        if request.config.option.all:
+            patch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
         yield
 
 

@@ -2,10 +2,12 @@
 
 import ctypes
 import shlex
+from itertools import product
 from pathlib import Path
 
 import pytest
 from cli_specs import NOT_POISSON
+from support import slow_but
 
 FILES = ["a.c", "a.h", "a.py"]
 
@@ -88,10 +90,11 @@ def damage_spec():
     spec.write_text(spec.read_text().replace("order: 2", "order: 4"))
 
 
-@pytest.mark.parametrize(
-    "damage", [damage_edit, damage_header, damage_missing, damage_orphan, damage_stale, damage_spec]
-)
-@pytest.mark.parametrize("folder", ["generated", "else where"])
+DAMAGES = [damage_edit, damage_header, damage_missing, damage_orphan, damage_stale, damage_spec]
+QUICK = [*product(["generated"], DAMAGES), ("else where", damage_edit), ("else where", damage_orphan)]
+
+
+@pytest.mark.parametrize(("folder", "damage"), slow_but(QUICK, product(["generated", "else where"], DAMAGES)))
 def test_check_notices_and_names_the_command_that_mends(phigen, write, damage, folder, monkeypatch):
     write("specs/a.yaml")
     options = [] if folder == "generated" else ["-o", folder]

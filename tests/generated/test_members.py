@@ -70,7 +70,10 @@ def test_parts_of_ensembles_end_where_groups_do(monkeypatch):
     assert len(made) > 3
 
 
-@pytest.mark.parametrize(("target", "profile"), [*product(TARGETS, ["fast"]), ("c", "small")])
+FAST = [*product(TARGETS, ["fast"])]
+
+
+@pytest.mark.parametrize(("target", "profile"), slow_but(FAST, [*FAST, ("c", "small")]))
 @pytest.mark.parametrize("scheme", ["series", "splitting"])
 def test_a_member_that_fails_has_no_frames_from_then_on(target, profile, scheme):
     """Of four, the second runs into its singularity after 239 steps; the numbers of the last are refused."""

@@ -75,7 +75,11 @@ def differences(step, x, width=1e-3):
     return np.column_stack(columns)
 
 
-@pytest.mark.parametrize(("target", "name"), slow_but(product(TARGETS, QUICK), product(TARGETS, NAMES)))
+#: Of `KINDS` it follows from what comes next, where the derivative is that of a map that is one by another test.
+FEW = [("c", name) for name in QUICK if name not in KINDS] + [("numpy", "lotka_volterra")]
+
+
+@pytest.mark.parametrize(("target", "name"), slow_but(FEW, product(TARGETS, NAMES)))
 def test_step_is_a_poisson_map(name, target):
     compilation = with_tangent(name) if name in QUICK else small(with_tangent(name))
     made = solver(compilation, target)
@@ -213,7 +217,7 @@ def test_code_without_extras_is_the_same_whatever_was_compiled_before():
     assert asked.program.step.linearise == again.program.step.linearise
 
 
-@pytest.mark.parametrize("compiler", ["gcc", "clang"])
+@pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
 @pytest.mark.parametrize("name", [*KINDS, "toda3_quadratic", "ablowitz_ladik3"])
 def test_generated_c_has_no_warnings(name, compiler, tmp_path):
     write(tmp_path, files(with_tangent(name), "c"))

@@ -165,6 +165,7 @@ def test_steps_and_what_is_seen_are_those_of_numpy_to_roundoff(case: str, answer
     assert found["first"] == found["x"][: len(found["first"])]
 
 
+@pytest.mark.slow
 def test_sweeps_of_every_kind_are_among_them(answers: dict[str, dict[str, Any]]) -> None:
     steps = [compiled(case).program.step for case in CASES]
     assert {s.equation is not None for s in steps} == {True, False}  # type: ignore[union-attr]

@@ -75,7 +75,7 @@ SIZES = {
     "swarm": [(5,)],
 }
 CASES = [(name, sizes) for name, listed in SIZES.items() for sizes in listed]
-pytestmark = pytest.mark.few("chain", "sheet", "net", of=SIZES)
+pytestmark = pytest.mark.few("sheet", "net", of=SIZES)
 
 
 @cache

@@ -25,6 +25,8 @@ NAMES = (
 )
 WITH_CASIMIRS = tuple(n for n in NAMES if n not in ("ablowitz_ladik3", "charged_particle", "guiding_centre"))
 
+BACK = ("charged_particle", "sklyanin_gyrostat", "sir_epidemic", "guiding_centre")
+
 EPS = np.finfo(float).eps
 
 
@@ -34,7 +36,11 @@ def steady(name):
     return numbers(compilation, "long" if "long" in compilation.spec.runs else "reference")
 
 
-@pytest.mark.parametrize("name", slow_but({*NAMES} - {"ablowitz_ladik3", "guiding_centre"}, NAMES))
+#: One for each kind of function along the path, and one with a closed form.
+FEW = ("charged_particle", "engel_geodesics", "maxwell_bloch", "nambu_pendulum", "sir_epidemic", "toda3_quadratic")
+
+
+@pytest.mark.parametrize("name", slow_but(FEW, NAMES))
 def test_step_is_a_poisson_map_and_the_generated_one(name):
     # Order 2, one stage, where order 4 is a composition.
     compilation, at = by_paths(name, 2 if name in ("ablowitz_ladik3", "guiding_centre") else 4), steady(name)
@@ -89,7 +95,7 @@ def test_no_path_crosses_the_boundary_of_its_leaf(h):
 
 
 @pytest.mark.parametrize("target", TARGETS)
-@pytest.mark.parametrize("name", ["charged_particle", "sklyanin_gyrostat", "sir_epidemic", "guiding_centre"])
+@pytest.mark.parametrize("name", slow_but(["charged_particle", "sir_epidemic"], BACK))
 def test_step_back_undoes_step(name, target):
     compilation, at = by_paths(name), steady(name)
     solve, count = solver(compilation, target), 100 if target == "c" else 10
@@ -110,7 +116,7 @@ def test_energy_error_does_not_grow(name):
     assert max(windows) > 1e-12  # else this shows round-off only
 
 
-@pytest.mark.parametrize("name", ["charged_particle", "sklyanin_gyrostat", "sir_epidemic", "maxwell_bloch"])
+@pytest.mark.parametrize("name", slow_but(["charged_particle", "sir_epidemic"], [*BACK[:3], "maxwell_bloch"]))
 def test_numpy_and_c_agree_to_roundoff(name):
     compilation, at = by_paths(name), steady(name)
     ends = [solver(compilation, t).integrate(at.x, h=at.h, steps=50, parameters=at.parameters).x[-1] for t in TARGETS]

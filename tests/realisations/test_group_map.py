@@ -2,6 +2,7 @@
 
 import pytest
 from geometry.building import family, system
+from systems import slow_but
 
 from phigen.errors import SpecError
 from phigen.geometry.system import system_from_spec
@@ -15,6 +16,9 @@ from phigen.symbolic.verdict import PROVED, decide_zero
 
 P = symbol(MATRIX)
 CAYLEY = (1 + P / 2) / (1 - P / 2)
+
+
+GROUPS = [("so", 3), ("sl", 2), ("se", 2), ("heisenberg", 1)]
 
 
 def mapped(tau):
@@ -38,7 +42,7 @@ def test_the_cayley_transform_is_the_kind_cayley(name, size):
     assert decide_zero("τ = Cayley", [("", a - b) for a, b in pairs]).verdict == PROVED
 
 
-@pytest.mark.parametrize(("name", "size"), [("so", 3), ("sl", 2), ("se", 2), ("heisenberg", 1)])
+@pytest.mark.parametrize(("name", "size"), slow_but([("sl", 2), ("heisenberg", 1)], GROUPS))
 @pytest.mark.parametrize(
     "tau",
     [(1 + P / 2 + P**2 / 12) / (1 - P / 2 + P**2 / 12), ((1 + P / 4) / (1 - P / 4)) ** 2],

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from html_check import Page
-from support import compiled
+from support import compiled, slow_but
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
@@ -104,7 +104,10 @@ def test_measured_times_are_marked(html):
 # -- systems of every kind, without measurements
 
 
-@pytest.mark.parametrize("name", ["pendulum_euler", "poisson_not_hamiltonian", "sir_epidemic", "spin_chain5"])
+BARE = ["pendulum_euler", "poisson_not_hamiltonian", "sir_epidemic"]
+
+
+@pytest.mark.parametrize("name", slow_but(BARE, [*BARE, "spin_chain5"]))
 def test_page_without_measurements_is_sound(name):
     text = bare(compiled(name))
     assert Page(text).errors == []

@@ -17,6 +17,7 @@ def session_of(name, target):
     return solver(compiled(name), target).backend.start(np.array(at.x), at.parameters), at
 
 
+@pytest.mark.corpus
 @pytest.mark.parametrize("name", NAMES)
 def test_numpy_session_is_the_loop_of_the_generated_module(name):
     session, at = session_of(name, "numpy")

@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from support import BODY, compiled
+from support import BODY, compiled, slow_but
 
 from phigen import resources, spec
 from phigen.api import solver_of
@@ -234,7 +234,7 @@ def test_command_for_machines_and_exit_code(file, monkeypatch):
     assert "reversibility" in result.stderr
 
 
-@pytest.mark.parametrize("name", ["rigid_body", "predator_prey"])
+@pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "predator_prey"]))
 def test_every_row_has_a_meaning_which_the_documentation_gives(name):
     compilation = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
     run = next(iter(compilation.spec.runs.values()))

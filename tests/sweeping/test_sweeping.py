@@ -48,9 +48,11 @@ def spec():
 
 
 @pytest.fixture(scope="module")
-def cluster():
+def cluster(request):
+    """Workers take seconds to start; that several do the work is tested with --all."""
+    several = request.config.option.all
     with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+        n_workers=1 + several, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
     ) as made:
         made.scheduler.allowed_failures = clusters.TRIES
         yield made

@@ -41,8 +41,10 @@ def defined(switches):
     return [f"-DPHI_{switch}=1" for switch in switches]
 
 
-#: Those of fast code take two seconds each.
-FEW = [switches for switches in [*IMPLICIT, *EXPLICIT] if "FAST" not in switches or len(switches) == 2]
+#: Each switch with one kind of step that has code for it, and all that go together.
+FEW = [(kind, *more) for kind in ("NEWTON", "PATH") for more in ((), ("FAST",), ("COMPOSED", "ADJOINT", "TANGENT"))]
+FEW += [("NEWTON", "GAUGE"), ("EXPLICIT",), ("EXPLICIT", "FAST"), ("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST"),
+        ("SPLITTING", "TANGENT")]  # fmt: skip
 
 
 @pytest.mark.parametrize(
