@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 6f0edb7b44295813e2d98fb96248923bd41131ef49c6b325a033a8a958d16be1
+ * body-sha256: d162d3612d4b2220260fc0e586694c06a3a16fffe0299329ada82d67a6d249d9
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -859,8 +859,8 @@ dzhanibekov_status dzhanibekov_ensemble_attitudes(const dzhanibekov_params *para
     double *attitude, size_t members, const double *gauge, const double *h, size_t steps, size_t stride,
     double *frames, double *attitudes, unsigned char *status)
 {
-    dzhanibekov_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1,
-        .params = params };
+    dzhanibekov_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .attitude = attitude };
     dzhanibekov_status worst = dzhanibekov_OK;
     size_t earliest = members;
     if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return dzhanibekov_BAD_ARGUMENT;

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 21b0272ceb06c32963d9ca26b34c9fa38f6a49b5cd5781951a902d63f603f527
+ * body-sha256: f9a919877a460b50bcea5295cfcb83cda04b6993a462e2d8b7bfbd8dc74d39db
  */
 #include "satellite.h"
 #include <float.h>
@@ -1394,8 +1394,8 @@ satellite_status satellite_ensemble_attitudes(const satellite_params *params, do
     size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
     unsigned char *status)
 {
-    satellite_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1,
-        .params = params };
+    satellite_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
+        .attitude = attitude };
     satellite_status worst = satellite_OK;
     size_t earliest = members;
     if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return satellite_BAD_ARGUMENT;

@@ -54,7 +54,7 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
 #endif
     size_t stride, double *frames, double *attitudes, unsigned char *status)
 {
-    phi_members all = { .x = x, .attitude = attitude, .members = members, .steps = steps, .own = 1, .params = params };
+    phi_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params, .attitude = attitude };
     phi_status worst = PHI_OK;
     size_t earliest = members;
     if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return PHI_BAD_ARGUMENT;
