@@ -2,7 +2,7 @@
  * thermal_heisenberg.h: the declarations; thermal_heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e3ee8836661a107b4ba6b00d257d5110634c50d0bbf2129a3c3b4a3a5c37231b
+ * body-sha256: 78849757f40fcca6e2aa906475c06e73d8d573acd6dd08926156cf5aa8ac3a98
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -27,9 +27,8 @@ typedef struct {
 
 extern const thermal_heisenberg_params thermal_heisenberg_default_params;
 
-enum { thermal_heisenberg_ARRAYS = 7 };       /* arrays over the sites: fields, then parameters, then noise */
-enum { thermal_heisenberg_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
-enum { thermal_heisenberg_DIRECTIONS = 24 };  /* of a Krylov space */
+enum { thermal_heisenberg_ARRAYS = 7 }; /* arrays over the sites: fields, then parameters, then noise */
+enum { thermal_heisenberg_COEFFICIENTS = 60 }; /* numbers that depend on params and h only */
 
 /* How a step ends; thermal_heisenberg_status_string says it in words. */
 typedef enum { thermal_heisenberg_OK = 0, thermal_heisenberg_NO_CONVERGENCE, thermal_heisenberg_SINGULAR,
@@ -44,18 +43,13 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[thermal_heisenberg_ARRAYS];
-    ptrdiff_t *lines;                       /* of each row, where it is and where those beside it are */
+    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[thermal_heisenberg_DIM]; /* the fields before the steps that are being made */
-    /* the middle of a stage, before and after a sweep, and varied; with the parameters at sites */
-    double *y[3][thermal_heisenberg_ARRAYS];
-    size_t sweeps;                        /* that stages took since thermal_heisenberg_init */
-    int stiff;                            /* whether sweeps have failed */
-    double usual[thermal_heisenberg_DIM]; /* the sizes of the fields of y */
-    /* variations of y, sums over pieces: see thermal_heisenberg_krylov */
-    double *space[thermal_heisenberg_DIRECTIONS + 1][thermal_heisenberg_DIM], *sums;
+    int open; /* whether these lack the last flow of a step, which between calls x has made */
+    size_t far; /* steps to be made by functions for large arguments, where there are others */
     size_t steps; /* good steps since thermal_heisenberg_init */
-    double t;     /* time since thermal_heisenberg_init */
-    double h;     /* the last step size */
+    double t; /* time since thermal_heisenberg_init */
+    double h; /* the last step size */
     /* of the noise: its seed, and the number of the step after thermal_heisenberg_init */
     uint64_t seed, first_step;
     uint32_t member;
@@ -87,12 +81,19 @@ thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver
 thermal_heisenberg_status thermal_heisenberg_passed(thermal_heisenberg_solver *s, double h, size_t steps);
 
 /* Steps of size h, of either sign. If one fails, the state is that before it, and s->steps counts the good
-   ones. With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
+   ones. Steps are joined, also those of several calls: where one ends as the next begins, both are one flow.
+   With OpenMP rows are worked at in parallel, with the same bits for any number of threads. */
 thermal_heisenberg_status thermal_heisenberg_step(thermal_heisenberg_solver *s, double h);
 thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver *s, double h, size_t steps);
 
 /* The state x[field][site]. */
 void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x);
+
+/* To go on elsewhere with the same bits: if thermal_heisenberg_saved is 1, x is what the next step begins
+   with, for thermal_heisenberg_resume after thermal_heisenberg_init at the state. */
+int thermal_heisenberg_saved(const thermal_heisenberg_solver *s, double *x, size_t *far);
+thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s, double h, const double *x,
+    size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

@@ -5,7 +5,7 @@ Each source of noise has the flow of Σ ΔW_s σ g(s), the sum over all sites wi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -13,8 +13,19 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.geometry import checks
 from phigen.geometry.system import build_system, system_from_spec
 from phigen.lattice.cell import GRAPH, PERIODIC, Cell
+from phigen.lattice.damping import damping_flows
 from phigen.lattice.expansion import expand
-from phigen.lattice.parts import CellFlow, Colouring, NoPartError, PartSearch, SiteFields, SiteMotion, own_ring
+from phigen.lattice.graphs import sums_by_field
+from phigen.lattice.parts import (
+    CellFlow,
+    Colouring,
+    NoPartError,
+    PartSearch,
+    SiteFields,
+    SiteMotion,
+    at_every_site,
+    own_ring,
+)
 from phigen.scheme.choosing import Host
 from phigen.spec.grammar import names_in
 from phigen.spec.model import NO_FORCES, MatrixForm, Parameter
@@ -32,26 +43,46 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
     """The flows of the forces; none without any. `SpecError` that names the piece that has none in closed form."""
     if not cell.forces:
         return ()
-    at = SiteFields(cell)
+    at = SiteFields(cell, sums_by_field(cell))
     tangent = {f: at.tangent(f, at.push) for f in cell.fields}
     impulse = {f: at.impulse(f) for f in cell.fields}
     whole = _flow(cell, colouring, {f: tangent[f] + impulse[f] for f in cell.fields})
     if isinstance(whole, CellFlow):
         return (whole,)
-    covectors = [(f"ζ_{f}", _alone(cell, at, f)) for f in cell.fields]
     components = [(f"f = {shortened(e)}", {f: e}) for f, e in impulse.items()]
-    place = next((host.locations[(key,)] for key in ("damping", "forces") if (key,) in host.locations), None)
-    found: list[CellFlow] = []
-    for field, pieces in ((tangent, covectors), (impulse, components)):
-        together = _flow(cell, colouring, field)
-        named = [("", field)] if isinstance(together, CellFlow) else pieces
-        for name, piece in named:
-            flow = _flow(cell, colouring, piece)
-            if isinstance(flow, str):
-                message = f"scheme splitting: the force {name} has no elementary flow on the lattice: {flow}"
-                raise SpecError([Diagnostic(message, place, "scheme: series takes every force")])
-            found.append(flow)
+    found = (*_tangent_flows(cell, colouring, host), *_pieces(cell, colouring, impulse, components, host))
     return tuple(flow for flow in found if flow.motions)
+
+
+def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
+    """The flows of πζ: the whole of it, or of its covectors, or of damping and of the other covectors."""
+    at = SiteFields(cell, sums_by_field(cell))
+    tangent = {f: at.tangent(f, at.push) for f in cell.fields}
+    try:
+        covectors = [(f"ζ_{f}", _alone(cell, at, f)) for f in cell.fields]
+        return tuple(_pieces(cell, colouring, tangent, covectors, host))
+    except SpecError:
+        if cell.forces.damping is None:
+            raise
+    undamped = replace(cell, forces=replace(cell.forces, damping=None))
+    return (
+        *damping_flows(cell, colouring, host),
+        *(_tangent_flows(undamped, colouring, host) if undamped.forces else ()),
+    )
+
+
+def _pieces(
+    cell: Cell, colouring: Colouring, field: Rates, pieces: Sequence[tuple[str, Rates]], host: Host
+) -> Iterator[CellFlow]:
+    """The flow of a field, or those of its pieces."""
+    together = _flow(cell, colouring, field)
+    for name, piece in [("", field)] if isinstance(together, CellFlow) else pieces:
+        flow = _flow(cell, colouring, piece)
+        if isinstance(flow, str):
+            message = f"scheme splitting: the force {name} has no elementary flow on the lattice: {flow}"
+            place = next((host.locations[(key,)] for key in ("damping", "forces") if (key,) in host.locations), None)
+            raise SpecError([Diagnostic(message, place, "scheme: series takes every force")])
+        yield flow
 
 
 def _alone(cell: Cell, at: SiteFields, field: str) -> dict[str, Expression]:
@@ -73,12 +104,9 @@ def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
     if isinstance(found, str):
         return found
     increments = {f: e for f, e in zip(cell.fields, found.increments, strict=True) if not e.is_zero}
-    motions = (
-        tuple(SiteMotion(c, increments, (), moved, increments, found.manner) for c in range(colouring.count))
-        if moved
-        else ()
-    )
-    return CellFlow(ZERO, tuple(found.increments), found.manner, motions, force=tuple(moved.values()))
+    motions = [SiteMotion(c, increments, (), moved, increments, found.manner) for c in range(colouring.count) if moved]
+    settled = at_every_site(motions, colouring.count)
+    return CellFlow(ZERO, tuple(found.increments), found.manner, settled, force=tuple(moved.values()))
 
 
 def noise_flows(

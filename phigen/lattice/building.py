@@ -53,6 +53,12 @@ def least_sizes(cell: Cell) -> tuple[int, ...]:
 
 def expect_coloured(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> None:
     """Raises `SpecError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
+    if problems := misfits(spec, axes, periods):
+        raise SpecError(problems)
+
+
+def misfits(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> list[Diagnostic]:
+    """What `expect_coloured` has to say."""
     problems = []
     for run in spec.runs.values():
         sizes = run.lattice.sizes if run.lattice else ()
@@ -62,8 +68,7 @@ def expect_coloured(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> 
                 nearest = size - size % period or period
                 hint = f"for example {nearest}; scheme: series takes every size"
                 problems.append(spec.diagnostic(("runs", run.name, "sizes"), message, hint))
-    if problems:
-        raise SpecError(problems)
+    return problems
 
 
 def _local(spec: Spec) -> dict[tuple[str, str], Expression]:

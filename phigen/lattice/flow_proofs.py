@@ -9,11 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from phigen.lattice.cell import Cell
+from phigen.lattice.graphs import sums_by_field
 from phigen.lattice.parts import CellFlow, SiteFields, SiteMotion, summands_of
 from phigen.lattice.sweeps import SplittingPlan
 from phigen.splitting.ring import KICK, TIME
 from phigen.splitting.statements import angles_added
-from phigen.symbolic.expression import ZERO, Expression, derivatives, number, substitute, symbol, symbols_of, total
+from phigen.symbolic.expression import ONE, ZERO, Expression, derivatives, number, substitute, symbol, symbols_of, total
+from phigen.symbolic.symbols import CHOSEN, Symbol
 from phigen.symbolic.verdict import Statement, decide_zero
 
 
@@ -27,7 +29,7 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     name = "H = " + " + ".join(f"H_{k}" for k, f in enumerate(flows, 1) if not f.force) + " at κ = 0" * modified
     yield decide_zero(name, [("", rest)], positive, f"sites of {count} colours" if count > 1 else "")
     if cell.forces:
-        yield _forces(cell, flows, positive)
+        yield _forces(cell, flows, count, positive)
     for k, flow in enumerate(flows, 1):
         residuals = [r for motion in flow.motions for r in _residuals(motion)]
         what, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
@@ -39,14 +41,18 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
         yield decide_zero(name, residuals, positive, flow.manner)
 
 
-def _forces(cell: Cell, flows: Sequence[CellFlow], positive: Sequence[str]) -> Statement:
+def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequence[str]) -> Statement:
     """The force parts are πζ + f together."""
-    at = SiteFields(cell)
-    moved: dict[str, list[Expression]] = {f: [] for f in cell.fields}
-    for flow in flows:
-        for f, e in flow.motions[0].rates.items() if flow.force else ():
-            moved[f].append(e)
-    residuals = [(f, at.tangent(f, at.push) + at.impulse(f) - total(listed)) for f, listed in moved.items()]
+    at = SiteFields(cell, sums_by_field(cell))
+    acting = [flow for flow in flows if flow.force]
+    residuals = []
+    for colour in range(count):
+        moved: dict[str, list[Expression]] = {f: [] for f in cell.fields}
+        for motion in (m for flow in acting for m in flow.motions if m.colour in (None, colour)):
+            known = {**motion.components, Symbol(CHOSEN): ONE}
+            for f, e in zip(motion.rates, substitute(list(motion.rates.values()), known), strict=True):
+                moved[f].append(e)
+        residuals += [(f, at.tangent(f, at.push) + at.impulse(f) - total(listed)) for f, listed in moved.items()]
     name = "πζ + f = " + " + ".join(f"F_{k}" for k, flow in enumerate(flows, 1) if flow.force)
     return decide_zero(name, residuals, positive)
 

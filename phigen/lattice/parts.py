@@ -91,17 +91,27 @@ class BondSum:
 class SiteMotion:
     """How sites of one colour move: increments of the fields, which read the site and neighbours that stand still.
 
+    Without a colour they are those of all sites.
     ``gathered`` are the sums over bonds or pairs that the increments read as symbols `GATHERED`.
     ``solution`` are the increments with a symbol for each component of the gradient, which solve ẋ = ``rates``;
-    ``manner`` says how the fields move.
+    ``components`` is what these symbols of a force stand for. ``manner`` says how the fields move.
     """
 
-    colour: int
+    colour: int | None
     increments: Mapping[str, Expression]
     gathered: tuple[BondSum, ...] = ()
     rates: Mapping[str, Expression] = field(default_factory=dict)
     solution: Mapping[str, Expression] = field(default_factory=dict)
     manner: str = ""
+    components: Mapping[str, Expression] = field(default_factory=dict)
+
+
+def at_every_site(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:
+    """One motion for those of all colours where they are the same."""
+    same = (
+        count > 1 and len(motions) == count and all(replace(m, colour=motions[0].colour) == motions[0] for m in motions)
+    )
+    return (replace(motions[0], colour=None),) if same else tuple(motions)
 
 
 @dataclass(frozen=True)
@@ -143,7 +153,7 @@ def split_cell(
     search = search or PartSearch
     refused: NoPartError | None = None
     best: CellSplitting | None = None
-    for colouring in _colourings(cell):
+    for colouring in colourings(cell):
         if best is not None and colouring.count > best.colouring.count:
             break
         try:
@@ -161,7 +171,8 @@ def split_cell(
     return best
 
 
-def _colourings(cell: Cell) -> Iterator[Colouring]:
+def colourings(cell: Cell) -> Iterator[Colouring]:
+    """All that are tried, those with the fewest colours first."""
     yield Colouring(1, (0,) * len(cell.axes))
     if cell.relation != GRID:
         return
@@ -268,7 +279,7 @@ class PartSearch:
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], added))
         hamiltonian = total(s.expression for s, _ in listed)
         manner = "; ".join(dict.fromkeys(m.manner for m in motions))
-        return CellFlow(hamiltonian, increments, manner, tuple(motions), listed)
+        return CellFlow(hamiltonian, increments, manner, at_every_site(motions, self.colouring.count), listed)
 
     def _motions(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
@@ -389,9 +400,10 @@ class PartSearch:
                 if f in moved:
                     rates[f].append(entry * slopes[g])
             field = {f: total(listed) for f, listed in rates.items()}
-            motions = tuple(SiteMotion(c, moved, (), field, moved, flow.manner) for c in colours) if moved else ()
+            motions = [SiteMotion(c, moved, (), field, moved, flow.manner) for c in colours if moved]
             own = ((Summand(flow.hamiltonian, steps, steps), colours),)
-            found.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, motions, own))
+            settled = at_every_site(motions, self.colouring.count)
+            found.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, settled, own))
         return found
 
 
@@ -413,7 +425,11 @@ class SiteFields:
         found = self._shifted(acting.covector.get(field, ZERO), shift)
         if acting.damping is None:
             return found
-        return found + self._shifted(acting.damping, shift) * self.tangent(field, self.slope, shift)
+        return found + self.damping(shift) * self.tangent(field, self.slope, shift)
+
+    def damping(self, shift: Offset = ()) -> Expression:
+        """λ at the site ``shift`` away, 0 without damping."""
+        return self._shifted(self.cell.forces.damping or ZERO, shift)
 
     def impulse(self, field: str) -> Expression:
         """The vector force on a field."""

@@ -10,7 +10,7 @@ from typing import Any
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import least_sizes
+from phigen.lattice.building import least_sizes, misfits
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
 from phigen.lattice.kernels import site_kernel
@@ -20,8 +20,10 @@ from phigen.lattice.parts import (
     CellFlow,
     CellSplitting,
     Colouring,
+    NoPartError,
     PartSearch,
     SiteMotion,
+    colourings,
     present,
     split_cell,
     summands_of,
@@ -118,7 +120,7 @@ def plan_sweeps(
     if scheme == "series" or (scheme == "auto" and spec and spec.birealisation.kind != "auto"):
         return plan_series(cell, host, order, composition, spec)
     try:
-        return _plan_splitting(cell, host, order, composition)
+        return _plan_splitting(cell, host, order, composition, spec, scheme)
     except SpecError as unsplit:
         if scheme == "splitting":
             raise
@@ -128,11 +130,14 @@ def plan_sweeps(
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
 
 
-def _plan_splitting(cell: Cell, host: Host, order: int, composition: str) -> SplittingPlan:
+def _plan_splitting(
+    cell: Cell, host: Host, order: int, composition: str, spec: Spec | None, scheme: str
+) -> SplittingPlan:
     search = GraphSearch if cell.relation == GRAPH else PartSearch
     parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
+    parts, forced = _with_forces(cell, parts, search, host, spec, scheme)
     noise = tuple(noise_flows(cell, parts.colouring, search, host))
-    flows = (*parts.flows, *force_flows(cell, parts.colouring, host))
+    flows = (*parts.flows, *forced)
     choice = planned(host, Splitting(flows), order, composition, lambda: () if cell.forces else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
@@ -141,6 +146,30 @@ def _plan_splitting(cell: Cell, host: Host, order: int, composition: str) -> Spl
     if cell.time:  # the flows of colours follow each other in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
     return SplittingPlan(parts, choice, noise)
+
+
+def _with_forces(
+    cell: Cell, parts: CellSplitting, search: type[PartSearch], host: Host, spec: Spec | None, scheme: str
+) -> tuple[CellSplitting, tuple[CellFlow, ...]]:
+    """The parts of H and of the forces, with more colours where damping needs them: such as all runs have sizes for.
+
+    Where there are none, the scheme ``splitting`` has others, and the runs are refused.
+    """
+    try:
+        return parts, force_flows(cell, parts.colouring, host)
+    except SpecError as refused:
+        found = None
+        for colouring in colourings(cell) if cell.forces.damping is not None else ():
+            try:
+                made = search(cell, colouring).splitting(), force_flows(cell, colouring, host)
+            except (SpecError, NoPartError):
+                continue
+            if not spec or not misfits(spec, cell.axes, colouring.periods(cell.boundary)):
+                return made
+            found = found or made
+        if found is None or scheme == "auto":
+            raise refused
+        return found
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:

@@ -318,6 +318,8 @@ class Partners:
 class Sweep:
     """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
 
+    Without a colour it is made at every site.
+
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
     beyond no open end, or where a site has the colour of the sweep, else 0, and ``gathered``, what ``gather`` adds up.
     ``tangent`` is there if derivatives of a step were asked for: how the variations of the moved fields change, from
@@ -326,7 +328,7 @@ class Sweep:
 
     kernel: Kernel
     moved: tuple[int, ...]
-    colour: int = 0
+    colour: int | None = 0
     gather: Gather | None = None
     tangent: Sweep | None = None
 

@@ -222,7 +222,7 @@ class _Printed:
         before = [f"{camel(e.kernel.name)}({given});" for e in _ends(sweep.gather)]
         clear = ["sites.sums.fill(0);"] if before else []
         loop = "for (let i = 0; i < count; i++) {"
-        if self.step.sites.colours > 1:
+        if self.step.sites.colours > 1 and sweep.colour is not None:
             body.lines.insert(0, "const i = chosen[k];")
             body.first.insert(0, f"const chosen = sites.coloured[{sweep.colour}];")
             loop = "for (let k = 0; k < chosen.length; k++) {"

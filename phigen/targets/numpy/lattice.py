@@ -13,6 +13,7 @@ from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
 from phigen.targets.numpy import lattice_adjoint
 from phigen.targets.numpy.language import LANGUAGE
+from phigen.targets.numpy.lattice_adjoint import chosen
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
 
@@ -127,7 +128,7 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
     for store in code.stores:
         place = f"[{sweep.moved[store.index]}]"
         new = f"{own}{place} + ({show(store.value)})"
-        lines.append(f"    moved{place} = sites.coloured({sweep.colour}, {new}, {own}{place})")
+        lines.append(f"    moved{place} = {chosen(sweep, new, own + place)}")
     return "\n".join([*lines, "    return moved\n"])
 
 

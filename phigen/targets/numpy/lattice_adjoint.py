@@ -37,11 +37,16 @@ def functions(program: Program, step: Sweeps, body: Body) -> Iterator[str]:
         yield "\n".join(["# Their transposes.", "PARTS_BACK = (", *listed, ")\n"])
 
 
+def chosen(sweep: Sweep, new: str, old: str) -> str:
+    """The new values where a sweep is made, the old ones elsewhere."""
+    return new if sweep.colour is None else f"sites.coloured({sweep.colour}, {new}, {old})"
+
+
 def _sweep(program: Program, step: Sweeps, sweep: Sweep, kernel: Kernel, body: Body) -> str:
     """The cotangent before a sweep from that after it, x being the state before."""
     code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"change_bar"})
     names = sweep.gather.names if sweep.gather else ()
-    seeds = ", ".join(f"sites.coloured({sweep.colour}, bar[{f}], 0.0)" for f in sweep.moved)
+    seeds = ", ".join(chosen(sweep, f"bar[{f}]", "0.0") for f in sweep.moved)
     lines = [f"def _{kernel.name}(coef, x, bar, sites, coef_bar, own):", f"    change_bar = [{seeds}]"]
     gather = _name(sweep.gather) if sweep.gather else ""
     lines += [f"    gathered = _{gather}(coef, x, sites)"] if gather else []

@@ -31,7 +31,7 @@ class Seeds:
     kind: str
     pointers: tuple[str, ...]
     bars: tuple[int, ...] = ()
-    colour: int = 0
+    colour: int | None = 0
 
     def declared(self, code: Code, here: str) -> list[str]:
         """The declarations of those pointers that are not cotangents to be added to."""
@@ -64,7 +64,7 @@ def first_loop(
     begin: int,
 ) -> Loop:
     """The first go of a kernel; cotangents of ``sums`` over bonds or pairs are handed in arrays from ``begin`` on."""
-    name, code, step = program.name, lower(kernel), layout.step
+    name, code = program.name, lower(kernel)
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program), sums, {seeds.kind: seeds.pointers})
     head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
     used, given = {*seeds.bars}, dict[int, str]()
@@ -91,7 +91,7 @@ def first_loop(
     head += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sorted(used)]
     for array in given:
         head.append(f"    double *restrict handed_{array} = row->handed[{array}]{layout.at(0)};")
-        if step.sites.colours > 1:
+        if layout.leaves_out(seeds.colour):
             head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
@@ -102,10 +102,15 @@ def first_loop(
 
 
 def _looped(
-    name: str, layout: Layout, colour: int, head: Sequence[str], body: Sequence[str], shares: Sequence[tuple[int, str]]
+    name: str,
+    layout: Layout,
+    colour: int | None,
+    head: Sequence[str],
+    body: Sequence[str],
+    shares: Sequence[tuple[int, str]],
 ) -> str:
     """The loop over sites; where they have shares in sums, over so many of them at once that these are kept apart."""
-    coloured = layout.step.sites.colours > 1
+    coloured = layout.leaves_out(colour)
     begin, end = ("begin", "end") if shares else ("from", "to")
     start = f"{name}_first(row, {colour}, {begin})" if coloured else begin
     onward = f"i += {layout.colour_step}" if coloured else "++i"

@@ -50,6 +50,10 @@ class Layout:
         """The number of the cotangents of a field, or of a parameter at sites or bonds."""
         return [*self.arrays, *self.step.sites.at_bonds].index(array)
 
+    def leaves_out(self, colour: int | None) -> bool:
+        """Whether what is done at sites of a colour, or without one at all of them, leaves out others."""
+        return self.step.sites.colours > 1 and colour is not None
+
     @property
     def colour_step(self) -> int:
         """The distance in a row from a site to the next of its colour."""

@@ -123,9 +123,9 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
             body += [f"{carry}[i] = add{k} - (sum{k} - {field});", f"{field} = sum{k};"]
     else:
         body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
-    colours = layout.step.sites.colours
-    start = f"{name}_first(row, {sweep.colour}, from)" if colours > 1 else "from"
-    onward = f"i += {layout.colour_step}" if colours > 1 else "++i"
+    coloured = layout.leaves_out(sweep.colour)
+    start = f"{name}_first(row, {sweep.colour}, from)" if coloured else "from"
+    onward = f"i += {layout.colour_step}" if coloured else "++i"
     text = _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
     shared = (
         "_".join(["tangent" if sweep.is_tangent else "sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
