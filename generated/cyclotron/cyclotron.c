@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 11d6256140787870be1d5252de964cf2ae9fb580c4b962ab9aaa8b69911686a4
+ * body-sha256: 040c7e5f701007cbe9101b9eecc36432e8899391f61af73bb5cee26d376c0dde
  */
 #include "cyclotron.h"
 #include <float.h>
@@ -216,6 +216,7 @@ static int cyclotron_plausible(const cyclotron_solver *s, const double increment
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define cyclotron_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -16,7 +16,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 30c019dc236fb87885f4eb2970da639b71914ae82d61c24fc267c59b22ebd60f
+ * body-sha256: e075aad93dcb80c1cafd1047a59c39656197e5703cae3708fb658238ba352a39
  */
 #include "double_well.h"
 #include <float.h>
@@ -203,6 +203,7 @@ static int double_well_plausible(const double_well_solver *s, const double incre
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define double_well_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: da05015b906fd414bc300df4ebb0bc6e255a62fb3da450604bc7fe520bec12e7
+ * body-sha256: a8d49fce52aa9dcb4cb89d6be88dbdbc6e375c90a5956da6c0df077fbe3f6cba
  */
 #include "duffing.h"
 #include <float.h>
@@ -259,6 +259,7 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define duffing_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: d162d3612d4b2220260fc0e586694c06a3a16fffe0299329ada82d67a6d249d9
+ * body-sha256: 3187eb89228e1fef2dbd60357714aacfd8ce10486da09e384b579663d73b3321
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -562,6 +562,7 @@ void dzhanibekov_attitude(const dzhanibekov_solver *s, double out[dzhanibekov_EL
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define dzhanibekov_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -618,7 +619,6 @@ static dzhanibekov_status dzhanibekov_attempt(dzhanibekov_solver *s)
 }
 
 /* ---- The solver ---- */
-
 /* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
    that gives nothing finite. */
 static void dzhanibekov_choose_gauge(const dzhanibekov_params *params, const double x[dzhanibekov_DIM],

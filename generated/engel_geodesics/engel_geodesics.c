@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 80ac67423d2caa0c29775606299cd1f630792cffdd6371c6a38b9dc4570c6c19
+ * body-sha256: 4cd67330645f30148d0641ba3aed5c7baf78bddc571e07330cba9ab9a282494f
  */
 #include "engel_geodesics.h"
 #include <float.h>
@@ -237,6 +237,7 @@ static int engel_geodesics_plausible(const engel_geodesics_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define engel_geodesics_FLOOR 1e-6
 

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: d00f9e942217fcedef27f3458bd1007310fa133aa0aea7e0cd8f7c2afbb56c91
+ * body-sha256: 16c11dab24f5694d9914210b284b1b74ec254aa9dcf91020b76932770612eb43
  */
 #include "gaussian_moments.h"
 #include <float.h>
@@ -313,6 +313,7 @@ static int gaussian_moments_plausible(const gaussian_moments_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define gaussian_moments_FLOOR 1e-6
 

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 534f67b23d571e2d291d08f5bb3ed472eeee4a72bbc656179b536e38c88b10d0
+ * body-sha256: 6ff8a901cffa2ece415aecc105884a50cbd5400b33d8d72894e80b14bd9b5ea3
  */
 #include "harmonic_oscillator.h"
 #include <float.h>
@@ -216,6 +216,7 @@ static int harmonic_oscillator_plausible(const harmonic_oscillator_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define harmonic_oscillator_FLOOR 1e-6
 

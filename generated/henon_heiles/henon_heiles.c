@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 7bbee817e8e3d63dba5f964c12edaf8defb0218d0079496ad07bd7d03a016a06
+ * body-sha256: 990c0e00441f26a401730658010641323574ffb0bc176c3b29763e76578f5ab9
  */
 #include "henon_heiles.h"
 #include <float.h>
@@ -272,6 +272,7 @@ static int henon_heiles_plausible(const henon_heiles_solver *s, const double inc
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define henon_heiles_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

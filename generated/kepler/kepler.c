@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6b578e2288a33aa6a6227bdc5bd36203e15f27a0936b5f218002e2ad72da4ace
+ * body-sha256: c19fa40843501d4384320d911f9da300ecd0acbab148d526c95dfe8314bbc284
  */
 #include "kepler.h"
 #include <float.h>
@@ -562,6 +562,7 @@ static int kepler_plausible(const kepler_solver *s, const double increment[keple
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define kepler_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

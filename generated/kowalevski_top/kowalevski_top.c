@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 7ddc93e5cb9ba9dcd8ebae9ddebdec19130ea90fce190681fde8eea9fa3f2bbf
+ * body-sha256: 5b462ce7eec345f4b0cee58bf2632d25cf39c1dc5af59879620af6f4367a8d7d
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -1340,6 +1340,7 @@ static int kowalevski_top_plausible(const kowalevski_top_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define kowalevski_top_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -2788,7 +2789,6 @@ static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevsk
 }
 
 /* ---- The residuals of a block ---- */
-
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */

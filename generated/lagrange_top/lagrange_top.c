@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 417555711e3186bad3590227c0715aebbdb362e496e7730276fd450e95b8000b
+ * body-sha256: e63395dbafc7ad60285abf5b328466e3e8b5200f9b560d9f003190a333d82ed3
  */
 #include "lagrange_top.h"
 #include <float.h>
@@ -667,6 +667,7 @@ static int lagrange_top_plausible(const lagrange_top_solver *s, const double inc
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define lagrange_top_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

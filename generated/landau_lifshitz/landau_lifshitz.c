@@ -15,7 +15,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: df5b763e0a3e8ee0440f9448710f9dcb62fce2fdf0d8b5b45670f4e69e77824b
+ * body-sha256: 53d56b4fbaef0dcceb2fe3d5bd1bb5d4d583df23421205bd899c8129b29d78b9
  */
 #include "landau_lifshitz.h"
 #include <float.h>
@@ -309,6 +309,7 @@ static int landau_lifshitz_plausible(const landau_lifshitz_solver *s, int stage,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define landau_lifshitz_FLOOR 1e-6
 

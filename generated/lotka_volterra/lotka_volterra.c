@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: c2bf39d7ab6ed27df7da68a7fe4583929c83c46572b22063d19c4171f46f8d1b
+ * body-sha256: 991762c01231c3378af5696f3603c0d55dd18b5512f77173bbf416ff9d50d4b8
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -447,6 +447,7 @@ static int lotka_volterra_plausible(const lotka_volterra_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
 static double lotka_volterra_size(const double y[lotka_volterra_DIM], const double delta[lotka_volterra_DIM])
@@ -903,7 +904,6 @@ static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_vol
 }
 
 /* ---- The residuals of a block ---- */
-
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: ac717d0fa5d5b598439ff76dd708095743ecb4436760d8c34812e7e4051f2307
+ * body-sha256: cfb13d76a96a676bcf63073f95e31f27010a972d7c21584f139cc22a54a56a65
  */
 #include "maxwell_bloch.h"
 #include <float.h>
@@ -222,6 +222,7 @@ static int maxwell_bloch_plausible(const maxwell_bloch_solver *s, const double i
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define maxwell_bloch_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

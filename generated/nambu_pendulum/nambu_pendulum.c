@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 8278b60e6c8028934653abf92134e5d8b118fd822e6f9209e6f4aba9610fbd2f
+ * body-sha256: b9e4c72a58d27ff2b01988d29ebbb5fc26932d727dfd184b85716ec6b6f1d874
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1452,7 +1452,7 @@ static void nambu_pendulum_begin_at(nambu_pendulum_lanes coef[restrict],
 /* Find the middles of the paths with mean y by iteration, which gains some digits each time, with expansions
    as short as that allows; the last can be gone on with. Infinite where that does not converge to the
    accuracy. */
-static void nambu_pendulum_settle(nambu_pendulum_lanes coef[restrict],
+static void nambu_pendulum_find_middles(nambu_pendulum_lanes coef[restrict],
     nambu_pendulum_lanes y[restrict nambu_pendulum_DIM],
     nambu_pendulum_lanes middle[restrict nambu_pendulum_DIM], nambu_pendulum_expansion *e, double accuracy)
 {
@@ -1639,7 +1639,7 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     if (matrices) nambu_pendulum_curvature_lanes(coef, model->y, e.p, hessian);
     else nambu_pendulum_momentum_lanes(coef, model->y, e.p);
     nambu_pendulum_halve(e.p);
-    if (matrices) nambu_pendulum_settle(coef, model->y, model->middle, &e, nambu_pendulum_SETTLED);
+    if (matrices) nambu_pendulum_find_middles(coef, model->y, model->middle, &e, nambu_pendulum_SETTLED);
     else nambu_pendulum_begin_at(coef, model->y, model->middle, &e);
     nambu_pendulum_extend(coef, &e, nambu_pendulum_NEGLIGIBLE);
     nambu_pendulum_check_ends(coef, &e, wrong);
@@ -1651,7 +1651,6 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
 }
 
 /* ---- The residuals of a block ---- */
-
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: d4ed6108f3d5982be2b89762274aaf3ae9912d7eac568c854ee614895300d92f
+ * body-sha256: f5b572d4c5c95fe999a5ef62ec3bd1631358d79e7387c61e9b99170933dfbdc3
  */
 #include "pendulum.h"
 #include <float.h>
@@ -228,6 +228,7 @@ static int pendulum_plausible(const pendulum_solver *s, const double increment[p
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define pendulum_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

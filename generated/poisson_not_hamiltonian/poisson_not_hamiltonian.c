@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: e133ccc27e2a6ec4c001b8442429e54bf82a6954a7d80a0c69a0674adfcc19a3
+ * body-sha256: 59786ec57cc4ab7c414a82c3975a4fc7e94c3cf4979af5953b75ed8ad90233ad
  */
 #include "poisson_not_hamiltonian.h"
 #include <float.h>
@@ -286,6 +286,7 @@ static int poisson_not_hamiltonian_plausible(const poisson_not_hamiltonian_solve
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define poisson_not_hamiltonian_FLOOR 1e-6
 

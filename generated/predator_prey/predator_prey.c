@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 062d098e57f89332fe390735b6acdc7a345e3e35fbd2da8004a76652fd26cc7b
+ * body-sha256: 0bcd21541379990ece2598f0978d699ab5382262cf7105421d43867fa25162e8
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -233,6 +233,7 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])

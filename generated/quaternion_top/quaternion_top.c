@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 2f2efb60838374f72eef8695e8973948d35f79a26f86173445101fab05c1fb55
+ * body-sha256: eabfeaf9c9fcc8ffa6b9c93f0705a3442e25616b893c906d34c0746ad7118404
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -849,7 +849,6 @@ static quaternion_top_status quaternion_top_attempt(quaternion_top_solver *s)
 }
 
 /* ---- The solver ---- */
-
 /* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
    that gives nothing finite. */
 static void quaternion_top_choose_gauge(const quaternion_top_params *params,

@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: ce59b897ba19e258ff99756ae03753a1d209e77547a19c293e3509daf3f8455c
+ * body-sha256: ed2278dbffceb90061f5677f070884a628e900f6b363ec98a274b04f8abc6f25
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -662,6 +662,7 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define rigid_body_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -1291,7 +1292,6 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 }
 
 /* ---- The residuals of a block ---- */
-
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: af29e738abcf4323aa3ace3e1fc2e64a409979f4ca60c97f6a9ed518c8ba4d1e
+ * body-sha256: fe01727213d91df2cc49e0ba2d4756700810869d831260db262d3d05aa32bdb5
  */
 #include "rigid_body_dual.h"
 #include <float.h>
@@ -330,6 +330,7 @@ static int rigid_body_dual_plausible(const rigid_body_dual_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define rigid_body_dual_FLOOR 1e-6
 
@@ -391,7 +392,6 @@ static rigid_body_dual_status rigid_body_dual_attempt(rigid_body_dual_solver *s)
 }
 
 /* ---- The solver ---- */
-
 /* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
    that gives nothing finite. */
 static void rigid_body_dual_choose_gauge(const rigid_body_dual_params *params,

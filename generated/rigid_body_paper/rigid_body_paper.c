@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 14cb8fe3248b995c3d715d24023a88808ee56e65f57b18a15bcc515401c83748
+ * body-sha256: 35d0858b57601849fcb15c7efd514319edf8d104a5c0372108cc524ac4fa06e7
  */
 #include "rigid_body_paper.h"
 #include <float.h>
@@ -288,6 +288,7 @@ static int rigid_body_paper_plausible(const rigid_body_paper_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* components of y are measured no finer than by this part of the largest */
 #define rigid_body_paper_FLOOR 1e-6
 

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: f9a919877a460b50bcea5295cfcb83cda04b6993a462e2d8b7bfbd8dc74d39db
+ * body-sha256: 22debfbd395b253405b3a3c063c07040d8ec3e595dc86a2c6a3437e4bf660b1e
  */
 #include "satellite.h"
 #include <float.h>
@@ -1111,6 +1111,7 @@ void satellite_attitude(const satellite_solver *s, double out[satellite_ELEMENT]
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define satellite_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

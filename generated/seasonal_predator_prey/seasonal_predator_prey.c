@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 60a89627bb6125eaa5b89dae12513a658947ba169a024b45f54afbf4aa14648e
+ * body-sha256: 221cf68f78f7fada32de3e1594d164cfef31c41baf750e90a10d2c59af3dd7dc
  */
 #include "seasonal_predator_prey.h"
 #include <float.h>
@@ -269,6 +269,7 @@ static int seasonal_predator_prey_plausible(const seasonal_predator_prey_solver 
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
 static double seasonal_predator_prey_size(const double y[seasonal_predator_prey_DIM],

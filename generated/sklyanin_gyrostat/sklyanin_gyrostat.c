@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: eff5211e93ce2cfcfce8ec4ae2ff332f6c49cd79bf8992bb1412fcffeb8e2257
+ * body-sha256: 0f6f894e8db533bc0180ac63d7f8cbb55842f24e61e372e7bd6218d2d8ab88e1
  */
 #include "sklyanin_gyrostat.h"
 #include <float.h>
@@ -613,7 +613,6 @@ static sklyanin_gyrostat_status sklyanin_gyrostat_attempt(sklyanin_gyrostat_solv
 }
 
 /* ---- The solver ---- */
-
 /* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
    that gives nothing finite. */
 static void sklyanin_gyrostat_choose_gauge(const sklyanin_gyrostat_params *params,

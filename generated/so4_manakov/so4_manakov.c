@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: cc25dd32a6c03011b9cd699a5d2e28bd959f0287cf1dc2183fdd74428c13a9dc
+ * body-sha256: 45b49ee5b9317615b33b192a4b298857fa02d5319325dddce77f27daf068e065
  */
 #include "so4_manakov.h"
 #include <float.h>
@@ -728,6 +728,7 @@ static int so4_manakov_plausible(const so4_manakov_solver *s, const double incre
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define so4_manakov_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -783,7 +784,6 @@ static so4_manakov_status so4_manakov_attempt(so4_manakov_solver *s)
 }
 
 /* ---- The solver ---- */
-
 /* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
    that gives nothing finite. */
 static void so4_manakov_choose_gauge(const so4_manakov_params *params, const double x[so4_manakov_DIM],

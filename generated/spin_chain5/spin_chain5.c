@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 8b8dca004b1e459c7c1b280f0520bb9262a0a7d099bddb81fc8bf2e6a442377a
+ * body-sha256: e0a3be082abea84a81f1ed9038acafdbbb139ec44644702f3349b4358a335311
  */
 #include "spin_chain5.h"
 #include <float.h>
@@ -1634,6 +1634,7 @@ static int spin_chain5_plausible(const spin_chain5_solver *s, const double incre
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define spin_chain5_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
@@ -1689,7 +1690,6 @@ static spin_chain5_status spin_chain5_attempt(spin_chain5_solver *s)
 }
 
 /* ---- The solver ---- */
-
 /* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where
    that gives nothing finite. */
 static void spin_chain5_choose_gauge(const spin_chain5_params *params, const double x[spin_chain5_DIM],

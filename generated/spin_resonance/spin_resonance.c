@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6a49b3ed126baef58182edc5f4f2b1ba3090679c56034a9624a15d5c3e1957dc
+ * body-sha256: c26dece7dfdd9e4459e9d6c82ecbbbba76692c829d02b0ae94c2e7d66eeda1ea
  */
 #include "spin_resonance.h"
 #include <float.h>
@@ -322,6 +322,7 @@ static int spin_resonance_plausible(const spin_resonance_solver *s,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define spin_resonance_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -18,7 +18,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 8bbb5fe32a29e3c9c8b1df857ed55c4499ea59347247c0147c931e0ee8034ac1
+ * body-sha256: 0b514424cf2dc10ef87c05e00381fc505151c6310bbd662d93ac35cce402ac5f
  */
 #include "thermal_chain.h"
 #include <float.h>
@@ -753,6 +753,7 @@ static int thermal_chain_plausible(const thermal_chain_solver *s, const double i
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define thermal_chain_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

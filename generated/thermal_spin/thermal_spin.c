@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 980f799c3596728a0afa6c68d404906cabd20da64716df6869215383f1eed10c
+ * body-sha256: b53ad65c9d4742996cab80f13fa780867a2c9e9fa5c1e0e0f7e1457b552c1f19
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -289,6 +289,7 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define thermal_spin_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -15,7 +15,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 32e02ad7befb73d0ba3a1be77d277250665f65c0a1d61dc851435f698fc5c888
+ * body-sha256: 4b57d7e15ac4619562f066c49eace4b984841d78adc02069fba76e9a65a08fca
  */
 #include "thruster_body.h"
 #include <float.h>
@@ -301,6 +301,7 @@ static int thruster_body_plausible(const thruster_body_solver *s, int stage,
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define thruster_body_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

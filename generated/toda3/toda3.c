@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: c80e841f835d5c9ffa1e55880bcfeb4654802f3e9ac2fac86d18dbdb00900076
+ * body-sha256: ca818c04d80f983b5a7d77cc9dcb9c57bb7b0981417e465b79c57133721476a6
  */
 #include "toda3.h"
 #include <float.h>
@@ -341,6 +341,7 @@ static int toda3_plausible(const toda3_solver *s, const double increment[toda3_D
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define toda3_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: ddbb2bef35e6bab8399c47269951fd789b9228dbfefbe561937691365b287d4b
+ * body-sha256: 0da3a6eaaff84d6ead80cb017fd29d71d85430ef755148a71ed65464048e1ca4
  */
 #include "volterra5.h"
 #include <float.h>
@@ -296,6 +296,7 @@ static int volterra5_plausible(const volterra5_solver *s, const double increment
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */
 static double volterra5_size(const double y[volterra5_DIM], const double delta[volterra5_DIM])

@@ -12,7 +12,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 45efe29a8cec25501053eb296ab598439c4cade9a657b5c7adae1de859d62c3d
+ * body-sha256: 2849943451d4af0a7b5be7a840f20c96d61ced1fcc13bd52c229605a9f146bb1
  */
 #include "vortices3.h"
 #include <float.h>
@@ -858,6 +858,7 @@ static int vortices3_plausible(const vortices3_solver *s, const double increment
 }
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #define vortices3_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */

@@ -42,7 +42,8 @@ class Amalgam:
 
     def text(self, file: str) -> str:
         """The file with all that it includes and that was not included before."""
-        return re.sub(r"\n{3,}", "\n\n", "\n".join(self._expanded(file))).strip("\n") + "\n"
+        text = re.sub(r"\n{3,}", "\n\n", "\n".join(self._expanded(file)))
+        return re.sub(r"( ---- \*/\n)\n", r"\1", text).strip("\n") + "\n"
 
     def _expanded(self, file: str) -> list[str]:
         if file in self.printed:

@@ -109,7 +109,7 @@ static void phi_trace(phi_traced *g, phi_lanes hessian[restrict PHI_DIM * PHI_DI
     phi_expansion *e = &g->e;
     phi_curvature_lanes(g->coef, g->y, e->p, hessian);
     phi_halve(e->p);
-    phi_settle(g->coef, g->y, middle, e, PHI_BACK_SETTLED);
+    phi_find_middles(g->coef, g->y, middle, e, PHI_BACK_SETTLED);
     phi_extend(g->coef, e, PHI_NEGLIGIBLE);
     memset(g->wrong, 0, sizeof g->wrong);
     phi_check_ends(g->coef, e, g->wrong);

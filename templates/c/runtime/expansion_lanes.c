@@ -170,7 +170,7 @@ static void phi_begin_at(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM]
 
 /* Find the middles of the paths with mean y by iteration, which gains some digits each time, with expansions as short as
    that allows; the last can be gone on with. Infinite where that does not converge to the accuracy. */
-static void phi_settle(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
+static void phi_find_middles(phi_lanes coef[restrict], phi_lanes y[restrict PHI_DIM], phi_lanes middle[restrict PHI_DIM],
     phi_expansion *e, double accuracy)
 {
     phi_lanes size, norm;

@@ -12,6 +12,7 @@
 #include "model.h"
 
 /* ---- The implicit step, by Newton's method ---- */
+/* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
 #if PHI_RELATIVE
 /* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
    different size); NaN or infinite if the correction is. */

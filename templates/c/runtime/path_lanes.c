@@ -79,7 +79,7 @@ static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
     if (matrices) phi_curvature_lanes(coef, model->y, e.p, hessian);
     else phi_momentum_lanes(coef, model->y, e.p);
     phi_halve(e.p);
-    if (matrices) phi_settle(coef, model->y, model->middle, &e, PHI_SETTLED);
+    if (matrices) phi_find_middles(coef, model->y, model->middle, &e, PHI_SETTLED);
     else phi_begin_at(coef, model->y, model->middle, &e);
     phi_extend(coef, &e, PHI_NEGLIGIBLE);
     phi_check_ends(coef, &e, wrong);
