@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 3187eb89228e1fef2dbd60357714aacfd8ce10486da09e384b579663d73b3321
+ * body-sha256: 7d676675f01e7cacbb1343aee6cc68c00a81dbcc157a4547ef4d63db4b581d09
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -446,7 +446,7 @@ static int dzhanibekov_plausible(const dzhanibekov_solver *s, const double incre
 
 /* ---- Attitude ---- */
 /* The product of two quaternions. */
-static void dzhanibekov_quaternion_product(const double a[4], const double b[4], double product[4])
+static inline void dzhanibekov_quaternion_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
     product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);
@@ -459,16 +459,6 @@ static void dzhanibekov_product(const double a[dzhanibekov_ELEMENT], const doubl
     double product[dzhanibekov_ELEMENT])
 {
     dzhanibekov_quaternion_product(a, b, product);
-}
-
-/* The element of the motion with a constant rate, for some time. */
-static void dzhanibekov_uniform(const double rate[dzhanibekov_RATE], double t,
-    double element[dzhanibekov_ELEMENT])
-{
-    const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
-    const double angle = t * speed, scale = speed > 0.0 ? sin(0.5 * angle) / speed : 0.0;
-    element[0] = cos(0.5 * angle);
-    for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
 }
 
 /* What a factor adds to an element. The quaternion of the factor is given less 1. */
@@ -513,9 +503,8 @@ static inline void dzhanibekov_turn_stage(dzhanibekov_solver *s, const double y[
 static void dzhanibekov_read_attitude(dzhanibekov_solver *s)
 {
     double found[dzhanibekov_ELEMENT], element[dzhanibekov_ELEMENT];
-    double uniform[dzhanibekov_ELEMENT];
-    dzhanibekov_uniform(s->rate, s->t - s->attitude_from, uniform);
-    dzhanibekov_product(s->first, uniform, element);
+    const double half = 0.5 * (s->t - s->attitude_from) * s->speed, c = cos(half), sine = sin(half);
+    for (int i = 0; i < 4; ++i) element[i] = c * s->first[i] + sine * s->aside[i];
     dzhanibekov_product(element, s->turned, found);
     memcpy(s->attitude, found, sizeof s->attitude);
 }
@@ -527,7 +516,11 @@ static void dzhanibekov_begin_attitude(dzhanibekov_solver *s, const double first
     memset(s->turned, 0, sizeof s->turned);
     memset(s->turned_carry, 0, sizeof s->turned_carry);
     s->turned[0] = 1.0;
-    dzhanibekov_rate(&s->params, s->gauge, s->x, s->rate);
+    double rate[dzhanibekov_RATE], axis[4] = { 0.0 };
+    dzhanibekov_rate(&s->params, s->gauge, s->x, rate);
+    s->speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
+    for (int i = 0; i < 3 && s->speed > 0.0; ++i) axis[i + 1] = rate[i] / s->speed;
+    dzhanibekov_product(s->first, axis, s->aside);
     s->attitude_from = s->t;
     dzhanibekov_read_attitude(s);
 }

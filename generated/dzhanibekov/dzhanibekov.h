@@ -2,7 +2,7 @@
  * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e959053a23361a4c986c7abbfc2a62a4bf6c2c9366783fd8d581d291bd9cf0fd
+ * body-sha256: cf862e6684d9571be2cf7000c34bba11cd05b99c55abfc97ee17832ed7c5f98b
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -58,8 +58,8 @@ typedef struct {
     double first[dzhanibekov_ELEMENT]; /* where the attitude began */
     /* the product of what steps turned it by; what rounding took */
     double turned[dzhanibekov_ELEMENT], turned_carry[dzhanibekov_ELEMENT];
-    /* the gradient of the Casimirs that are taken from H: the body turns by them too */
-    double rate[dzhanibekov_RATE];
+    /* of turning by the Casimirs that are taken from H; first, turned by pi about that axis */
+    double speed, aside[4];
     double attitude_from;  /* the time when the attitude began */
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;

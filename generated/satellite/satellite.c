@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 22debfbd395b253405b3a3c063c07040d8ec3e595dc86a2c6a3437e4bf660b1e
+ * body-sha256: 9404154b06a018e5c3a4e9edbfaf0ef3613525ffc9af7b761c7a8d4a0aae42fa
  */
 #include "satellite.h"
 #include <float.h>
@@ -1010,7 +1010,7 @@ static int satellite_plausible(const satellite_solver *s, int stage, const doubl
 
 /* ---- Attitude ---- */
 /* The product of two quaternions. */
-static void satellite_quaternion_product(const double a[4], const double b[4], double product[4])
+static inline void satellite_quaternion_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
     product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);

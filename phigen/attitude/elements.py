@@ -80,9 +80,14 @@ def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:
     """exp(r), or exp(r, t), in the same form, for rotations by any angle.
 
-    About a coordinate axis it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.parts.by_angles`.
+    Without a translation, about a coordinate axis, it is not divided by its length: (1, tan(|r|/2)) takes least to be
+    made, from what a flow has of the angle in any case, and to be multiplied by. Products are divided at the end of a
+    step. With one it has sin and 1 − cos of half the angle, as the flow in `phigen.attitude.parts.by_angles`.
     """
     s, turning = dot(r, r), [ri for ri in r if not ri.is_zero]
+    if len(turning) == 1 and not t:
+        tangent = call("tanhalf", call("sin", turning[0]), call("versin", turning[0]))
+        return (ZERO, *(ri if ri.is_zero else tangent for ri in r))
     if len(turning) == 1:
         half = turning[0] / 2
         rotation = (-ONE * call("versin", half), *(ri if ri.is_zero else call("sin", half) for ri in r))

@@ -58,7 +58,7 @@ class Turning:
 
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
-    """The same flows by the sines that their elements need in any case: for quaternions those of half the angles."""
+    """The same flows by the sines that their elements need in any case: those of half the angles for se(3)."""
     turned = turnings(system, group, flows, put_back=put_back)
     return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turned, strict=True))
 
@@ -72,9 +72,9 @@ def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Fl
             return rebuild(e, args)
         for angle in angles:
             for sign in (ONE, -ONE):
-                same = [("", args[0] - sign * (angle if group.matrices else 2 * angle))]
+                same = [("", args[0] - sign * (2 * angle if group.translation else angle))]
                 if decide_zero("", same, system.positive).verdict == PROVED:
-                    return _of_angle(e.op, sign, angle, double=not group.matrices)
+                    return _of_angle(e.op, sign, angle, double=bool(group.translation))
         return rebuild(e, args)
 
     return replace(flow, increment=tuple(fold(flow.increment, visit)))

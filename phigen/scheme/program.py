@@ -120,6 +120,16 @@ class Attitude:
         return (rows, rows) if rows else (4,)
 
     @property
+    def quaternion(self) -> bool:
+        """Whether an element is a quaternion, with nothing beside it."""
+        return not (self.group.matrices or self.group.translation)
+
+    @property
+    def lengthened(self) -> bool:
+        """Whether the quaternion of a step is still to be divided by its length, as those of flows are not."""
+        return bool(self.turns) and self.quaternion
+
+    @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         return tuple(k for k in (self.turn, self.along, *self.turns, self.rate, self.exponential) if k is not None)

@@ -36,9 +36,10 @@ class Function:
     its values are rational there. ``cost`` is in units of one addition. ``own`` are those of phigen's own, which no
     spec can name.
 
-    ``written`` is how a language writes it: a name, or a text with ``{0}`` for the argument; in languages that are not
-    there a function of the generated file does it. ``lanes`` is the same for C's loops over lanes, by functions that
-    have a version for them, whose own entry is their name; ``inline`` ones are instructions or arithmetic in any case.
+    ``written`` is how a language writes it: a name, or a text with ``{0}``, ``{1}`` for the arguments; in languages
+    that are not there a function of the generated file does it. ``lanes`` is the same for C's loops over lanes, by
+    functions that have a version for them, whose own entry is their name; ``inline`` ones are instructions or
+    arithmetic in any case.
     ``near`` tells that flows call a polynomial where arguments are small. ``letters`` is the name in mathematics.
     """
 
@@ -107,6 +108,21 @@ _LISTED = (
         ),
         lanes="(2.0 * {sin}(0.5 * ({{0}})) * {sin}(0.5 * ({{0}})))",
         near=True,
+    ),
+    Function(  # tan(θ/2) from a = sin θ and b = 1 − cos θ, without cancellation for any θ
+        "tanhalf",
+        arity=2,
+        own=True,
+        known=lambda call, a, b: a * call("inv", 2 - b),
+        value=lambda library, a, b: a / (2 - b) if b < 1 else b / a,
+        at_zero=None,
+        cost=5,
+        written=_languages(
+            "({1} < 1.0 ? ({0}) / (2.0 - ({1})) : ({1}) / ({0}))",
+            "np.where({1} < 1.0, ({0}) / (2.0 - ({1})), ({1}) / ({0}))",
+            "({1} < 1.0 ? ({0}) / (2.0 - ({1})) : ({1}) / ({0}))",
+        ),
+        inline=True,
     ),
     Function(  # log(1 + a) without cancellation
         "log1p",

@@ -46,6 +46,7 @@ FEATURES = (
     Feature("TURNED_IN_STAGES", lambda p: p.attitude and p.attitude.turn),
     Feature("TURNED_BY_COVECTOR", lambda p: p.attitude and not p.attitude.cayley, ("TURNED_IN_STAGES", "MATRICES")),
     Feature("POSITION", lambda p: p.attitude and p.attitude.group.translation),
+    Feature("LENGTHENED", lambda p: p.attitude and p.attitude.lengthened),
     Feature("SPATIAL", lambda p: p.attitude and p.attitude.group.spatial),
     Feature("RATE_OF_GAUGE", lambda p: p.attitude and p.attitude.rate),
     Feature("TANGENT", lambda p: p.extras.tangent),

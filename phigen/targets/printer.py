@@ -67,7 +67,7 @@ class Printer:
             case "pi" | "E":
                 return self.constants[e.op], ATOM
             case op if "{0}" in self.functions[op]:
-                return self.functions[op].format(args[0][0]), ATOM
+                return self.functions[op].format(*(a for a, _ in args)), ATOM
             case _:
                 return f"{self.functions[e.op]}({', '.join(a for a, _ in args)})", ATOM
 

@@ -375,6 +375,16 @@ def test_spatial_momentum_is_constant_to_round_off_for_many_steps(case):
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("h", [0.3, 7.0, 12 * np.pi, 12 * np.pi + 1e-6, -50.0])
+def test_flows_may_turn_by_any_angle(target, h):
+    """12π: the first flow turns by π, where neither a tangent of the half nor a division by 1 + cos will do."""
+    start = np.array([0.3, 0.2, 1.0])
+    found = solver("body, split", target, 2).integrate(start, h, 20)
+    assert np.abs(momenta_in_space(found) - start).max() < 3e-14
+    assert np.abs((found.attitude**2).sum(axis=1) - 1).max() < 2e-15
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
 @pytest.mark.parametrize("case", ["body", "body, split"])
 def test_after_a_kick_a_body_turns_as_one_that_starts_there(case, target):
     """By another rate of the Casimirs that are taken from H: an impulse along the momentum too changes it."""

@@ -27,7 +27,9 @@ def printed(program: Program, step: Splitting) -> str:
     more = f", double element[{program.name}_ELEMENT]" if program.attitude else ""
     for k, flow in enumerate(program.attitude.turns if program.attitude else step.flows, 1):
         kernel, values = _flow(program, flow, k)
-        found.append(function(program, kernel, functions=_functions(program)))
+        text = function(program, kernel, functions=_functions(program))
+        # With an element compilers would find it too long to be put into its only callers.
+        found.append(text.replace("\nstatic void", "\nstatic inline void") if more else text)
         found.append(render("c", "flow.c", {**values, "more": more}))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"

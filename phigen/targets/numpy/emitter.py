@@ -265,6 +265,7 @@ def _attitude(program: Program, attitude: Attitude) -> list[str]:
         "splitting": isinstance(step, Splitting),
         "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
         "turn_of_stage": _turn_of_stage(attitude, solved),
+        "lengthened": attitude.lengthened,
         "shaped": _shaped(rows, bool(group.translation)),
         **_ordered(group.spatial),
         "shapes": shown + ", positions (rows, ..., 3)" * bool(group.translation),

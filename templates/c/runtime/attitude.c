@@ -105,7 +105,7 @@ static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_E
 
 #else
 /* The product of two quaternions. */
-static void phi_quaternion_product(const double a[4], const double b[4], double product[4])
+static inline void phi_quaternion_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
     product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);
@@ -134,7 +134,7 @@ static void phi_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT]
 #endif
 }
 
-#if PHI_RATE_OF_GAUGE
+#if PHI_RATE_OF_GAUGE && PHI_POSITION
 /* The element of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
@@ -142,14 +142,12 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
     const double angle = t * speed, scale = speed > 0.0 ? sin(0.5 * angle) / speed : 0.0;
     element[0] = cos(0.5 * angle);
     for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
-#if PHI_POSITION
     const double *w = rate, *v = rate + 3, sine = speed > 0.0 ? sin(angle) / speed : t;
     const double versine = 2.0 * scale * scale, along = (w[0] * v[0] + w[1] * v[1]) + w[2] * v[2];
     const double rest = speed > 0.0 ? (t - sine) / (speed * speed) * along : 0.0;
     element[4] = sine * v[0] + versine * (w[1] * v[2] - w[2] * v[1]) + rest * w[0];
     element[5] = sine * v[1] + versine * (w[2] * v[0] - w[0] * v[2]) + rest * w[1];
     element[6] = sine * v[2] + versine * (w[0] * v[1] - w[1] * v[0]) + rest * w[2];
-#endif
 }
 
 #endif
@@ -176,6 +174,17 @@ static void phi_normalise(const double q[4], double carry[4])
 {
     const double excess = 0.5 * (((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
     for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
+}
+
+#endif
+#if PHI_LENGTHENED
+/* Divide a quaternion, given less 1, by its length. */
+static void phi_shorten(double q[4])
+{
+    const double excess = (q[0] * (2.0 + q[0]) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+    const double length = sqrt(1.0 + excess), per = 1.0 / length;
+    q[0] = per * (q[0] - excess / (1.0 + length));
+    for (int i = 1; i < 4; ++i) q[i] *= per;
 }
 
 #endif
@@ -246,7 +255,10 @@ static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int
 static void phi_read_attitude(phi_solver *s)
 {
     double found[PHI_ELEMENT], element[PHI_ELEMENT];
-#if PHI_RATE_OF_GAUGE
+#if PHI_TURNS_ASIDE
+    const double half = 0.5 * (s->t - s->attitude_from) * s->speed, c = cos(half), sine = sin(half);
+    for (int i = 0; i < 4; ++i) element[i] = c * s->first[i] + sine * s->aside[i];
+#elif PHI_RATE_OF_GAUGE
     double uniform[PHI_ELEMENT];
     phi_uniform(s->rate, s->t - s->attitude_from, uniform);
 #if PHI_SPATIAL
@@ -279,12 +291,26 @@ static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
 #else
     s->turned[0] = 1.0;
 #endif
-#if PHI_RATE_OF_GAUGE
-#if PHI_GAUGE
-    phi_rate(&s->params, s->gauge, s->x, s->rate);
-#else
-    phi_rate(&s->params, s->x, s->rate);
+#if PHI_TURNS_ASIDE
+    double rate[PHI_RATE], axis[4] = { 0.0 };
+#elif PHI_RATE_OF_GAUGE
+    double *rate = s->rate;
 #endif
+#if PHI_RATE_OF_GAUGE && PHI_GAUGE
+    phi_rate(&s->params, s->gauge, s->x, rate);
+#elif PHI_RATE_OF_GAUGE
+    phi_rate(&s->params, s->x, rate);
+#endif
+#if PHI_TURNS_ASIDE
+    s->speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
+    for (int i = 0; i < 3 && s->speed > 0.0; ++i) axis[i + 1] = rate[i] / s->speed;
+#if PHI_SPATIAL
+    phi_product(axis, s->first, s->aside);
+#else
+    phi_product(s->first, axis, s->aside);
+#endif
+#endif
+#if PHI_RATE_OF_GAUGE
     s->attitude_from = s->t;
 #endif
     phi_read_attitude(s);

@@ -88,8 +88,12 @@ typedef struct {
 #endif
     double first[PHI_ELEMENT]; /* where the attitude began */
     double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT]; /* the product of what steps turned it by; what rounding took */
-#if PHI_RATE_OF_GAUGE
+#if PHI_TURNS_ASIDE
+    double speed, aside[4]; /* of turning by the Casimirs that are taken from H; first, turned by pi about that axis */
+#elif PHI_RATE_OF_GAUGE
     double rate[PHI_RATE]; /* the gradient of the Casimirs that are taken from H: the body turns by them too */
+#endif
+#if PHI_RATE_OF_GAUGE
     double attitude_from; /* the time when the attitude began */
 #endif
 #endif

@@ -57,6 +57,16 @@ export function turnAdds(element, factor, added) {
   // #endif
 }
 
+// #if LENGTHENED
+/** Divide a quaternion, given less 1, by its length. */
+export function shorten(q) {
+  const excess = q[0] * (2 + q[0]) + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3]);
+  const length = Math.sqrt(1 + excess);
+  q[0] = (q[0] - excess / (1 + length)) / length;
+  for (let i = 1; i < 4; i++) q[i] /= length;
+}
+
+// #endif
 /** Bring the length of a quaternion nearer to 1. */
 export function normalise(q, carry) {
   const excess = 0.5 * (q[0] * q[0] - 1 + q[1] * q[1] + (q[2] * q[2] + q[3] * q[3]));

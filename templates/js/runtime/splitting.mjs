@@ -4,6 +4,9 @@ import { pass } from "./level.mjs";
 // #if ATTITUDE
 import { ELEMENT } from "./model.mjs";
 import { turnBy } from "./attitude.mjs";
+// #if LENGTHENED
+import { shorten } from "./attitude_quaternions.mjs";
+// #endif
 // #endif
 import { DIM, FLOWS, MULTIPLES, SCHEDULE, TIMES, prepareRow } from "./model.mjs";
 
@@ -71,6 +74,9 @@ export function makeStage(solver) {
     carry[i] = (x[i] - (sum - added)) + (moved[i] - added);
     x[i] = sum;
   }
+  // #if LENGTHENED
+  shorten(elementOfStep);
+  // #endif
   // #if ATTITUDE
   turnBy(solver, elementOfStep);
   // #endif
