@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -72,6 +73,9 @@ KEPT = 1 << 18
 
 #: States that segments of a run begin with for which a pullback has room, however large they are.
 STATES = 8
+
+#: Bytes of the trail of a run whose segments are all made once more, at most.
+TWICE = 1 << 26
 
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
 _UPDATES_PER_CALL = 1 << 26
@@ -169,8 +173,10 @@ class CLatticeSession:
         given = np.ascontiguousarray(bars, dtype=self._real)
         rows, x0_bar = np.empty_like(given), np.empty(self._shape, self._real)
         most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
-        state = x0_bar.nbytes
-        trail = np.empty(min(most or least, max(KEPT * x0_bar.itemsize, least + STATES * 2 * state)), dtype=np.uint8)
+        state, of_step = x0_bar.nbytes, int(self._c.trail_size(self._address, 2)) - least
+        twice = least + 3 * math.isqrt(steps * state * of_step)  # segments that are made once more have room by this
+        room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, twice))
+        trail = np.empty(min(most or least, room), dtype=np.uint8)
         pointers = (rows.ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found, trail.ctypes.data)
         status = self._c.pullback(self._address, h, steps, stride, *pointers, max(len(trail), least))
         if status:

@@ -53,7 +53,7 @@ IN_C |= {"driven composed": SITES, "far_open series": (4, 3), "spin_graph series
 SLOW = ("volterra", "far_open series")
 
 HOW = {"series": {"scheme": "series", "order": 2}, "composed": {"scheme": "series", "order": 4}}
-HOW["small"] = {"profile": "small"}
+HOW |= {profile: {"profile": profile} for profile in ("small", "fast")}
 
 
 @cache
@@ -209,6 +209,14 @@ def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     assert [np.sum(x0_bar * v) for v in along] == pytest.approx(slopes, rel=1e-12)
 
 
+@pytest.mark.parametrize("scale", [1, 30])
+def test_functions_go_back_by_what_is_for_small_arguments_or_for_any(scale):
+    in_c, numpy, random = (*(made("toda fast", target) for target in ("c", "numpy")), np.random.default_rng(5))
+    x, bar = beginning(in_c) * [[1], [scale]], random.normal(size=(2, SITES))
+    found, expected = (solver.pullback(x, H, STEPS, bar) for solver in (in_c, numpy))
+    assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-12)
+
+
 def same(a, b):
     return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
 
@@ -219,6 +227,7 @@ def test_c_has_the_same_bits_for_any_memory(monkeypatch):
     x, bar = 0.3 * random.random((2, SITES)), random.normal(size=(4, 2, SITES))
     whole = solver.pullback(x, H, 17, bar, 7)
     for kept, states in ((0, 1), (0, 4), (1200, 1)):
+        monkeypatch.setattr(c_lattice, "TWICE", 0)
         monkeypatch.setattr(c_lattice, "KEPT", kept)
         monkeypatch.setattr(c_lattice, "STATES", states)
         part = solver.pullback(x, H, 17, bar, 7)
@@ -233,6 +242,7 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
     whole = solver.pullback(x, H, 17, bar, 7)
     assert np.array_equal(whole.x1, solver.integrate(x, H, 17, 7).x)
     for kept, states in ((0, 1), (1200, 1)):
+        monkeypatch.setattr(c_lattice, "TWICE", 0)
         monkeypatch.setattr(c_lattice, "KEPT", kept)
         monkeypatch.setattr(c_lattice, "STATES", states)
         part = solver.pullback(x, H, 17, bar, 7)

@@ -84,7 +84,7 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
         "sweeps.h": sweeps(program, step, lanes),
     }
     if step.adjoint:
-        texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint)
+        texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint, lanes)
     return Amalgam(program.name, has, texts), "lattice.h", "lattice.c"
 
 

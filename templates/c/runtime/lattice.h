@@ -51,6 +51,7 @@ typedef struct {
     double *y[3][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, with the parameters at sites; of one gone back through */
     double *const *side;      /* while the equation of its cotangents is solved, what is on the right of it, else NULL */
     double *const *handed, *shares; /* what sites hand to those that they have read; of each piece of a row shares in sums */
+    int wide;                 /* whether they are found by functions for arguments of any size */
 #elif PHI_SLOPES
     double *y[2][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, with the parameters at sites */
 #else

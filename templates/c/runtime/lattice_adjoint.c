@@ -133,12 +133,31 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
 #endif
         }
         status = phi_segment_back(s, g, done, end, stride, steps, rows_bar, coef_bar);
+        if (status == PHI_OK && !phi_all_hold(s, g->bar)) status = PHI_NOT_FINITE;
+        g->failed = status != PHI_OK && !g->far;
         if (g->count > 1 && done == g->marks[2 * (g->count - 1)]) --g->count;
     }
 #if !PHI_RENEWED
     phi_add_up(s, g, coef_bar);
 #endif
     return status;
+}
+
+/* The same from where s stands, with cotangents of coefficients that are 0 before. */
+static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, size_t stride, double *rows,
+    const double *rows_bar, double coef_bar[PHI_SUMS])
+{
+    memset(coef_bar, 0, PHI_SUMS * sizeof *coef_bar);
+    g->first_step = s->steps;
+#if PHI_SERIES
+    s->shares = g->sums;
+    s->handed = g->handed;
+    s->wide = g->far;
+#else
+    s->open = 0;
+#endif
+    phi_mark(s, g, 0);
+    return phi_run_back(s, g, steps, stride, rows, rows_bar, coef_bar);
 }
 
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
@@ -150,18 +169,18 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
     phi_transpose g;
-    double coef_bar[PHI_SUMS] = { 0.0 };
+    double coef_bar[PHI_SUMS];
     phi_place_transpose(s, &g, steps, trail, size);
-    g.first_step = s->steps;
-#if PHI_SERIES
-    s->shares = g.sums;
-    s->handed = g.handed;
-#else
-    s->open = 0;
+    status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar);
+#if PHI_NEAR
+    if (g.failed) {
+        g.count = 1;
+        phi_return(s, &g);
+        phi_place_transpose(s, &g, steps, trail, size);
+        g.far = 1;
+        status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar);
+    }
 #endif
-    phi_mark(s, &g, 0);
-    status = phi_run_back(s, &g, steps, stride, rows, rows_bar, coef_bar);
-    if (status == PHI_OK && !phi_all_hold(s, g.bar)) status = PHI_NOT_FINITE;
     status = phi_settle(s, &g, steps, status);
     if (status != PHI_OK) return status;
     phi_take(s, g.bar, x0_bar);

@@ -48,24 +48,17 @@ static size_t phi_numbers_kept(const phi_solver *s)
     size_t fields = 0;
     for (int flow = 0; flow < PHI_OWN_FLOWS; ++flow)
         for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)
-            for (int f = 0; f < PHI_DIM; ++f) fields += phi_moves[phi_part_of(s, sweep)][f];
-    return fields * phi_block(s->rows, s->width);
+            for (int f = 0; f < PHI_DIM; ++f) fields += phi_keeps[phi_part_of(s, sweep)][f];
+    return (fields > 0 ? fields : 1) * phi_block(s->rows, s->width);
 }
 
-/* Keep the fields that a sweep will change; returns where the next ones are kept. */
+/* Keep the fields that a sweep will change, and that anything reads on the way back; returns where the next ones are kept. */
 static double *phi_keep(const phi_solver *s, int sweep, double *to)
 {
     size_t first, end = phi_share(phi_units(s), &first);
     for (int f = 0; f < PHI_DIM; ++f) {
-        if (!phi_moves[phi_part_of(s, sweep)][f]) continue;
-        for (size_t unit = first; unit < end; ++unit) {
-            const phi_piece at = phi_piece_of(s, unit);
-            double *row = to + PHI_LEAD + at.row.at[0];
-            memcpy(row + at.from, s->x[f] + at.row.at[0] + at.from, (size_t)(at.to - at.from) * sizeof *row);
-#if PHI_HALO
-            phi_ends(row, s->length, at.from, at.to);
-#endif
-        }
+        if (!phi_keeps[phi_part_of(s, sweep)][f]) continue;
+        phi_keep_units(s, s->x[f] - PHI_LEAD, to, first, end);
         to += phi_block(s->rows, s->width);
     }
     return to;
@@ -99,7 +92,7 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
     double *const *x, double *const *bar)
 {
     size_t first, end = phi_share(phi_units(s), &first);
-    phi_back_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+    phi_back_rows(s, sweep, coef, g->far, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #if PHI_HANDS
     if (!phi_hands[phi_part_of(s, sweep)]) return;
     phi_wait();
@@ -125,7 +118,7 @@ static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t
     while (last-- > 0) {
         const int sweep = phi_sweep_of(s, number, last);
         for (int f = PHI_DIM - 1; f >= 0; --f)
-            if (kept != NULL && phi_moves[phi_part_of(s, sweep)][f]) {
+            if (kept != NULL && phi_keeps[phi_part_of(s, sweep)][f]) {
                 kept -= g->block;
                 x[f] = kept + PHI_LEAD;
             }
@@ -150,7 +143,7 @@ static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, i
     for (int flow = 0; flow < PHI_OWN_FLOWS; ++flow)
         for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)
             for (int f = 0; f < PHI_DIM; ++f) {
-                if (!phi_moves[phi_part_of(s, sweep)][f]) continue;
+                if (!phi_keeps[phi_part_of(s, sweep)][f]) continue;
                 if (!seen[f]) g->x[f] = left + PHI_LEAD;
                 seen[f] = 1;
                 left += g->block;

@@ -27,7 +27,22 @@ static inline double phi_added(const double *values, ptrdiff_t count)
 }
 
 #endif
-#if !PHI_ONE_ROW
+/* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. */
+static void phi_keep_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
+{
+#if PHI_ONE_ROW
+    const ptrdiff_t begin = (ptrdiff_t)first * PHI_PIECE, stop = end == phi_units(s) ? s->length : (ptrdiff_t)end * PHI_PIECE;
+    if (first < end) memcpy(to + PHI_LEAD + begin, from + PHI_LEAD + begin, (size_t)(stop - begin) * sizeof *to);
+#if PHI_HALO
+    if (first < end) phi_ends(to + PHI_LEAD, s->length, begin, stop);
+#endif
+#else
+    const size_t begin = first * (size_t)s->width, stop = end * (size_t)s->width;
+    memcpy(to + begin, from + begin, (stop - begin) * sizeof *to);
+#endif
+}
+
+#if PHI_GIVERS
 /* The rows from which a row is handed what is its own; beyond open ends a row of zeros after all others. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])
 {
@@ -57,7 +72,7 @@ static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, d
             for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][at.row.at[0] + i];
         }
     }
-    phi_back_rows(s, kernel, coef, v, to, s->shares + (coef - s->coef), first, end);
+    phi_back_rows(s, kernel, coef, s->wide, v, to, s->shares + (coef - s->coef), first, end);
 #if PHI_HANDS
     if (!phi_hands[kernel - 1]) return;
     phi_wait();

@@ -188,17 +188,9 @@ static double *phi_keep_stage(const phi_solver *s, int now, double *to)
     double *const *const kept[] = { s->y[now] };
 #endif
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
-        for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k) {
-            double *row = to + k * block + PHI_LEAD + at.row.at[0];
-            const double *from = kept[k / PHI_DIM][k % PHI_DIM] + at.row.at[0];
-            memcpy(row + at.from, from + at.from, (size_t)(at.to - at.from) * sizeof *row);
-#if PHI_HALO
-            phi_ends(row, s->length, at.from, at.to);
-#endif
-        }
-    }
+    for (size_t unit = 0; unit < units; ++unit)
+        for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k)
+            phi_keep_units(s, kept[k / PHI_DIM][k % PHI_DIM] - PHI_LEAD, to + k * block, unit, unit + 1);
     return to + PHI_KEPT * PHI_DIM * block;
 }
 

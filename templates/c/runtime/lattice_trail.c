@@ -34,6 +34,8 @@ typedef struct {
     size_t most, count;          /* how many there may be, and are */
     size_t longest;              /* most steps of a segment */
     size_t first_step;           /* steps that were made before */
+    int far;                     /* whether cotangents are found by functions for arguments of any size */
+    int failed;                  /* whether others have led to what is not finite */
 } phi_transpose;
 
 #if PHI_SERIES
@@ -80,8 +82,10 @@ size_t phi_trail_size(const phi_solver *s, size_t steps)
     return phi_always(s) * sizeof(double) + steps * of_step + phi_state_size(s) + 64;
 }
 
+enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes that the caches of a core hold beside the state */
+
 /* Share memory out, all that is not taken in any case between what the steps of a segment keep and the states that segments
-   begin with: as few of these as there may be, or half and half where all that is too little for two runs. */
+   begin with: the shortest segments that are made twice only, if caches hold them, or half and half where all that is too little. */
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {
     double *next = (double *)(void *)((char *)memory + (64 - (uintptr_t)memory % 64) % 64);
@@ -92,14 +96,14 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     g->block = block;
     g->of_step = phi_numbers_kept(s);
     const size_t of_step = g->of_step * sizeof *next, fit = (room - of_state) / of_step;
-    g->longest = fit < steps ? fit : steps > 0 ? steps : 1;
-    while (g->longest > 1 && (room - g->longest * of_step) / of_state < steps / g->longest + 1)
-        g->longest -= (g->longest + 7) / 8;
-    g->most = (room - g->longest * of_step) / of_state;
-    if (g->most < steps / g->longest + 1) {
-        g->longest = fit > 2 ? fit / 2 : 1;
-        g->most = (room - g->longest * of_step) / of_state;
+    g->longest = steps > 0 ? steps : 1;
+    if (fit < steps) {
+        g->longest = of_step < PHI_BESIDE_CORE ? PHI_BESIDE_CORE / of_step : 1;
+        if (g->longest > fit) g->longest = fit;
+        while (g->longest < fit && (room - g->longest * of_step) / of_state < steps / g->longest + 1) ++g->longest;
+        if ((room - g->longest * of_step) / of_state < steps / g->longest + 1) g->longest = fit > 2 ? fit / 2 : 1;
     }
+    g->most = (room - g->longest * of_step) / of_state;
     for (int f = 0; f < PHI_ARRAYS; ++f, next += block) g->bar[f] = g->row_bar[f] = next + PHI_LEAD;
     for (int f = 0; f < PHI_DIM; ++f, next += block) g->row_bar[f] = next + PHI_LEAD;
     for (int f = 0; f < PHI_DIM; ++f, next += block) g->end[f] = next + PHI_LEAD;

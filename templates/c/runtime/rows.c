@@ -186,7 +186,7 @@ typedef struct {
     ptrdiff_t from, to;
 #if !PHI_ONE_ROW
     ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
-#if PHI_ADJOINT
+#if PHI_GIVERS
     ptrdiff_t givers[PHI_LINES]; /* the rows that hand something to this one, where they have been found */
 #endif
 #endif

@@ -8,21 +8,23 @@ So it is with the kernels of the equation of a stage, see `adjoint_stages`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from phigen.lanes.lowering import Rows
 from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Ends, Gather, Sweep, Sweeps
+from phigen.symbolic.expression import symbols_of
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
-from phigen.targets.c.lattice.layout import Layout, layout_of, starts_are_read
+from phigen.targets.c.lattice.layout import Layout, givers, layout_of, starts_are_read
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
-from phigen.targets.c.lattice.parts import Case, calls_over_sites, over_rows
+from phigen.targets.c.lattice.parts import Case, call_forms, calls_over_sites, either, over_rows
 from phigen.targets.rendering import render
 
 
@@ -49,30 +51,30 @@ class _Pulled:
     before: tuple[str, ...] = ()
 
 
-def printed(program: Program, step: Sweeps, adjoint: Adjoint) -> str:
+def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
     """The loops, and which of them go back through which part, or kernel of the equation of a stage."""
     layout, kernels = layout_of(program, step), {kernel.name: kernel for kernel in adjoint.steps}
     found = [function(program, adjoint.prepare)] if adjoint.prepare.inputs["params"] else []
     found += [function(program, adjoint.refresh)] if adjoint.refresh else []
     if step.equation:
-        parts = [*_of_equation(program, layout, kernels)]
+        parts = [*_of_equation(program, layout, rows, kernels)]
         setups: list[tuple[str, ...]] = [_SETUP_OF_STAGES] * len(parts)
     else:
-        parts = [*_of_parts(program, layout, kernels)]
+        parts = [*_of_parts(program, layout, rows, kernels)]
         chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(parts))]
         setups = [(*_SETUP, *["at.row.chosen = colour;"] * own) for own in chosen]
     found += [loop.text(program) for part in parts for loop in part.loops]
     back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
     found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1))))
-    where = _givers(program) if len(step.sites.axes) > 1 else []
+    where = _givers(program) if givers(step) else []
     hand = {
         k: Case(p.second, [*(line for line in setup if line != _VARIED), *where], beside=False)
         for k, (p, setup) in enumerate(zip(parts, setups, strict=True), 1)
         if p.second
     }
     found += [_over(program, layout, "What sites are handed", "hand_rows", hand)] if hand else []
-    return "\n".join([_tables(program, step, parts), *found, _added(program, step, layout)])
+    return "\n".join([_tables(program, step, parts, adjoint.steps), *found, _added(program, step, layout)])
 
 
 _SETUP = ("at.row.x = x;", "at.row.bar = bar;", "at.row.handed = handed;")
@@ -85,7 +87,7 @@ def _has_ends(calls: Sequence[str]) -> bool:
     return any("second" in call for call in calls)
 
 
-def _of_parts(program: Program, layout: Layout, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
+def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of all sweeps of each part."""
     for number, part in enumerate(layout.step.parts, 1):
         pulled = list[_Pulled]()
@@ -95,10 +97,10 @@ def _of_parts(program: Program, layout: Layout, kernels: Mapping[str, Kernel]) -
             ends = tuple((e, kernels[e.kernel.name + BACK]) for e in (sweep.gather.ends if sweep.gather else ()))
             before = tuple(_gathered(program, layout, sweep))
             pulled.append(_Pulled(kernels[sweep.kernel.name + BACK], seeds, sweep.gather, ends, before))
-        yield _back(program, layout, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
+        yield _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
 
 
-def _of_equation(program: Program, layout: Layout, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
+def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of each kernel that a stage is gone back through by; in the first one what is gathered is found."""
     fields, gather = program.coordinates, layout.partners.field
     for number, (name, own, wanted) in enumerate(KERNELS):
@@ -112,10 +114,10 @@ def _of_equation(program: Program, layout: Layout, kernels: Mapping[str, Kernel]
         )
         before = (f"{program.name}_{e.kernel.name}(&s->params, &at.row, at.from, at.to);" for e in gather.ends)
         pulled = _Pulled(kernel, seeds, read, ends, () if number else tuple(before))
-        yield _back(program, layout, name.replace("_back", "_hand"), f"{name} has read", [pulled])
+        yield _back(program, layout, rows, name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
 
-def _back(program: Program, layout: Layout, name: str, whom: str, pulled: Sequence[_Pulled]) -> Back:
+def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pulled: Sequence[_Pulled]) -> Back:
     """The two goes of some kernels, of which the second is ``name``."""
     loops, first, second = list[Loop](), list[str](), list[str]()
     beside, given = list[Handed](), 0
@@ -128,15 +130,19 @@ def _back(program: Program, layout: Layout, name: str, whom: str, pulled: Sequen
         sums = one.gather.names if one.gather else ()
         listed = handed_by(layout, one.kernel, given)
         given = max([given, *(h.array + 1 for h in listed)])
-        own = [
-            first_loop(program, layout, kernel, form, one.seeds, sums, listed, given)
-            for kernel, form in forms_of(program, one.kernel)
-        ]
-        first += [*one.before, *(called(call.loop, call.sites) for call in calls_over_sites(own))]
+        lines = {}
+        for far, calls in call_forms(program, rows, [one.kernel]).items():
+            own = [
+                first_loop(program, layout, kernel, form + far, one.seeds, sums, listed, given, calls)
+                for kernel, form in forms_of(program, one.kernel)
+            ]
+            lines[far] = [called(call.loop, call.sites) for call in calls_over_sites(own)]
+            loops += own
+        first += [*one.before, *either(lines)]
         bonds = [loop for end, kernel in one.ends for loop in gathering_back(program, layout, end, kernel, given)]
         given += len(sums)
         second += map(called, bonds)
-        loops += [*own, *bonds]
+        loops += bonds
         beside += listed
     first += copied_ends(program, layout, beside)
     if beside:
@@ -164,33 +170,42 @@ def _over(program: Program, layout: Layout, title: str, head: str, cases: Mappin
         numbers = ["double *numbers"] * bool(layout.step.partners)
         arguments = ", ".join(["double *const *bar", *numbers])
         if head == "back_rows":
-            arguments = "const double *coef, double *const *v, double *const *bar, double *sums"
+            arguments = "const double *coef, int far, double *const *v, double *const *bar, double *sums"
     elif whole:
-        arguments = f"const double *coef, {arguments}, double *sums"
+        far = "int far, " * (head == "back_rows")
+        arguments = f"const double *coef, {far}{arguments}, double *sums"
     more = {"title": title, "head": head, "coloured": coloured}
     more["arguments"] = f"int {'flow' if coloured else 'part'}, {arguments}"
     unused = ["part"] * (len(cases) == 1 and not coloured)
     calls = [call for case in cases.values() for call in case.calls]
     unused += ["numbers"] * ("*numbers" in arguments and not any("numbers" in call for call in calls))
+    unused += ["far"] * ("int far" in arguments and not any("(far)" in call for call in calls))
     return over_rows(program, layout, list(cases.values()), list(cases), unused=unused, **more)
 
 
-def _tables(program: Program, step: Sweeps, parts: Sequence[Back]) -> str:
-    moved = [{f for sweep in part for f in sweep.moved} for part in step.parts]
-    rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in moved]
+def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iterable[Kernel]) -> str:
+    read = _read(step, kernels)
+    kept = [{f for sweep in part for f in sweep.moved if program.coordinates[f] in read} for part in step.parts]
+    rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in kept]
     values = {
         "NAME": program.name,
         "parts": len(parts),
         "kernels": [f"{name.upper()} = {k}" for k, (name, *_) in enumerate(KERNELS, 1)] if step.equation else (),
         "kept": 1 + starts_are_read(step),
         "sums": _sums(program, step),
-        "moves": ", ".join(f"{{ {row} }}" for row in rows),
+        "keeps": ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
         "handed": max(1, *(part.handed for part in parts)) if parts else 1,
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),
         "numbers": max(1, sum(p.at == "all" for p in program.parameters)),
     }
     return render("c", "lattice_adjoint.c", values)
+
+
+def _read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
+    """The fields, and parameters, whose values before a sweep some transposed kernel reads."""
+    used = {s for kernel in kernels for s in {*kernel.inputs.get("site", ())} & {*symbols_of(*kernel.roots)}}
+    return {(step.sites.ends.get(s) or step.sites.places[s])[0] for s in used}
 
 
 def _sums(program: Program, step: Sweeps) -> str:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.symbols import COEFFICIENT, Symbol
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.loops import Loop, in_loops
+from phigen.targets.c.lattice.loops import Loop
 from phigen.targets.c.lattice.names import SiteNames, beside
 from phigen.targets.code import Code, Store, lower
 
@@ -62,10 +62,11 @@ def first_loop(
     sums: Sequence[str],
     handed: Sequence[Handed],
     begin: int,
+    calls: Mapping[str, str],
 ) -> Loop:
     """The first go of a kernel; cotangents of ``sums`` over bonds or pairs are handed in arrays from ``begin`` on."""
     name, code = program.name, lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), sums, {seeds.kind: seeds.pointers})
+    names = SiteNames(program, layout, kernel, code, set(), calls, sums, {seeds.kind: seeds.pointers})
     head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
     used, given = {*seeds.bars}, dict[int, str]()
     places = {(h.base, h.offset): h.array for h in handed}

@@ -133,6 +133,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "HANDS": any(hands(step)),
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
+        "GIVERS": step.adjoint is not None and givers(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "BANDED": banded,
@@ -180,6 +181,11 @@ def shares(step: Sweeps) -> bool:
         kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
     return any(not e.is_zero for along in summed for _, e in along)
+
+
+def givers(step: Sweeps) -> bool:
+    """Whether rows that hand something to a row are not those that it reads, since beyond open ends there are none."""
+    return any(step.sites.open[:-1])
 
 
 def starts_are_read(step: Sweeps) -> bool:

@@ -46,7 +46,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     seen = program.observables
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
-        found += _of_equation(program, layout, kernel, _forms(program, rows, [kernel]))
+        found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]))
     if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
         found += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
@@ -67,7 +67,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     return "\n".join([*found, render("c", "lattice_parameters.c", values)])
 
 
-def _forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
+def call_forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
     """The forms in which kernels are needed, each with what its functions are called; without rows one for all."""
     calls = in_loops(program)
     if rows is None or not any(rows.calls_near(kernel) for kernel in kernels):
@@ -143,7 +143,7 @@ def _forms_of_part(
 
     Short code has loops that also serve with the fields in another order.
     """
-    forms = _forms(program, rows, [sweep.kernel for sweep in part])
+    forms = call_forms(program, rows, [sweep.kernel for sweep in part])
     fields, found = program.coordinates, dict[str, list[_Call]]()
     tried = [*orders(fields)] if program.profile == "small" and rows is not None else []
     for form, names in forms.items():
@@ -171,7 +171,7 @@ def _case(
     coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
     lines = {form: [*_called(program, called, names)] for form, called in forms.items()}
     moved = sorted({f for sweep in part for f in sweep.moved})
-    statements = [*_either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
+    statements = [*either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
     setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
     orders = [*_reordered(program, layout, [call.order for called in forms.values() for call in called])]
     return Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]), orders)
@@ -246,7 +246,7 @@ def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
     yield from (_Call(end, "at.from, second"), _Call(inside, "second, third"), _Call(end, "third, at.to"))
 
 
-def _either(lines: Mapping[str, Sequence[str]]) -> list[str]:
+def either(lines: Mapping[str, Sequence[str]]) -> list[str]:
     """The calls of each form, for those arguments that it is for."""
     if len(lines) == 1:
         return [line for calls in lines.values() for line in calls]
@@ -293,7 +293,7 @@ def _of_equation(
     yield over_rows(
         program,
         layout,
-        [Case([*gathered, *_either(lines), *ends], setup, has_ends(program, [kernel]))],
+        [Case([*gathered, *either(lines), *ends], setup, has_ends(program, [kernel]))],
         title=titles[kernel.name],
         head=f"{kernel.name}_rows",
         arguments=f"const double *coef, int far, double *const *y, {'double *const *v, ' * varied}double *const *to",
