@@ -29,6 +29,15 @@ _ONE_STAGE = (
 #: What holds the stages of a step, and says which is meant: one stage is the step.
 _STAGES = re.compile(r"typedef struct \{ phi_model stage\[PHI_STAGES\]; \}| *phi_model \*this_stage = ")
 
+#: Loops over the rows of a lattice, and places in them: what a lattice with one axis lacks.
+_OVER_ROWS = re.compile(r"^( *)for \(size_t r = 0; r < s->rows; \+\+r\)(?: (.*))?$")
+_ONE_ROW = (
+    (re.compile(r" \+ \(ptrdiff_t\)r \* s->width| \+ r \* \(size_t\)s->length"), ""),
+    (re.compile(r" \+ at\.row\.at\[0\]|at\.row\.at\[0\] \+ "), ""),
+    (re.compile(r"(?:\(ptrdiff_t\))?s->rows \* (?=(?:\(size_t\))?s->width)"), ""),
+    (re.compile(r"phi_locate\(s, (?:r|0), "), "phi_locate(s, "),
+)
+
 
 @dataclass
 class Amalgam:
@@ -102,11 +111,19 @@ class Amalgam:
     def _own(self, lines: Sequence[str]) -> list[str]:
         """Lines of the runtime with the prefix of the solver."""
         kept = lines if self.switches["COMPOSED"] else one_stage(lines)
+        kept = _without_loops(kept, _OVER_ROWS, _ONE_ROW) if self.switches.get("ONE_ROW") else kept
         return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
 
 
 def one_stage(lines: Sequence[str]) -> list[str]:
     """The lines for a solver with one stage: no loops over stages, no arrays of one."""
+    return _without_loops([line for line in lines if not _STAGES.match(line)], _OVER_STAGES, _ONE_STAGE)
+
+
+def _without_loops(
+    lines: Sequence[str], over: re.Pattern[str], alone: Sequence[tuple[re.Pattern[str], str]]
+) -> list[str]:
+    """The lines without loops of which but one turn is made, and with what stands for other texts where that is ``alone``."""
     kept: list[str] = []
     ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
     for line in lines:
@@ -116,15 +133,13 @@ def one_stage(lines: Sequence[str]) -> list[str]:
             ends.pop()
             continue
         shift = 4 * len(ends)
-        found = _OVER_STAGES.match(line)
-        if _STAGES.match(line):
-            continue
+        found = over.match(line)
         if found is None:
             kept.append(line[shift:] if line.startswith(" " * shift) else line)
         elif found[2] in (None, "{"):
             ends.append((found[1], f"{found[1]}}}" if found[2] else ""))
         else:
             kept.append(f"{found[1]}{found[2]}"[shift:])
-    for pattern, text in _ONE_STAGE:
+    for pattern, text in alone:
         kept = [pattern.sub(text, line) for line in kept]
     return kept

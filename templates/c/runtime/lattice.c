@@ -122,15 +122,14 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     const size_t most = SIZE_MAX / 64 / PHI_RESERVED;
 #endif
     size_t rows = 1;
-    for (int a = 0; a < PHI_AXES; ++a) {
+    for (int a = 0; a < PHI_AXES; ++a)
         if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
 #if !PHI_ONE_ROW
-        if (a < PHI_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
-#endif
+    for (int a = 0; a < PHI_AXES - 1; ++a) {
+        if (rows > most / sizes[a]) return 0;
+        rows *= sizes[a];
     }
+#endif
     size_t wide = PHI_LEAD + ((sizes[PHI_AXES - 1] + 7) / 8 * 8 + PHI_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -170,9 +169,13 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
     doubles += phi_matrix_of(sizes[0], NULL, &matrix);
 #endif
 #if PHI_GRAPH
-    return doubles * sizeof(double) + phi_graph_size(sizes[0], bonds) + 128;
+    return doubles * sizeof(double) + phi_graph_size(sizes[0], bonds) + 64;
+#else
+#if PHI_ONE_ROW
+    return doubles * sizeof(double) + 64;
 #else
     return doubles * sizeof(double) + rows * PHI_LINES * sizeof(ptrdiff_t) + 64;
+#endif
 #endif
 }
 
@@ -350,14 +353,12 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
     const size_t block = phi_block(rows, width);
+#if !PHI_ONE_ROW
     s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + PHI_RESERVED * block);
-#if PHI_ONE_ROW
-    s->lines[0] = 0;
-#else
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
 #endif
 #if PHI_BANDED
-    s->matrix = (double *)(void *)(s->lines + PHI_LINES);
+    s->matrix = aligned - PHI_LEAD + PHI_RESERVED * block;
 #endif
     for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
@@ -376,7 +377,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     phi_put_parameters(s, &own);
 #endif
 #if PHI_GRAPH
-    phi_connect(s, bonds, (double *)(void *)(s->lines + 8)); /* there is one line, and doubles are aligned */
+    phi_connect(s, bonds, aligned - PHI_LEAD + PHI_RESERVED * block);
 #if PHI_BOND_PARAMETERS
     phi_put_at_bonds(s, &own);
 #endif

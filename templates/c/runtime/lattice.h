@@ -18,7 +18,9 @@ typedef struct {
     size_t sites, rows;
     ptrdiff_t length, width;  /* sites of a row; doubles between the beginnings of two rows */
     double *x[PHI_ARRAYS];    /* in rows, each field, then each parameter at sites: the first site of the first row */
+#if !PHI_ONE_ROW
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
+#endif
 #if PHI_GATHER
     double *gathered[PHI_GATHERED]; /* sums over other sites, for each site */
 #endif

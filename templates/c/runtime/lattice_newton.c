@@ -22,8 +22,8 @@ enum { PHI_MOST_ITERATIONS = 200 };
 static double phi_distance(const phi_solver *s, int side, double added)
 {
     double sum = 0.0;
-    for (int k = 0; k < PHI_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r) {
+    for (size_t r = 0; r < s->rows; ++r)
+        for (int k = 0; k < PHI_DIM; ++k) {
             const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
             for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
         }

@@ -119,9 +119,9 @@ static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *no
 static void phi_predict(const phi_solver *s, double *const *x, int stage)
 {
     PHI_EACH_PIECE
-    for (size_t r = 0; r < s->rows; ++r)
+    for (size_t row = 0; row < s->rows; ++row)
         for (int k = 0; k < PHI_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+            const ptrdiff_t first = (ptrdiff_t)row * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
             for (int d = 0; d < s->guess[stage].order; ++d) {
                 const double *difference = s->guess[stage].difference[d][k];
@@ -136,10 +136,10 @@ static void phi_remember(phi_solver *s, double *const *from, int stage, int now)
     phi_guess *guess = &s->guess[stage];
     double size[PHI_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
     PHI_EACH_PIECE
-    for (size_t r = 0; r < s->rows; ++r) {
+    for (size_t row = 0; row < s->rows; ++row) {
         double own[PHI_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < PHI_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)r * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+            const ptrdiff_t first = (ptrdiff_t)row * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
             const double *restrict y = s->y[now][k], *restrict x = from[k];
             for (ptrdiff_t i = first; i < end; ++i) {
                 double next = y[i] - x[i];

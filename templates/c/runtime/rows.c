@@ -9,7 +9,9 @@
 /* Where one row is. */
 typedef struct {
     double *const *x;             /* see phi_solver */
+#if !PHI_ONE_ROW
     const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
+#endif
     ptrdiff_t length;             /* sites of a row */
 #if PHI_TIMED
     double t;                     /* the time */
@@ -104,10 +106,16 @@ static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[
 
 #endif
 /* What kernels are told of a row. */
+#if PHI_ONE_ROW
+static inline void phi_locate(const phi_solver *s, phi_row *row)
+#else
 static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
+#endif
 {
     row->x = s->x;
+#if !PHI_ONE_ROW
     row->at = s->lines + index * PHI_LINES;
+#endif
     row->length = s->length;
 #if PHI_TIMED
     row->t = s->now;

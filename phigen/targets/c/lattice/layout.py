@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
@@ -32,6 +32,7 @@ class Layout:
     halo: int
     weights: tuple[str, ...]
     arrays: tuple[str, ...]
+    slopes: bool = True  # whether code has how sweeps follow variations, or takes differences of them
 
     def line(self, offset: Sequence[int]) -> int:
         """The line of a neighbour."""
@@ -78,8 +79,10 @@ class Layout:
 
     @property
     def partners(self) -> Partners:
-        """Bonds or pairs; nothing where there are none."""
-        return self.step.partners or Partners(Gather((), ()), Gather((), ()))
+        """Bonds or pairs, with their variations where these are followed; nothing where there are none."""
+        nothing = Gather((), ())
+        found = self.step.partners or Partners(nothing, nothing)
+        return found if self.slopes else replace(found, varied=nothing)
 
     def gathered(self, kernel: Kernel) -> Gather:
         """What a kernel of the equation of a stage reads of bonds or pairs."""
@@ -100,9 +103,10 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     used = (w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
     weights = dict.fromkeys(w for w in used if kind_of(w) == PRESENT)
     halo = max((abs(o[-1]) for o in offsets), default=0)
-    return Layout(
-        step, tuple(lines), halo, tuple(weights), (*program.coordinates, *sites.parameters, *sites.increments)
-    )
+    arrays = (*program.coordinates, *sites.parameters, *sites.increments)
+    found = Layout(step, tuple(lines), halo, tuple(weights), arrays)
+    banded = found.band > 0 and program.offers("recurrences")
+    return replace(found, slopes=program.profile == "fast" or program.extras.tangent or banded or bool(step.adjoint))
 
 
 def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
@@ -142,7 +146,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BY_HAND": step.is_by_hand and program.offers("by-hand") and not program.compensated,
         "WAVES": waves(program, step),
         "COMPENSATED": program.compensated,
-        "SLOPES": program.profile == "fast" or program.extras.tangent or banded or step.adjoint is not None,
+        "SLOPES": layout.slopes,
         "SHARED": bool(step.adjoint)
         or (step.equation is None and (program.profile == "fast" or bool(program.extras.tangent or program.noise))),
         "ONE_ROW": len(step.sites.axes) == 1,

@@ -31,8 +31,8 @@ def declarations(program: Program, step: Sweeps) -> str:
     if step.partners:
         every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
         swept = [sweep.gather for sweep in every if sweep.gather]
-        own = (step.partners.energy, step.partners.field, step.partners.varied)
-        most = max(len(g.names) for g in (*swept, *own))
+        own = layout.partners
+        most = max(len(g.names) for g in (*swept, own.energy, own.field, own.varied))
         sizes.append(("GATHERED", most, "sums over other sites that are held for each site"))
     if step.sites.at_bonds:
         sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
@@ -83,7 +83,7 @@ def model(program: Program, step: Sweeps) -> str:
     multiples = [*schedule.multiples, *schedule.multiples[:1]]
     constants = [
         ("HALO", layout.halo, "sites that are copied beside a row"),
-        ("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it"),
+        *[("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it")] * several,
         ("ROW", max(1, step.row), "coefficients of one flow"),
         ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
     ]

@@ -33,9 +33,8 @@ from phigen.targets.rendering import render
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
     layout, name, member = layout_of(program, step), program.name, members(program)
-    followed = switches(program, step, layout)["SLOPES"]
     found = [
-        *functions.called(program, [step.equation.slope] if step.equation and not followed else ()),
+        *functions.called(program, [step.equation.slope] if step.equation and not layout.slopes else ()),
         *functions.phi_lanes(program, set(rows.near)),
     ]
     found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
@@ -51,7 +50,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         found += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
         )
-    for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and followed else ():
+    for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and layout.slopes else ():
         found += _of_equation(program, layout, kernel, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field) if k.roots]
     sites = [p for p in program.parameters if p.at == "sites"]
