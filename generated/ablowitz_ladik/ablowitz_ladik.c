@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2b485e10283acb0aa700208956314034afd5da81201eac6913223f7d5d61b95f
+ * body-sha256: a127157d5b42cf8ee4a0d8ab79e63c3a96be412b3e714721aa8261e00f12be05
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const ablowitz_ladik_params ablowitz_ladik_default_params = { 0 };
 
 enum { ablowitz_ladik_HALO = 1 };           /* sites that are copied beside a row */
-enum { ablowitz_ladik_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { ablowitz_ladik_LEAD = 8 };           /* doubles before the first site of a row */
+enum { ablowitz_ladik_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
 enum { ablowitz_ladik_ROW = 4 };            /* coefficients of one flow */
 enum { ablowitz_ladik_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { ablowitz_ladik_FLOWS = 25 };         /* in a step */
@@ -75,9 +76,8 @@ static void ablowitz_ladik_prepare(const ablowitz_ladik_params *params, double h
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see ablowitz_ladik_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see ablowitz_ladik_solver */
+    ptrdiff_t length; /* sites of a row */
 } ablowitz_ladik_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -102,11 +102,9 @@ static inline void ablowitz_ladik_ends(double *row, ptrdiff_t length, ptrdiff_t 
 }
 
 /* What kernels are told of a row. */
-static inline void ablowitz_ladik_locate(const ablowitz_ladik_solver *s, size_t index,
-    ablowitz_ladik_row *row)
+static inline void ablowitz_ladik_locate(const ablowitz_ladik_solver *s, ablowitz_ladik_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * ablowitz_ladik_LINES;
     row->length = s->length;
 }
 
@@ -127,7 +125,7 @@ typedef struct {
 static inline ablowitz_ladik_piece ablowitz_ladik_piece_of(const ablowitz_ladik_solver *s, size_t unit)
 {
     ablowitz_ladik_piece piece;
-    ablowitz_ladik_locate(s, 0, &piece.row);
+    ablowitz_ladik_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * ablowitz_ladik_PIECE;
     piece.to = unit == ablowitz_ladik_units(s) - 1 ? s->length : piece.from + ablowitz_ladik_PIECE;
     return piece;
@@ -275,22 +273,17 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_params *params,
 }
 
 /* ---- The lattice ---- */
-enum {
-    ablowitz_ladik_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    ablowitz_ladik_LEAD = (ablowitz_ladik_HALO + 7) / 8 * 8,
-    ablowitz_ladik_BUFFER = 256,
-    ablowitz_ladik_RESERVED = ablowitz_ladik_ARRAYS + ablowitz_ladik_DIM
-};
+enum { ablowitz_ladik_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { ablowitz_ladik_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < ablowitz_ladik_AXES; ++a) {
+    for (int a = 0; a < ablowitz_ladik_AXES; ++a)
         if (sizes[a] < ablowitz_ladik_least[a] || sizes[a] % ablowitz_ladik_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = ablowitz_ladik_LEAD + ((sizes[ablowitz_ladik_AXES - 1] + 7) / 8 * 8 + ablowitz_ladik_HALO
         + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -308,18 +301,16 @@ size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
     const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = ablowitz_ladik_RESERVED * ablowitz_ladik_block(rows, width);
-    return doubles * sizeof(double) + rows * ablowitz_ladik_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void ablowitz_ladik_put(const ablowitz_ladik_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - ablowitz_ladik_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        ablowitz_ladik_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - ablowitz_ladik_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    ablowitz_ladik_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -359,8 +350,6 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + ablowitz_ladik_LEAD;
     const size_t block = ablowitz_ladik_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - ablowitz_ladik_LEAD + ablowitz_ladik_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k) * block;
@@ -385,15 +374,14 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
 static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s, double *const x[ablowitz_ladik_DIM])
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!ablowitz_ladik_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!ablowitz_ladik_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *const from[ablowitz_ladik_DIM],
     const ablowitz_ladik_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         memcpy(to[k] - ablowitz_ladik_LEAD, from[k] - ablowitz_ladik_LEAD, block);
 }
@@ -476,9 +464,8 @@ static void ablowitz_ladik_take(const ablowitz_ladik_solver *s, double *const fi
     double *x)
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x) { ablowitz_ladik_take(s, s->x, x); }
@@ -506,18 +493,15 @@ double ablowitz_ladik_hamiltonian(const ablowitz_ladik_solver *s)
 {
     double density[ablowitz_ladik_BUFFER], sum = 0.0, rest = 0.0;
     ablowitz_ladik_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        ablowitz_ladik_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += ablowitz_ladik_BUFFER) {
-            const ptrdiff_t to = s->length - from > ablowitz_ladik_BUFFER ? from + ablowitz_ladik_BUFFER
-                : s->length;
-            ablowitz_ladik_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    ablowitz_ladik_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += ablowitz_ladik_BUFFER) {
+        const ptrdiff_t to = s->length - from > ablowitz_ladik_BUFFER ? from + ablowitz_ladik_BUFFER
+            : s->length;
+        ablowitz_ladik_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -530,10 +514,8 @@ typedef void ablowitz_ladik_kernel(const ablowitz_ladik_params *, const ablowitz
 static void ablowitz_ladik_fill(const ablowitz_ladik_solver *s, ablowitz_ladik_kernel *kernel, double *out)
 {
     ablowitz_ladik_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        ablowitz_ladik_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    ablowitz_ladik_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)

@@ -2,7 +2,7 @@
  * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a70cfd203db795be2f7efeb89046d1e2c9e2e130f93b1777d49b55283ebde3d9
+ * body-sha256: a0def90d7b9fe16c8950568cf082d67f8ef6ab8d645c4240dbd569a49d8424b6
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
@@ -40,7 +40,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[ablowitz_ladik_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[ablowitz_ladik_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6d86c34c5d0c33f1c358a1ec9218026676591a418a3409bd307ba3814a8e29fe
+ * body-sha256: 08a5969a05aa3f5e5d362f9e48c30e77cd1c961e096efb70b347db6140d0feed
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -29,7 +29,8 @@
 const chiral_magnet_params chiral_magnet_default_params = { 1.0, 0.5, NULL, NULL, 0.1, 0.15 };
 
 enum { chiral_magnet_HALO = 0 }; /* sites that are copied beside a row */
-enum { chiral_magnet_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { chiral_magnet_LEAD = 0 }; /* doubles before the first site of a row */
+enum { chiral_magnet_RESERVED = 9 }; /* arrays over the sites in the memory of a solver */
 enum { chiral_magnet_ROW = 5 }; /* coefficients of one flow */
 enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { chiral_magnet_FLOWS = 5 }; /* in a step */
@@ -79,7 +80,6 @@ static void chiral_magnet_prepare(const chiral_magnet_params *params, double h, 
 /* Where one row is. */
 typedef struct {
     double *const *x;        /* see chiral_magnet_solver */
-    const ptrdiff_t *at;     /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;        /* sites of a row */
     double *const *gathered; /* see chiral_magnet_solver */
     const int *bonds, *middle, *other;
@@ -100,10 +100,9 @@ typedef struct {
 #endif
 
 /* What kernels are told of a row. */
-static inline void chiral_magnet_locate(const chiral_magnet_solver *s, size_t index, chiral_magnet_row *row)
+static inline void chiral_magnet_locate(const chiral_magnet_solver *s, chiral_magnet_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * chiral_magnet_LINES;
     row->length = s->length;
     row->gathered = s->gathered;
     row->bonds = s->bonds;
@@ -131,7 +130,7 @@ typedef struct {
 static inline chiral_magnet_piece chiral_magnet_piece_of(const chiral_magnet_solver *s, size_t unit)
 {
     chiral_magnet_piece piece;
-    chiral_magnet_locate(s, 0, &piece.row);
+    chiral_magnet_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * chiral_magnet_PIECE;
     piece.to = unit == chiral_magnet_units(s) - 1 ? s->length : piece.from + chiral_magnet_PIECE;
     return piece;
@@ -452,18 +451,6 @@ static void chiral_magnet_vector_field_row(const chiral_magnet_params *params, c
     }
 }
 
-static void chiral_magnet_put_at_bond(const chiral_magnet_solver *s, double *at, const double *values,
-    double value);
-
-/* The parameters at bonds, in the order of the bonds of each site. */
-static void chiral_magnet_put_at_bonds(chiral_magnet_solver *s, const chiral_magnet_params *params)
-{
-    chiral_magnet_put_at_bond(s, s->at_bonds[0], params->Dx, 0.0);
-    s->params.Dx = NULL;
-    chiral_magnet_put_at_bond(s, s->at_bonds[1], params->Dy, 1.0);
-    s->params.Dy = NULL;
-}
-
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
 static int chiral_magnet_few(size_t sites, size_t bonds)
@@ -551,23 +538,17 @@ static void chiral_magnet_put_at_bond(const chiral_magnet_solver *s, double *at,
 }
 
 /* ---- The lattice ---- */
-enum {
-    chiral_magnet_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    chiral_magnet_LEAD = (chiral_magnet_HALO + 7) / 8 * 8,
-    chiral_magnet_BUFFER = 256,
-    chiral_magnet_RESERVED = chiral_magnet_ARRAYS + chiral_magnet_DIM
-        + chiral_magnet_GATHERED
-};
+enum { chiral_magnet_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < chiral_magnet_AXES; ++a) {
+    for (int a = 0; a < chiral_magnet_AXES; ++a)
         if (sizes[a] < chiral_magnet_least[a] || sizes[a] % chiral_magnet_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = chiral_magnet_LEAD + ((sizes[chiral_magnet_AXES - 1] + 7) / 8 * 8 + chiral_magnet_HALO + 7)
         / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -585,17 +566,24 @@ size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bo
     const size_t rows = sizes == NULL ? 0 : chiral_magnet_shape(sizes, &width);
     if (rows == 0 || !chiral_magnet_few(sizes[0], bonds)) return 0;
     size_t doubles = chiral_magnet_RESERVED * chiral_magnet_block(rows, width);
-    return doubles * sizeof(double) + chiral_magnet_graph_size(sizes[0], bonds) + 128;
+    return doubles * sizeof(double) + chiral_magnet_graph_size(sizes[0], bonds) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - chiral_magnet_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-    }
+    double *row = rows;
+    memset(row - chiral_magnet_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+}
+
+/* The parameters at bonds, in the order of the bonds of each site. */
+static void chiral_magnet_put_at_bonds(chiral_magnet_solver *s, const chiral_magnet_params *params)
+{
+    chiral_magnet_put_at_bond(s, s->at_bonds[0], params->Dx, 0.0);
+    s->params.Dx = NULL;
+    chiral_magnet_put_at_bond(s, s->at_bonds[1], params->Dy, 1.0);
+    s->params.Dy = NULL;
 }
 
 /* ---- The solver ---- */
@@ -637,16 +625,13 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + chiral_magnet_LEAD;
     const size_t block = chiral_magnet_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         s->before[k] = aligned + (chiral_magnet_ARRAYS + k) * block;
     for (size_t k = 0; k < chiral_magnet_GATHERED; ++k)
         s->gathered[k] = aligned + (chiral_magnet_ARRAYS + chiral_magnet_DIM + k) * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->x[k], x0 + k * sites);
-    /* there is one line, and doubles are aligned */
-    chiral_magnet_connect(s, bonds, (double *)(void *)(s->lines + 8));
+    chiral_magnet_connect(s, bonds, aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block);
     chiral_magnet_put_at_bonds(s, &own);
     return chiral_magnet_OK;
 }
@@ -668,15 +653,14 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
 static int chiral_magnet_all_hold(const chiral_magnet_solver *s, double *const x[chiral_magnet_DIM])
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!chiral_magnet_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!chiral_magnet_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *const from[chiral_magnet_DIM],
     const chiral_magnet_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         memcpy(to[k] - chiral_magnet_LEAD, from[k] - chiral_magnet_LEAD, block);
 }
@@ -770,9 +754,8 @@ static void chiral_magnet_take(const chiral_magnet_solver *s, double *const fiel
     double *x)
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void chiral_magnet_state(const chiral_magnet_solver *s, double *x) { chiral_magnet_take(s, s->x, x); }
@@ -800,18 +783,15 @@ double chiral_magnet_hamiltonian(const chiral_magnet_solver *s)
 {
     double density[chiral_magnet_BUFFER], sum = 0.0, rest = 0.0;
     chiral_magnet_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        chiral_magnet_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += chiral_magnet_BUFFER) {
-            const ptrdiff_t to = s->length - from > chiral_magnet_BUFFER ? from + chiral_magnet_BUFFER
-                : s->length;
-            chiral_magnet_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    chiral_magnet_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += chiral_magnet_BUFFER) {
+        const ptrdiff_t to = s->length - from > chiral_magnet_BUFFER ? from + chiral_magnet_BUFFER
+            : s->length;
+        chiral_magnet_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -824,10 +804,8 @@ typedef void chiral_magnet_kernel(const chiral_magnet_params *, const chiral_mag
 static void chiral_magnet_fill(const chiral_magnet_solver *s, chiral_magnet_kernel *kernel, double *out)
 {
     chiral_magnet_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        chiral_magnet_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    chiral_magnet_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void chiral_magnet_density(const chiral_magnet_solver *s, double *out)

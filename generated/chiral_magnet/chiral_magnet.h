@@ -2,7 +2,7 @@
  * chiral_magnet.h: the declarations; chiral_magnet.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2940718a6660e850324849651d8aba6048698f201f7991e0e9104206bcc6ab6e
+ * body-sha256: 3a4ec524c0929a0ea81474de12e07d3a791f2379672f0ad933be8ac94e0bc611
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -47,7 +47,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[chiral_magnet_ARRAYS];
-    ptrdiff_t *lines;                         /* of each row, where it is and where those beside it are */
     double *gathered[chiral_magnet_GATHERED]; /* sums over other sites, for each site */
     /* of each site the first of its bonds that begin there, then of those that end there */
     int *bonds, *middle;

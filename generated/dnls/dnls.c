@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3692a147178d3c5f5de14dbee4fcddd0a1046c10fe17a941d166842182082491
+ * body-sha256: 449e276b2c8c786f60bb9a3175a28d13d819b349816ca91a4005b46bf43da65f
  */
 #include "dnls.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const dnls_params dnls_default_params = { 1.0 };
 
 enum { dnls_HALO = 1 };           /* sites that are copied beside a row */
-enum { dnls_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { dnls_LEAD = 8 };           /* doubles before the first site of a row */
+enum { dnls_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
 enum { dnls_ROW = 2 };            /* coefficients of one flow */
 enum { dnls_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_FLOWS = 25 };         /* in a step */
@@ -71,9 +72,8 @@ static void dnls_prepare(const dnls_params *params, double h, double coef[restri
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see dnls_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see dnls_solver */
+    ptrdiff_t length; /* sites of a row */
 } dnls_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -98,10 +98,9 @@ static inline void dnls_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
 }
 
 /* What kernels are told of a row. */
-static inline void dnls_locate(const dnls_solver *s, size_t index, dnls_row *row)
+static inline void dnls_locate(const dnls_solver *s, dnls_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * dnls_LINES;
     row->length = s->length;
 }
 
@@ -122,7 +121,7 @@ typedef struct {
 static inline dnls_piece dnls_piece_of(const dnls_solver *s, size_t unit)
 {
     dnls_piece piece;
-    dnls_locate(s, 0, &piece.row);
+    dnls_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * dnls_PIECE;
     piece.to = unit == dnls_units(s) - 1 ? s->length : piece.from + dnls_PIECE;
     return piece;
@@ -259,21 +258,16 @@ static void dnls_vector_field_row(const dnls_params *params, const dnls_row *row
 }
 
 /* ---- The lattice ---- */
-enum {
-    dnls_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    dnls_LEAD = (dnls_HALO + 7) / 8 * 8,
-    dnls_BUFFER = 256,
-    dnls_RESERVED = dnls_ARRAYS + dnls_DIM
-};
+enum { dnls_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { dnls_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < dnls_AXES; ++a) {
+    for (int a = 0; a < dnls_AXES; ++a)
         if (sizes[a] < dnls_least[a] || sizes[a] % dnls_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    }
     size_t wide = dnls_LEAD + ((sizes[dnls_AXES - 1] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -290,18 +284,16 @@ size_t dnls_work_size(const size_t sizes[dnls_AXES])
     const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = dnls_RESERVED * dnls_block(rows, width);
-    return doubles * sizeof(double) + rows * dnls_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void dnls_put(const dnls_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - dnls_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        dnls_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - dnls_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    dnls_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -338,8 +330,6 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
     const size_t block = dnls_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_LEAD + dnls_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < dnls_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_DIM; ++k) s->before[k] = aligned + (dnls_ARRAYS + k) * block;
     for (size_t k = 0; k < dnls_DIM; ++k) dnls_put(s, s->x[k], x0 + k * sites);
@@ -363,14 +353,13 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
 static int dnls_all_hold(const dnls_solver *s, double *const x[dnls_DIM])
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!dnls_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!dnls_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], const dnls_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < dnls_DIM; ++k) memcpy(to[k] - dnls_LEAD, from[k] - dnls_LEAD, block);
 }
 
@@ -446,9 +435,8 @@ dnls_status dnls_step(dnls_solver *s, double h) { return dnls_integrate(s, h, 1)
 static void dnls_take(const dnls_solver *s, double *const fields[dnls_DIM], double *x)
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void dnls_state(const dnls_solver *s, double *x) { dnls_take(s, s->x, x); }
@@ -475,17 +463,14 @@ double dnls_hamiltonian(const dnls_solver *s)
 {
     double density[dnls_BUFFER], sum = 0.0, rest = 0.0;
     dnls_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        dnls_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += dnls_BUFFER) {
-            const ptrdiff_t to = s->length - from > dnls_BUFFER ? from + dnls_BUFFER : s->length;
-            dnls_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    dnls_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += dnls_BUFFER) {
+        const ptrdiff_t to = s->length - from > dnls_BUFFER ? from + dnls_BUFFER : s->length;
+        dnls_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -498,10 +483,8 @@ typedef void dnls_kernel(const dnls_params *, const dnls_row *, ptrdiff_t, ptrdi
 static void dnls_fill(const dnls_solver *s, dnls_kernel *kernel, double *out)
 {
     dnls_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        dnls_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    dnls_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void dnls_density(const dnls_solver *s, double *out) { dnls_fill(s, dnls_energy_row, out); }

@@ -2,7 +2,7 @@
  * dnls.h: the declarations; dnls.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 95ef82d8dfbbd09a6e562b41d64740755a844aeae013408e8e9512cdd30a661b
+ * body-sha256: f31b24d3b58cb000df760cf9aadeb82f023322f8e2c2633128894518f118f4c4
  */
 #ifndef DNLS_H
 #define DNLS_H
@@ -40,7 +40,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[dnls_ARRAYS];
-    ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
     double *before[dnls_DIM]; /* the fields before the steps that are being made */
     int open;                 /* whether these lack the last flow of a step, which between calls x has made */
     size_t far;               /* steps to be made by functions for large arguments, where there are others */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 37a149bc8cf08b0aeeb1e956277ae6976002e6d96ab1d238cf512443904cc926
+ * body-sha256: d85f6df64b4b6c2d0ccdc251445a961cd16da141214cbc8afa0cebb46a2ffbf8
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const dnls_disorder_params dnls_disorder_default_params = { 0.72, NULL };
 
 enum { dnls_disorder_HALO = 1 };           /* sites that are copied beside a row */
-enum { dnls_disorder_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { dnls_disorder_LEAD = 8 };           /* doubles before the first site of a row */
+enum { dnls_disorder_RESERVED = 5 };       /* arrays over the sites in the memory of a solver */
 enum { dnls_disorder_ROW = 2 };            /* coefficients of one flow */
 enum { dnls_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_disorder_FLOWS = 25 };         /* in a step */
@@ -74,9 +75,8 @@ static void dnls_disorder_prepare(const dnls_disorder_params *params, double h, 
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see dnls_disorder_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see dnls_disorder_solver */
+    ptrdiff_t length; /* sites of a row */
 } dnls_disorder_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -102,10 +102,9 @@ static inline void dnls_disorder_ends(double *row, ptrdiff_t length, ptrdiff_t f
 }
 
 /* What kernels are told of a row. */
-static inline void dnls_disorder_locate(const dnls_disorder_solver *s, size_t index, dnls_disorder_row *row)
+static inline void dnls_disorder_locate(const dnls_disorder_solver *s, dnls_disorder_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * dnls_disorder_LINES;
     row->length = s->length;
 }
 
@@ -126,7 +125,7 @@ typedef struct {
 static inline dnls_disorder_piece dnls_disorder_piece_of(const dnls_disorder_solver *s, size_t unit)
 {
     dnls_disorder_piece piece;
-    dnls_disorder_locate(s, 0, &piece.row);
+    dnls_disorder_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * dnls_disorder_PIECE;
     piece.to = unit == dnls_disorder_units(s) - 1 ? s->length : piece.from + dnls_disorder_PIECE;
     return piece;
@@ -274,33 +273,18 @@ static void dnls_disorder_vector_field_row(const dnls_disorder_params *params, c
     }
 }
 
-static void dnls_disorder_put_parameter(const dnls_disorder_solver *s, double *rows, const double *values,
-    double value);
-
-/* The parameters at sites into rows. */
-static void dnls_disorder_put_parameters(dnls_disorder_solver *s, const dnls_disorder_params *params)
-{
-    dnls_disorder_put_parameter(s, s->x[2], params->e, 1.0);
-    s->params.e = NULL;
-}
-
 /* ---- The lattice ---- */
-enum {
-    dnls_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    dnls_disorder_LEAD = (dnls_disorder_HALO + 7) / 8 * 8,
-    dnls_disorder_BUFFER = 256,
-    dnls_disorder_RESERVED = dnls_disorder_ARRAYS + dnls_disorder_DIM
-};
+enum { dnls_disorder_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { dnls_disorder_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < dnls_disorder_AXES; ++a) {
+    for (int a = 0; a < dnls_disorder_AXES; ++a)
         if (sizes[a] < dnls_disorder_least[a] || sizes[a] % dnls_disorder_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = dnls_disorder_LEAD + ((sizes[dnls_disorder_AXES - 1] + 7) / 8 * 8 + dnls_disorder_HALO + 7)
         / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -318,30 +302,31 @@ size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
     const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = dnls_disorder_RESERVED * dnls_disorder_block(rows, width);
-    return doubles * sizeof(double) + rows * dnls_disorder_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void dnls_disorder_put(const dnls_disorder_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - dnls_disorder_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        dnls_disorder_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - dnls_disorder_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    dnls_disorder_ends(row, s->length, 0, s->length);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void dnls_disorder_put_parameter(const dnls_disorder_solver *s, double *rows, const double *values,
     double value)
 {
-    if (values != NULL) {
-        dnls_disorder_put(s, rows, values);
-        return;
-    }
-    for (ptrdiff_t i = -dnls_disorder_LEAD; i < (ptrdiff_t)s->rows * s->width - dnls_disorder_LEAD; ++i)
-        rows[i] = value;
+    for (ptrdiff_t i = -dnls_disorder_LEAD; i < s->width - dnls_disorder_LEAD; ++i) rows[i] = value;
+    if (values != NULL) dnls_disorder_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void dnls_disorder_put_parameters(dnls_disorder_solver *s, const dnls_disorder_params *params)
+{
+    dnls_disorder_put_parameter(s, s->x[2], params->e, 1.0);
+    s->params.e = NULL;
 }
 
 /* ---- The solver ---- */
@@ -381,8 +366,6 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + dnls_disorder_LEAD;
     const size_t block = dnls_disorder_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - dnls_disorder_LEAD + dnls_disorder_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         s->before[k] = aligned + (dnls_disorder_ARRAYS + k) * block;
@@ -408,15 +391,14 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
 static int dnls_disorder_all_hold(const dnls_disorder_solver *s, double *const x[dnls_disorder_DIM])
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!dnls_disorder_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!dnls_disorder_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *const from[dnls_disorder_DIM],
     const dnls_disorder_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         memcpy(to[k] - dnls_disorder_LEAD, from[k] - dnls_disorder_LEAD, block);
 }
@@ -499,9 +481,8 @@ static void dnls_disorder_take(const dnls_disorder_solver *s, double *const fiel
     double *x)
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void dnls_disorder_state(const dnls_disorder_solver *s, double *x) { dnls_disorder_take(s, s->x, x); }
@@ -529,18 +510,15 @@ double dnls_disorder_hamiltonian(const dnls_disorder_solver *s)
 {
     double density[dnls_disorder_BUFFER], sum = 0.0, rest = 0.0;
     dnls_disorder_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        dnls_disorder_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += dnls_disorder_BUFFER) {
-            const ptrdiff_t to = s->length - from > dnls_disorder_BUFFER ? from + dnls_disorder_BUFFER
-                : s->length;
-            dnls_disorder_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    dnls_disorder_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += dnls_disorder_BUFFER) {
+        const ptrdiff_t to = s->length - from > dnls_disorder_BUFFER ? from + dnls_disorder_BUFFER
+            : s->length;
+        dnls_disorder_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -553,10 +531,8 @@ typedef void dnls_disorder_kernel(const dnls_disorder_params *, const dnls_disor
 static void dnls_disorder_fill(const dnls_disorder_solver *s, dnls_disorder_kernel *kernel, double *out)
 {
     dnls_disorder_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        dnls_disorder_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    dnls_disorder_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void dnls_disorder_density(const dnls_disorder_solver *s, double *out)

@@ -2,7 +2,7 @@
  * dnls_disorder.h: the declarations; dnls_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 459b1c7d6bf916878b678998f08e6d18ad2b98bd8fc300253b585b7de7d8852d
+ * body-sha256: 5f3ac6211757dc7f5d6e8c80128a36eb68268d38bbe5a8a62a8d094c043d87bb
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
@@ -41,7 +41,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[dnls_disorder_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[dnls_disorder_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

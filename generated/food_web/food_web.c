@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9766de5f6c7a40ba0af404b0b903be0ba5a1bdec223837d797c71a32ac3cc7d4
+ * body-sha256: 5e0a6d166732894b186d25e4047552a98d361cd0a62bf3d2c095a1b704bce2d0
  */
 #include "food_web.h"
 #include <float.h>
@@ -29,7 +29,8 @@
 const food_web_params food_web_default_params = { NULL, NULL };
 
 enum { food_web_HALO = 0 }; /* sites that are copied beside a row */
-enum { food_web_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { food_web_LEAD = 0 }; /* doubles before the first site of a row */
+enum { food_web_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
 enum { food_web_ROW = 1 }; /* coefficients of one flow */
 enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { food_web_FLOWS = 25 }; /* in a step */
@@ -81,7 +82,6 @@ static void food_web_prepare(const food_web_params *params, double h, double coe
 /* Where one row is. */
 typedef struct {
     double *const *x;        /* see food_web_solver */
-    const ptrdiff_t *at;     /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;        /* sites of a row */
     double *const *gathered; /* see food_web_solver */
     const int *bonds, *middle, *other;
@@ -102,10 +102,9 @@ typedef struct {
 #endif
 
 /* What kernels are told of a row. */
-static inline void food_web_locate(const food_web_solver *s, size_t index, food_web_row *row)
+static inline void food_web_locate(const food_web_solver *s, food_web_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * food_web_LINES;
     row->length = s->length;
     row->gathered = s->gathered;
     row->bonds = s->bonds;
@@ -133,7 +132,7 @@ typedef struct {
 static inline food_web_piece food_web_piece_of(const food_web_solver *s, size_t unit)
 {
     food_web_piece piece;
-    food_web_locate(s, 0, &piece.row);
+    food_web_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * food_web_PIECE;
     piece.to = unit == food_web_units(s) - 1 ? s->length : piece.from + food_web_PIECE;
     return piece;
@@ -264,25 +263,6 @@ static void food_web_vector_field_row(const food_web_params *params, const food_
     }
 }
 
-static void food_web_put_parameter(const food_web_solver *s, double *rows, const double *values,
-    double value);
-
-/* The parameters at sites into rows. */
-static void food_web_put_parameters(food_web_solver *s, const food_web_params *params)
-{
-    food_web_put_parameter(s, s->x[1], params->k, 1.0);
-    s->params.k = NULL;
-}
-
-static void food_web_put_at_bond(const food_web_solver *s, double *at, const double *values, double value);
-
-/* The parameters at bonds, in the order of the bonds of each site. */
-static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *params)
-{
-    food_web_put_at_bond(s, s->at_bonds[0], params->A, 1.0);
-    s->params.A = NULL;
-}
-
 /* ---- Bonds ---- */
 /* Whether sites and bonds can be numbered. */
 static int food_web_few(size_t sites, size_t bonds)
@@ -369,23 +349,17 @@ static void food_web_put_at_bond(const food_web_solver *s, double *at, const dou
 }
 
 /* ---- The lattice ---- */
-enum {
-    food_web_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    food_web_LEAD = (food_web_HALO + 7) / 8 * 8,
-    food_web_BUFFER = 256,
-    food_web_RESERVED = food_web_ARRAYS + food_web_DIM
-        + food_web_GATHERED
-};
+enum { food_web_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < food_web_AXES; ++a) {
+    for (int a = 0; a < food_web_AXES; ++a)
         if (sizes[a] < food_web_least[a] || sizes[a] % food_web_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-    }
     size_t wide = food_web_LEAD + ((sizes[food_web_AXES - 1] + 7) / 8 * 8 + food_web_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -402,28 +376,36 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
     const size_t rows = sizes == NULL ? 0 : food_web_shape(sizes, &width);
     if (rows == 0 || !food_web_few(sizes[0], bonds)) return 0;
     size_t doubles = food_web_RESERVED * food_web_block(rows, width);
-    return doubles * sizeof(double) + food_web_graph_size(sizes[0], bonds) + 128;
+    return doubles * sizeof(double) + food_web_graph_size(sizes[0], bonds) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void food_web_put(const food_web_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - food_web_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-    }
+    double *row = rows;
+    memset(row - food_web_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void food_web_put_parameter(const food_web_solver *s, double *rows, const double *values, double value)
 {
-    if (values != NULL) {
-        food_web_put(s, rows, values);
-        return;
-    }
-    for (ptrdiff_t i = -food_web_LEAD; i < (ptrdiff_t)s->rows * s->width - food_web_LEAD; ++i)
-        rows[i] = value;
+    for (ptrdiff_t i = -food_web_LEAD; i < s->width - food_web_LEAD; ++i) rows[i] = value;
+    if (values != NULL) food_web_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void food_web_put_parameters(food_web_solver *s, const food_web_params *params)
+{
+    food_web_put_parameter(s, s->x[1], params->k, 1.0);
+    s->params.k = NULL;
+}
+
+/* The parameters at bonds, in the order of the bonds of each site. */
+static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *params)
+{
+    food_web_put_at_bond(s, s->at_bonds[0], params->A, 1.0);
+    s->params.A = NULL;
 }
 
 /* ---- The solver ---- */
@@ -464,16 +446,13 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + food_web_LEAD;
     const size_t block = food_web_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - food_web_LEAD + food_web_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < food_web_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < food_web_DIM; ++k) s->before[k] = aligned + (food_web_ARRAYS + k) * block;
     for (size_t k = 0; k < food_web_GATHERED; ++k)
         s->gathered[k] = aligned + (food_web_ARRAYS + food_web_DIM + k) * block;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
     food_web_put_parameters(s, &own);
-    /* there is one line, and doubles are aligned */
-    food_web_connect(s, bonds, (double *)(void *)(s->lines + 8));
+    food_web_connect(s, bonds, aligned - food_web_LEAD + food_web_RESERVED * block);
     food_web_put_at_bonds(s, &own);
     return food_web_OK;
 }
@@ -495,15 +474,14 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
 static int food_web_all_hold(const food_web_solver *s, double *const x[food_web_DIM])
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!food_web_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!food_web_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void food_web_copy(double *const to[food_web_DIM], double *const from[food_web_DIM],
     const food_web_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k] - food_web_LEAD, from[k] - food_web_LEAD, block);
 }
 
@@ -590,9 +568,8 @@ food_web_status food_web_step(food_web_solver *s, double h) { return food_web_in
 static void food_web_take(const food_web_solver *s, double *const fields[food_web_DIM], double *x)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void food_web_state(const food_web_solver *s, double *x) { food_web_take(s, s->x, x); }
@@ -619,17 +596,14 @@ double food_web_hamiltonian(const food_web_solver *s)
 {
     double density[food_web_BUFFER], sum = 0.0, rest = 0.0;
     food_web_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        food_web_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += food_web_BUFFER) {
-            const ptrdiff_t to = s->length - from > food_web_BUFFER ? from + food_web_BUFFER : s->length;
-            food_web_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    food_web_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += food_web_BUFFER) {
+        const ptrdiff_t to = s->length - from > food_web_BUFFER ? from + food_web_BUFFER : s->length;
+        food_web_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -642,10 +616,8 @@ typedef void food_web_kernel(const food_web_params *, const food_web_row *, ptrd
 static void food_web_fill(const food_web_solver *s, food_web_kernel *kernel, double *out)
 {
     food_web_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        food_web_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    food_web_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }

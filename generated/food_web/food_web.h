@@ -2,7 +2,7 @@
  * food_web.h: the declarations; food_web.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 933dfdbb4e1fefbcf0bdddd2b1972e1bc7123b6eec35ada2b96a9c116b5198bb
+ * body-sha256: 8d8f6064ccdbb71017ee6c2acaf238094fd24396762bac1ac4dd38c2bdadeb6b
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -43,7 +43,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[food_web_ARRAYS];
-    ptrdiff_t *lines;                    /* of each row, where it is and where those beside it are */
     double *gathered[food_web_GATHERED]; /* sums over other sites, for each site */
     /* of each site the first of its bonds that begin there, then of those that end there */
     int *bonds, *middle;

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 3241675e77cc7e192ec1080f58e8e63d224f9abfe21800f563f448a0556f2c56
+ * body-sha256: 4eb2f705e08750f19d550161c786516822cbf6e19ae3be45a0e9d02f5eb5bca7
  */
 #include "fput.h"
 #include <float.h>
@@ -29,7 +29,8 @@
 const fput_params fput_default_params = { 0.25, 0.1 };
 
 enum { fput_HALO = 1 }; /* sites that are copied beside a row */
-enum { fput_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { fput_LEAD = 8 }; /* doubles before the first site of a row */
+enum { fput_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
 enum { fput_ROW = 4 }; /* coefficients of one flow */
 enum { fput_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { fput_FLOWS = 13 }; /* in a step */
@@ -75,9 +76,8 @@ static void fput_prepare(const fput_params *params, double h, double coef[restri
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see fput_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see fput_solver */
+    ptrdiff_t length; /* sites of a row */
 } fput_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -102,10 +102,9 @@ static inline void fput_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
 }
 
 /* What kernels are told of a row. */
-static inline void fput_locate(const fput_solver *s, size_t index, fput_row *row)
+static inline void fput_locate(const fput_solver *s, fput_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * fput_LINES;
     row->length = s->length;
 }
 
@@ -126,7 +125,7 @@ typedef struct {
 static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
 {
     fput_piece piece;
-    fput_locate(s, 0, &piece.row);
+    fput_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * fput_PIECE;
     piece.to = unit == fput_units(s) - 1 ? s->length : piece.from + fput_PIECE;
     if (piece.from < s->from) piece.from = s->from;
@@ -258,21 +257,16 @@ static void fput_wait(void)
 #endif
 }
 
-enum {
-    fput_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    fput_LEAD = (fput_HALO + 7) / 8 * 8,
-    fput_BUFFER = 256,
-    fput_RESERVED = fput_ARRAYS + fput_DIM
-};
+enum { fput_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { fput_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / fput_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < fput_AXES; ++a) {
+    for (int a = 0; a < fput_AXES; ++a)
         if (sizes[a] < fput_least[a] || sizes[a] % fput_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    }
     size_t wide = fput_LEAD + ((sizes[fput_AXES - 1] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -294,18 +288,16 @@ size_t fput_work_size(const size_t sizes[fput_AXES])
     const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = fput_RESERVED * fput_block(rows, width);
-    return doubles * sizeof(double) + rows * fput_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void fput_put(const fput_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - fput_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        fput_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - fput_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    fput_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -343,8 +335,6 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
     const size_t block = fput_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - fput_LEAD + fput_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < fput_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < fput_DIM; ++k) s->before[k] = aligned + (fput_ARRAYS + k) * block;
     for (size_t k = 0; k < fput_DIM; ++k) fput_put(s, s->x[k], x0 + k * sites);
@@ -368,14 +358,13 @@ static fput_status fput_set_step(fput_solver *s, double h)
 static int fput_all_hold(const fput_solver *s, double *const x[fput_DIM])
 {
     for (size_t k = 0; k < fput_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!fput_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!fput_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], const fput_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < fput_DIM; ++k) memcpy(to[k] - fput_LEAD, from[k] - fput_LEAD, block);
 }
 
@@ -428,8 +417,7 @@ static size_t fput_slices(const fput_solver *s, size_t *units)
 static size_t fput_depth(const fput_solver *s)
 {
     size_t units;
-    const size_t slices = fput_slices(s, &units),
-        bytes = s->rows * (size_t)s->width * fput_ARRAYS * sizeof(double);
+    const size_t slices = fput_slices(s, &units), bytes = (size_t)s->width * fput_ARRAYS * sizeof(double);
     const size_t held = fput_CACHE / (bytes / slices) / fput_SPAN,
         room = slices / fput_THREADS / (2 * fput_SPAN);
     const size_t depth = held < room ? held : room;
@@ -532,9 +520,8 @@ fput_status fput_step(fput_solver *s, double h) { return fput_integrate(s, h, 1)
 static void fput_take(const fput_solver *s, double *const fields[fput_DIM], double *x)
 {
     for (size_t k = 0; k < fput_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void fput_state(const fput_solver *s, double *x) { fput_take(s, s->x, x); }
@@ -583,17 +570,14 @@ double fput_hamiltonian(const fput_solver *s)
 {
     double density[fput_BUFFER], sum = 0.0, rest = 0.0;
     fput_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        fput_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += fput_BUFFER) {
-            const ptrdiff_t to = s->length - from > fput_BUFFER ? from + fput_BUFFER : s->length;
-            fput_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    fput_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += fput_BUFFER) {
+        const ptrdiff_t to = s->length - from > fput_BUFFER ? from + fput_BUFFER : s->length;
+        fput_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -606,10 +590,8 @@ typedef void fput_kernel(const fput_params *, const fput_row *, ptrdiff_t, ptrdi
 static void fput_fill(const fput_solver *s, fput_kernel *kernel, double *out)
 {
     fput_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        fput_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    fput_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }
@@ -663,8 +645,7 @@ fput_status fput_planes(const fput_solver *s, size_t field, size_t from, size_t 
     for (size_t plane = from; plane < to; ++plane) {
         size_t rows, length;
         const double *at = fput_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length)
-            memcpy(x, at + (ptrdiff_t)r * s->width, length * sizeof *x);
+        for (size_t r = 0; r < rows; ++r, x += length) memcpy(x, at, length * sizeof *x);
     }
     return fput_OK;
 }
@@ -677,7 +658,7 @@ fput_status fput_put_planes(fput_solver *s, size_t field, size_t from, size_t to
         size_t rows, length;
         double *at = fput_plane(s, field, plane, &rows, &length);
         for (size_t r = 0; r < rows; ++r, x += length) {
-            memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
+            memcpy(at, x, length * sizeof *x);
         }
     }
     fput_ends(s->x[field], s->length, 0, s->length);

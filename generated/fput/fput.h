@@ -2,7 +2,7 @@
  * fput.h: the declarations; fput.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cfae9b737444f94171415097d832d928ed771e4b509162d297cd193033e03bc8
+ * body-sha256: 6f63c7ddaf989298f24a33e63591fcdb0055322c1a0e20df348449220e813fb1
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -41,7 +41,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[fput_ARRAYS];
-    ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
     double *before[fput_DIM]; /* the fields before the steps that are being made */
     int open;                 /* whether these lack the last flow of a step, which between calls x has made */
     size_t far;               /* steps to be made by functions for large arguments, where there are others */

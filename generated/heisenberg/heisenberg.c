@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: ff249ea0a5b6f9f73ac54c092077f809e0b8bbe1c45515df703c0acd05547bac
+ * body-sha256: 36fb88bde1d76aa279ae411cfe483ecd653094cf06118551fb8f0f11c93cb930
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -29,6 +29,8 @@
 const heisenberg_params heisenberg_default_params = { 1.0, NULL };
 
 enum { heisenberg_HALO = 1 }; /* sites that are copied beside a row */
+enum { heisenberg_LEAD = 8 }; /* doubles before the first site of a row */
+enum { heisenberg_RESERVED = 7 }; /* arrays over the sites in the memory of a solver */
 enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and those beside it */
 enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
@@ -496,16 +498,6 @@ static void heisenberg_vector_field_row(const heisenberg_params *params, const h
     }
 }
 
-static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, const double *values,
-    double value);
-
-/* The parameters at sites into rows. */
-static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_params *params)
-{
-    heisenberg_put_parameter(s, s->x[3], params->B, 0.2);
-    s->params.B = NULL;
-}
-
 /* ---- The lattice ---- */
 #ifdef _OPENMP
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
@@ -539,26 +531,21 @@ static void heisenberg_wait(void)
 #endif
 }
 
-enum {
-    heisenberg_STRETCH = 32,   /* steps before the state is looked at: what is not finite stays so */
-    heisenberg_FAR_STEPS = 64, /* steps by functions for large arguments, after one that needed them */
-    heisenberg_LEAD = (heisenberg_HALO + 7) / 8 * 8,
-    heisenberg_BUFFER = 256,
-    heisenberg_RESERVED = heisenberg_ARRAYS + heisenberg_DIM
-};
+enum { heisenberg_STRETCH = 32 };   /* steps before the state is looked at: what is not finite stays so */
+enum { heisenberg_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
+enum { heisenberg_BUFFER = 256 };   /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < heisenberg_AXES; ++a) {
+    for (int a = 0; a < heisenberg_AXES; ++a)
         if (sizes[a] < heisenberg_least[a] || sizes[a] % heisenberg_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-        if (a < heisenberg_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
+    for (int a = 0; a < heisenberg_AXES - 1; ++a) {
+        if (rows > most / sizes[a]) return 0;
+        rows *= sizes[a];
     }
     size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -599,12 +586,16 @@ static void heisenberg_put(const heisenberg_solver *s, double *rows, const doubl
 static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, const double *values,
     double value)
 {
-    if (values != NULL) {
-        heisenberg_put(s, rows, values);
-        return;
-    }
     for (ptrdiff_t i = -heisenberg_LEAD; i < (ptrdiff_t)s->rows * s->width - heisenberg_LEAD; ++i)
         rows[i] = value;
+    if (values != NULL) heisenberg_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_params *params)
+{
+    heisenberg_put_parameter(s, s->x[3], params->B, 0.2);
+    s->params.B = NULL;
 }
 
 /* Where a row is, and those beside it. */

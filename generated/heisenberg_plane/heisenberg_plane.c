@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: ce6ecaa58a5662c4c596b2fc38838cc42923379a7477ec2cb005fb1e60af17de
+ * body-sha256: 8eb3a923e12c2dcf07b05d61f28f36c0cdfdacca44fdde4a4f76b7d7a2e7ea55
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -28,6 +28,8 @@
 const heisenberg_plane_params heisenberg_plane_default_params = { 1.0, 0.9 };
 
 enum { heisenberg_plane_HALO = 1 };           /* sites that are copied beside a row */
+enum { heisenberg_plane_LEAD = 8 };           /* doubles before the first site of a row */
+enum { heisenberg_plane_RESERVED = 6 };       /* arrays over the sites in the memory of a solver */
 enum { heisenberg_plane_LINES = 3 };          /* rows that kernels read: the row itself and those beside it */
 enum { heisenberg_plane_ROW = 2 };            /* coefficients of one flow */
 enum { heisenberg_plane_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
@@ -341,25 +343,20 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
 }
 
 /* ---- The lattice ---- */
-enum {
-    heisenberg_plane_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    heisenberg_plane_LEAD = (heisenberg_plane_HALO + 7) / 8 * 8,
-    heisenberg_plane_BUFFER = 256,
-    heisenberg_plane_RESERVED = heisenberg_plane_ARRAYS + heisenberg_plane_DIM
-};
+enum { heisenberg_plane_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { heisenberg_plane_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_plane_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < heisenberg_plane_AXES; ++a) {
+    for (int a = 0; a < heisenberg_plane_AXES; ++a)
         if (sizes[a] < heisenberg_plane_least[a] || sizes[a] % heisenberg_plane_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-        if (a < heisenberg_plane_AXES - 1) {
-            if (rows > most / sizes[a]) return 0;
-            rows *= sizes[a];
-        }
+    for (int a = 0; a < heisenberg_plane_AXES - 1; ++a) {
+        if (rows > most / sizes[a]) return 0;
+        rows *= sizes[a];
     }
     size_t wide = heisenberg_plane_LEAD + ((sizes[heisenberg_plane_AXES - 1] + 7) / 8 * 8
         + heisenberg_plane_HALO + 7) / 8 * 8;

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 45bd5c5d29c08ce0fc9cf0c97cf8dc903466e55c0354bde19b6c0216e1bdb6e3
+ * body-sha256: c4e702ccfbc98c7b51b647fb6de72d1f71e2516de5a283ae8994c2981c37cc58
  */
 #include "kdv.h"
 #include <float.h>
@@ -29,9 +29,12 @@
 const kdv_params kdv_default_params = { 0.022, 0.015625 };
 
 enum { kdv_HALO = 2 };          /* sites that are copied beside a row */
-enum { kdv_LINES = 1 };         /* rows that kernels read: the row itself and those beside it */
+enum { kdv_LEAD = 8 };          /* doubles before the first site of a row */
+enum { kdv_RESERVED = 9 };      /* arrays over the sites in the memory of a solver */
 enum { kdv_ROW = 7 };           /* coefficients of one flow */
 enum { kdv_ROWS_OF_FLOWS = 1 }; /* rows of coefficients */
+enum { kdv_SIDES = 2 };         /* y before and after a sweep */
+enum { kdv_IMPLICIT = 7 };      /* of these for y, its guesses and its variations */
 enum { kdv_MOST_SWEEPS = 200 }; /* that a stage may take */
 enum { kdv_REACH = 2 };         /* sites that y at a site depends on, to each side */
 enum { kdv_BAND = 2 };          /* diagonals beside that of the matrix of Newton's method */
@@ -69,9 +72,8 @@ static void kdv_prepare(const kdv_params *params, double h, double coef[restrict
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see kdv_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see kdv_solver */
+    ptrdiff_t length; /* sites of a row */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
     double *const *varied; /* a variation of x */
@@ -99,10 +101,9 @@ static inline void kdv_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
 }
 
 /* What kernels are told of a row. */
-static inline void kdv_locate(const kdv_solver *s, size_t index, kdv_row *row)
+static inline void kdv_locate(const kdv_solver *s, kdv_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * kdv_LINES;
     row->length = s->length;
     row->start = row->out = s->x;
 }
@@ -124,7 +125,7 @@ typedef struct {
 static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
 {
     kdv_piece piece;
-    kdv_locate(s, 0, &piece.row);
+    kdv_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * kdv_PIECE;
     piece.to = unit == kdv_units(s) - 1 ? s->length : piece.from + kdv_PIECE;
     return piece;
@@ -312,27 +313,15 @@ static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, p
 #define kdv_ONE_BY_ONE
 #endif
 
-enum {
-    kdv_SIDES = 2, /* y before and after a sweep */
-    kdv_LEAD = (kdv_HALO + 7) / 8 * 8,
-    kdv_BUFFER = 256,
-    kdv_IMPLICIT = (kdv_SIDES /* arrays for y, its guesses and its variations */
-        + kdv_DIFFERENCES
-        + 1
-        ) * kdv_DIM
-        ,
-    kdv_RESERVED = kdv_ARRAYS + kdv_DIM
-        + kdv_IMPLICIT
-};
+enum { kdv_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / (kdv_RESERVED + 8 * kdv_BAND * kdv_DIM);
     size_t rows = 1;
-    for (int a = 0; a < kdv_AXES; ++a) {
+    for (int a = 0; a < kdv_AXES; ++a)
         if (sizes[a] < kdv_least[a] || sizes[a] % kdv_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    }
     size_t wide = kdv_LEAD + ((sizes[kdv_AXES - 1] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -356,18 +345,16 @@ size_t kdv_work_size(const size_t sizes[kdv_AXES])
     size_t doubles = kdv_RESERVED * kdv_block(rows, width);
     kdv_matrix matrix;
     doubles += kdv_matrix_of(sizes[0], NULL, &matrix);
-    return doubles * sizeof(double) + rows * kdv_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void kdv_put(const kdv_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - kdv_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        kdv_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - kdv_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    kdv_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -415,9 +402,7 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + kdv_LEAD;
     const size_t block = kdv_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - kdv_LEAD + kdv_RESERVED * block);
-    s->lines[0] = 0;
-    s->matrix = (double *)(void *)(s->lines + kdv_LINES);
+    s->matrix = aligned - kdv_LEAD + kdv_RESERVED * block;
     for (size_t k = 0; k < kdv_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < kdv_DIM; ++k) s->before[k] = aligned + (kdv_ARRAYS + k) * block;
     kdv_place_middle(s, aligned + (kdv_RESERVED - kdv_IMPLICIT) * block, block);
@@ -441,14 +426,13 @@ static kdv_status kdv_set_step(kdv_solver *s, double h)
 static int kdv_all_hold(const kdv_solver *s, double *const x[kdv_DIM])
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!kdv_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!kdv_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void kdv_copy(double *const to[kdv_DIM], double *const from[kdv_DIM], const kdv_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < kdv_DIM; ++k) memcpy(to[k] - kdv_LEAD, from[k] - kdv_LEAD, block);
 }
 
@@ -467,8 +451,7 @@ static void kdv_measure(const kdv_solver *s, int now, size_t unit, double *chang
     const kdv_piece at = kdv_piece_of(s, unit);
     const ptrdiff_t whole = at.to - (at.to - at.from) % kdv_WIDTH;
     for (int k = 0; k < kdv_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after =
-            s->y[1 - now][k] + at.row.at[0];
+        const double *restrict before = s->y[now][k], *restrict after = s->y[1 - now][k];
         double changes[kdv_WIDTH] = { 0.0 }, sizes[kdv_WIDTH] = { 0.0 };
         for (ptrdiff_t i = at.from; i < whole; i += kdv_WIDTH)
             for (int l = 0; l < kdv_WIDTH; ++l) {
@@ -511,41 +494,13 @@ static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
     return moved;
 }
 
-#define kdv_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
-#define kdv_ROUNDING 0x1p-40 /* changes below this may be rounding */
-
-#define kdv_SLOW 0.6        /* changes that shrink by less are left to Newton's method, ... */
-enum { kdv_PATIENCE = 10 }; /* ... after so many sweeps */
-
-/* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in
-   s->y[*now]. */
-static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, int *now)
-{
-    double before = 0.0;
-    for (int sweep = 0; sweep < kdv_MOST_SWEEPS; ++sweep) {
-        const double change = kdv_relaxed(s, coef, far, *now), shrunk = before - change;
-        ++s->sweeps;
-        *now = 1 - *now;
-        if (!isfinite(change)) return sweep == 0 ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
-        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
-        if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING && sweep > 0))
-            {
-            if (kdv_all_hold(s, s->y[*now])) return kdv_OK;
-            return sweep == 0 ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
-        }
-        if (sweep >= kdv_PATIENCE && change > kdv_SLOW * before && change > 0x1p-30) break;
-        before = change;
-    }
-    return kdv_NO_CONVERGENCE;
-}
-
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
 static void kdv_predict(const kdv_solver *s, double *const *x)
 {
     kdv_EACH_PIECE
-    for (size_t r = 0; r < s->rows; ++r)
+    for (size_t row = 0; row < s->rows; ++row)
         for (int k = 0; k < kdv_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
+            const ptrdiff_t first = (ptrdiff_t)row * s->width - kdv_HALO,
                 end = first + s->length + 2 * kdv_HALO;
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
             for (int d = 0; d < s->guess.order; ++d) {
@@ -562,10 +517,10 @@ static void kdv_remember(kdv_solver *s, double *const *from, int now)
     kdv_guess *guess = &s->guess;
     double size[kdv_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
     kdv_EACH_PIECE
-    for (size_t r = 0; r < s->rows; ++r) {
+    for (size_t row = 0; row < s->rows; ++row) {
         double own[kdv_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < kdv_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)r * s->width - kdv_HALO,
+            const ptrdiff_t first = (ptrdiff_t)row * s->width - kdv_HALO,
                 end = first + s->length + 2 * kdv_HALO;
             const double *restrict y = s->y[now][k], *restrict x = from[k];
             for (ptrdiff_t i = first; i < end; ++i) {
@@ -750,17 +705,15 @@ static void kdv_eliminate(kdv_solver *s, int now)
 
 /* ---- Newton's method where sweeps fail ---- */
 #define kdv_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
-enum { kdv_MOST_ITERATIONS = 200 };
 
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double kdv_distance(const kdv_solver *s, int side, double added)
 {
     double sum = 0.0;
-    for (int k = 0; k < kdv_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r) {
-            const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
-            for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
-        }
+    for (int k = 0; k < kdv_DIM; ++k) {
+        const double *y = s->y[side][k], *x = s->x[k];
+        for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
+    }
     return sum;
 }
 
@@ -772,7 +725,6 @@ static double kdv_corrected(kdv_solver *s, const double *coef, int now)
     s->factored = coef;
     if (!isfinite(kdv_relaxed(s, coef, 1, now))) return HUGE_VAL;
     kdv_eliminate(s, now);
-    ++s->sweeps;
     return kdv_relaxed(s, NULL, 1, now);
 }
 
@@ -784,18 +736,29 @@ static double kdv_range(kdv_solver *s, const double *coef)
     return kdv_PLAUSIBLE * kdv_distance(s, 1, 1.0);
 }
 
-/* y in the middle of a stage, from the guess in s->y[0]; it is in s->y[*now]. */
-static kdv_status kdv_newton(kdv_solver *s, const double *coef, double range, int *now)
+#define kdv_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
+#define kdv_ROUNDING 0x1p-40 /* changes below this may be rounding */
+#define kdv_SLOW 0.6         /* changes that shrink by less are left to Newton's method, ... */
+enum { kdv_PATIENCE = 10 };  /* ... after so many sweeps */
+
+/* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where
+   these have failed, by corrections, and then no farther from x than in that range. It is in s->y[*now]. */
+static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, double range, int *now)
 {
     double before = 0.0;
-    for (int iteration = 0; iteration < kdv_MOST_ITERATIONS; ++iteration) {
-        const double change = kdv_corrected(s, coef, *now), shrunk = before - change;
+    for (int count = 0; count < kdv_MOST_SWEEPS; ++count) {
+        const double change = s->stiff ? kdv_corrected(s, coef, *now) : kdv_relaxed(s, coef, far, *now);
+        const double shrunk = before - change;
+        const kdv_status failed = count == 0 && !s->stiff ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
+        ++s->sweeps;
         *now = 1 - *now;
-        if (!isfinite(change)) return kdv_NO_CONVERGENCE;
-        if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING
-            && iteration > 0))
-            return kdv_distance(s, *now, 0.0) <= range ? kdv_OK : kdv_NO_CONVERGENCE;
-        if (iteration > 0 && change > 0.25 * before && change > kdv_ROUNDING) s->factored = NULL;
+        if (!isfinite(change)) return failed;
+        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
+        if (change * change <= shrunk * kdv_SETTLED || (shrunk <= 0.0 && change <= kdv_ROUNDING && count > 0))
+            return (s->stiff ? kdv_distance(s, *now, 0.0) <= range : kdv_all_hold(s, s->y[*now])) ? kdv_OK
+                : failed;
+        if (!s->stiff && count >= kdv_PATIENCE && change > kdv_SLOW * before && change > 0x1p-30) break;
+        if (count > 0 && change > 0.25 * before && change > kdv_ROUNDING) s->factored = NULL;
         before = change;
     }
     return kdv_NO_CONVERGENCE;
@@ -808,13 +771,13 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
     const double *coef = s->coef;
     int now = 0;
     kdv_predict(s, s->x);
-    kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, &now);
+    kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, 0.0, &now);
     if (status != kdv_OK && (far || status != kdv_NOT_FINITE)) {
         s->stiff = 1;
         now = 0;
         const double range = kdv_range(s, coef);
         kdv_predict(s, s->x);
-        status = kdv_newton(s, coef, range, &now);
+        status = kdv_middle(s, coef, far, range, &now);
     }
     if (status != kdv_OK) return status;
     kdv_remember(s, s->x, now);
@@ -854,9 +817,8 @@ kdv_status kdv_step(kdv_solver *s, double h) { return kdv_integrate(s, h, 1); }
 static void kdv_take(const kdv_solver *s, double *const fields[kdv_DIM], double *x)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void kdv_state(const kdv_solver *s, double *x) { kdv_take(s, s->x, x); }
@@ -887,17 +849,14 @@ double kdv_hamiltonian(const kdv_solver *s)
 {
     double density[kdv_BUFFER], sum = 0.0, rest = 0.0;
     kdv_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        kdv_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += kdv_BUFFER) {
-            const ptrdiff_t to = s->length - from > kdv_BUFFER ? from + kdv_BUFFER : s->length;
-            kdv_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    kdv_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += kdv_BUFFER) {
+        const ptrdiff_t to = s->length - from > kdv_BUFFER ? from + kdv_BUFFER : s->length;
+        kdv_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -909,10 +868,8 @@ typedef void kdv_kernel(const kdv_params *, const kdv_row *, ptrdiff_t, ptrdiff_
 static void kdv_fill(const kdv_solver *s, kdv_kernel *kernel, double *out)
 {
     kdv_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        kdv_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    kdv_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void kdv_density(const kdv_solver *s, double *out) { kdv_fill(s, kdv_energy_row, out); }

@@ -2,7 +2,7 @@
  * kdv.h: the declarations; kdv.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e8486dd2c2188cf80a695ede0365de10151d6ae192a1ef7a5e1cffc5c4ce73e1
+ * body-sha256: 0019d3a7def87db7a555da9669b08863499c80e4cbc8677581f95247c4a3ae22
  */
 #ifndef KDV_H
 #define KDV_H
@@ -47,7 +47,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[kdv_ARRAYS];
-    ptrdiff_t *lines;        /* of each row, where it is and where those beside it are */
     double *before[kdv_DIM]; /* the fields before the steps that are being made */
     /* the middle of a stage, before and after a sweep, with the parameters at sites */
     double *y[2][kdv_ARRAYS];

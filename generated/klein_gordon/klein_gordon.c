@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: db1f69c1255b553d532e6bd7dc6584b959963ae666f7083a438c6fb92d025fdd
+ * body-sha256: 2bb3a6bd59c39c10893c610b727c43b0274b87c27e62e921cfbd02505df5cb77
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const klein_gordon_params klein_gordon_default_params = { 0.2 };
 
 enum { klein_gordon_HALO = 1 }; /* sites that are copied beside a row */
-enum { klein_gordon_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { klein_gordon_LEAD = 8 }; /* doubles before the first site of a row */
+enum { klein_gordon_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
 enum { klein_gordon_ROW = 2 }; /* coefficients of one flow */
 enum { klein_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { klein_gordon_FLOWS = 13 }; /* in a step */
@@ -70,9 +71,8 @@ static void klein_gordon_prepare(const klein_gordon_params *params, double h, do
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see klein_gordon_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see klein_gordon_solver */
+    ptrdiff_t length; /* sites of a row */
 } klein_gordon_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -97,10 +97,9 @@ static inline void klein_gordon_ends(double *row, ptrdiff_t length, ptrdiff_t fr
 }
 
 /* What kernels are told of a row. */
-static inline void klein_gordon_locate(const klein_gordon_solver *s, size_t index, klein_gordon_row *row)
+static inline void klein_gordon_locate(const klein_gordon_solver *s, klein_gordon_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * klein_gordon_LINES;
     row->length = s->length;
 }
 
@@ -121,7 +120,7 @@ typedef struct {
 static inline klein_gordon_piece klein_gordon_piece_of(const klein_gordon_solver *s, size_t unit)
 {
     klein_gordon_piece piece;
-    klein_gordon_locate(s, 0, &piece.row);
+    klein_gordon_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * klein_gordon_PIECE;
     piece.to = unit == klein_gordon_units(s) - 1 ? s->length : piece.from + klein_gordon_PIECE;
     return piece;
@@ -210,22 +209,17 @@ static void klein_gordon_vector_field_row(const klein_gordon_params *params, con
 }
 
 /* ---- The lattice ---- */
-enum {
-    klein_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    klein_gordon_LEAD = (klein_gordon_HALO + 7) / 8 * 8,
-    klein_gordon_BUFFER = 256,
-    klein_gordon_RESERVED = klein_gordon_ARRAYS + klein_gordon_DIM
-};
+enum { klein_gordon_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { klein_gordon_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < klein_gordon_AXES; ++a) {
+    for (int a = 0; a < klein_gordon_AXES; ++a)
         if (sizes[a] < klein_gordon_least[a] || sizes[a] % klein_gordon_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = klein_gordon_LEAD + ((sizes[klein_gordon_AXES - 1] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8
         * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -243,18 +237,16 @@ size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
     const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = klein_gordon_RESERVED * klein_gordon_block(rows, width);
-    return doubles * sizeof(double) + rows * klein_gordon_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void klein_gordon_put(const klein_gordon_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - klein_gordon_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        klein_gordon_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - klein_gordon_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    klein_gordon_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -293,8 +285,6 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
     const size_t block = klein_gordon_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - klein_gordon_LEAD + klein_gordon_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < klein_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) s->before[k] = aligned + (klein_gordon_ARRAYS + k) * block;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) klein_gordon_put(s, s->x[k], x0 + k * sites);
@@ -318,15 +308,14 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
 static int klein_gordon_all_hold(const klein_gordon_solver *s, double *const x[klein_gordon_DIM])
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!klein_gordon_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!klein_gordon_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const from[klein_gordon_DIM],
     const klein_gordon_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
         memcpy(to[k] - klein_gordon_LEAD, from[k] - klein_gordon_LEAD, block);
 }
@@ -408,9 +397,8 @@ klein_gordon_status klein_gordon_step(klein_gordon_solver *s, double h)
 static void klein_gordon_take(const klein_gordon_solver *s, double *const fields[klein_gordon_DIM], double *x)
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void klein_gordon_state(const klein_gordon_solver *s, double *x) { klein_gordon_take(s, s->x, x); }
@@ -438,18 +426,14 @@ double klein_gordon_hamiltonian(const klein_gordon_solver *s)
 {
     double density[klein_gordon_BUFFER], sum = 0.0, rest = 0.0;
     klein_gordon_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        klein_gordon_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += klein_gordon_BUFFER) {
-            const ptrdiff_t to = s->length - from > klein_gordon_BUFFER ? from + klein_gordon_BUFFER
-                : s->length;
-            klein_gordon_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    klein_gordon_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += klein_gordon_BUFFER) {
+        const ptrdiff_t to = s->length - from > klein_gordon_BUFFER ? from + klein_gordon_BUFFER : s->length;
+        klein_gordon_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -462,10 +446,8 @@ typedef void klein_gordon_kernel(const klein_gordon_params *, const klein_gordon
 static void klein_gordon_fill(const klein_gordon_solver *s, klein_gordon_kernel *kernel, double *out)
 {
     klein_gordon_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        klein_gordon_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    klein_gordon_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void klein_gordon_density(const klein_gordon_solver *s, double *out)

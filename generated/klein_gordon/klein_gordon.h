@@ -2,7 +2,7 @@
  * klein_gordon.h: the declarations; klein_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 873b98d736d9b895e57ecde3ac1b1266d63e900b00bf438862b0486678537a17
+ * body-sha256: 74314006909806143db7d75d953050c1b5e51118e3e141a1a6a34feb75c3215c
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
@@ -40,7 +40,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[klein_gordon_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[klein_gordon_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

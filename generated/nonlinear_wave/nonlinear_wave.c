@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f81a08bfe9204950b032b78c020f385b7df82acbf35cb243768600a062bb68d6
+ * body-sha256: 59ad70a2d05ad6dffc8a7059112ac6b9f6d04d477ecda1c77f512a28a56dad61
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const nonlinear_wave_params nonlinear_wave_default_params = { 1.0, 0.1 };
 
 enum { nonlinear_wave_HALO = 1 };           /* sites that are copied beside a row */
-enum { nonlinear_wave_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { nonlinear_wave_LEAD = 8 };           /* doubles before the first site of a row */
+enum { nonlinear_wave_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
 enum { nonlinear_wave_ROW = 4 };            /* coefficients of one flow */
 enum { nonlinear_wave_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { nonlinear_wave_FLOWS = 13 };         /* in a step */
@@ -73,9 +74,8 @@ static void nonlinear_wave_prepare(const nonlinear_wave_params *params, double h
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see nonlinear_wave_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see nonlinear_wave_solver */
+    ptrdiff_t length; /* sites of a row */
 } nonlinear_wave_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -100,11 +100,9 @@ static inline void nonlinear_wave_ends(double *row, ptrdiff_t length, ptrdiff_t 
 }
 
 /* What kernels are told of a row. */
-static inline void nonlinear_wave_locate(const nonlinear_wave_solver *s, size_t index,
-    nonlinear_wave_row *row)
+static inline void nonlinear_wave_locate(const nonlinear_wave_solver *s, nonlinear_wave_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * nonlinear_wave_LINES;
     row->length = s->length;
 }
 
@@ -125,7 +123,7 @@ typedef struct {
 static inline nonlinear_wave_piece nonlinear_wave_piece_of(const nonlinear_wave_solver *s, size_t unit)
 {
     nonlinear_wave_piece piece;
-    nonlinear_wave_locate(s, 0, &piece.row);
+    nonlinear_wave_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * nonlinear_wave_PIECE;
     piece.to = unit == nonlinear_wave_units(s) - 1 ? s->length : piece.from + nonlinear_wave_PIECE;
     return piece;
@@ -229,22 +227,17 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
 }
 
 /* ---- The lattice ---- */
-enum {
-    nonlinear_wave_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    nonlinear_wave_LEAD = (nonlinear_wave_HALO + 7) / 8 * 8,
-    nonlinear_wave_BUFFER = 256,
-    nonlinear_wave_RESERVED = nonlinear_wave_ARRAYS + nonlinear_wave_DIM
-};
+enum { nonlinear_wave_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { nonlinear_wave_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < nonlinear_wave_AXES; ++a) {
+    for (int a = 0; a < nonlinear_wave_AXES; ++a)
         if (sizes[a] < nonlinear_wave_least[a] || sizes[a] % nonlinear_wave_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = nonlinear_wave_LEAD + ((sizes[nonlinear_wave_AXES - 1] + 7) / 8 * 8 + nonlinear_wave_HALO
         + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -262,18 +255,16 @@ size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
     const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = nonlinear_wave_RESERVED * nonlinear_wave_block(rows, width);
-    return doubles * sizeof(double) + rows * nonlinear_wave_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void nonlinear_wave_put(const nonlinear_wave_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - nonlinear_wave_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        nonlinear_wave_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - nonlinear_wave_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    nonlinear_wave_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -313,8 +304,6 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + nonlinear_wave_LEAD;
     const size_t block = nonlinear_wave_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - nonlinear_wave_LEAD + nonlinear_wave_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         s->before[k] = aligned + (nonlinear_wave_ARRAYS + k) * block;
@@ -339,15 +328,14 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
 static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s, double *const x[nonlinear_wave_DIM])
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!nonlinear_wave_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!nonlinear_wave_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *const from[nonlinear_wave_DIM],
     const nonlinear_wave_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         memcpy(to[k] - nonlinear_wave_LEAD, from[k] - nonlinear_wave_LEAD, block);
 }
@@ -430,9 +418,8 @@ static void nonlinear_wave_take(const nonlinear_wave_solver *s, double *const fi
     double *x)
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void nonlinear_wave_state(const nonlinear_wave_solver *s, double *x) { nonlinear_wave_take(s, s->x, x); }
@@ -460,18 +447,15 @@ double nonlinear_wave_hamiltonian(const nonlinear_wave_solver *s)
 {
     double density[nonlinear_wave_BUFFER], sum = 0.0, rest = 0.0;
     nonlinear_wave_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        nonlinear_wave_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += nonlinear_wave_BUFFER) {
-            const ptrdiff_t to = s->length - from > nonlinear_wave_BUFFER ? from + nonlinear_wave_BUFFER
-                : s->length;
-            nonlinear_wave_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    nonlinear_wave_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += nonlinear_wave_BUFFER) {
+        const ptrdiff_t to = s->length - from > nonlinear_wave_BUFFER ? from + nonlinear_wave_BUFFER
+            : s->length;
+        nonlinear_wave_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -484,10 +468,8 @@ typedef void nonlinear_wave_kernel(const nonlinear_wave_params *, const nonlinea
 static void nonlinear_wave_fill(const nonlinear_wave_solver *s, nonlinear_wave_kernel *kernel, double *out)
 {
     nonlinear_wave_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        nonlinear_wave_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    nonlinear_wave_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void nonlinear_wave_density(const nonlinear_wave_solver *s, double *out)

@@ -2,7 +2,7 @@
  * nonlinear_wave.h: the declarations; nonlinear_wave.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8428a0c3fc48e7b27f4c8f02df37322c4380cee12b5d0ef6b56ded3c18acf7ac
+ * body-sha256: e8dffc9fc74bde0520fe465980ef5315a3f17cc5f98bbdf303cfaaacacac9eb5
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
@@ -41,7 +41,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[nonlinear_wave_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[nonlinear_wave_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4a2872b72674537d4c6a77b25e37adcd299eb8b1707c09eee963dafc3ff0316b
+ * body-sha256: c09cf7b820caa4aa7584f2568083fb355f31a5c8de83d982cd785844c847f700
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const outer_planets_params outer_planets_default_params = { 0.000295912208286, NULL };
 
 enum { outer_planets_HALO = 0 };           /* sites that are copied beside a row */
-enum { outer_planets_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { outer_planets_LEAD = 0 };           /* doubles before the first site of a row */
+enum { outer_planets_RESERVED = 16 };      /* arrays over the sites in the memory of a solver */
 enum { outer_planets_ROW = 2 };            /* coefficients of one flow */
 enum { outer_planets_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { outer_planets_FLOWS = 13 };         /* in a step */
@@ -73,7 +74,6 @@ static void outer_planets_prepare(const outer_planets_params *params, double h, 
 /* Where one row is. */
 typedef struct {
     double *const *x;        /* see outer_planets_solver */
-    const ptrdiff_t *at;     /* the row itself and those beside it, from the first row on */
     ptrdiff_t length;        /* sites of a row */
     double *const *gathered; /* see outer_planets_solver */
 } outer_planets_row;
@@ -90,10 +90,9 @@ typedef struct {
 #endif
 
 /* What kernels are told of a row. */
-static inline void outer_planets_locate(const outer_planets_solver *s, size_t index, outer_planets_row *row)
+static inline void outer_planets_locate(const outer_planets_solver *s, outer_planets_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * outer_planets_LINES;
     row->length = s->length;
     row->gathered = s->gathered;
 }
@@ -115,7 +114,7 @@ typedef struct {
 static inline outer_planets_piece outer_planets_piece_of(const outer_planets_solver *s, size_t unit)
 {
     outer_planets_piece piece;
-    outer_planets_locate(s, 0, &piece.row);
+    outer_planets_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * outer_planets_PIECE;
     piece.to = unit == outer_planets_units(s) - 1 ? s->length : piece.from + outer_planets_PIECE;
     return piece;
@@ -288,34 +287,18 @@ static void outer_planets_vector_field_row(const outer_planets_params *params, c
     }
 }
 
-static void outer_planets_put_parameter(const outer_planets_solver *s, double *rows, const double *values,
-    double value);
-
-/* The parameters at sites into rows. */
-static void outer_planets_put_parameters(outer_planets_solver *s, const outer_planets_params *params)
-{
-    outer_planets_put_parameter(s, s->x[6], params->m, 1.0);
-    s->params.m = NULL;
-}
-
 /* ---- The lattice ---- */
-enum {
-    outer_planets_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    outer_planets_LEAD = (outer_planets_HALO + 7) / 8 * 8,
-    outer_planets_BUFFER = 256,
-    outer_planets_RESERVED = outer_planets_ARRAYS + outer_planets_DIM
-        + outer_planets_GATHERED
-};
+enum { outer_planets_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { outer_planets_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < outer_planets_AXES; ++a) {
+    for (int a = 0; a < outer_planets_AXES; ++a)
         if (sizes[a] < outer_planets_least[a] || sizes[a] % outer_planets_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = outer_planets_LEAD + ((sizes[outer_planets_AXES - 1] + 7) / 8 * 8 + outer_planets_HALO + 7)
         / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -333,29 +316,30 @@ size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
     const size_t rows = sizes == NULL ? 0 : outer_planets_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = outer_planets_RESERVED * outer_planets_block(rows, width);
-    return doubles * sizeof(double) + rows * outer_planets_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void outer_planets_put(const outer_planets_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - outer_planets_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-    }
+    double *row = rows;
+    memset(row - outer_planets_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void outer_planets_put_parameter(const outer_planets_solver *s, double *rows, const double *values,
     double value)
 {
-    if (values != NULL) {
-        outer_planets_put(s, rows, values);
-        return;
-    }
-    for (ptrdiff_t i = -outer_planets_LEAD; i < (ptrdiff_t)s->rows * s->width - outer_planets_LEAD; ++i)
-        rows[i] = value;
+    for (ptrdiff_t i = -outer_planets_LEAD; i < s->width - outer_planets_LEAD; ++i) rows[i] = value;
+    if (values != NULL) outer_planets_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void outer_planets_put_parameters(outer_planets_solver *s, const outer_planets_params *params)
+{
+    outer_planets_put_parameter(s, s->x[6], params->m, 1.0);
+    s->params.m = NULL;
 }
 
 /* ---- The solver ---- */
@@ -395,8 +379,6 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + outer_planets_LEAD;
     const size_t block = outer_planets_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - outer_planets_LEAD + outer_planets_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         s->before[k] = aligned + (outer_planets_ARRAYS + k) * block;
@@ -424,15 +406,14 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
 static int outer_planets_all_hold(const outer_planets_solver *s, double *const x[outer_planets_DIM])
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!outer_planets_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!outer_planets_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void outer_planets_copy(double *const to[outer_planets_DIM], double *const from[outer_planets_DIM],
     const outer_planets_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         memcpy(to[k] - outer_planets_LEAD, from[k] - outer_planets_LEAD, block);
 }
@@ -515,9 +496,8 @@ static void outer_planets_take(const outer_planets_solver *s, double *const fiel
     double *x)
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void outer_planets_state(const outer_planets_solver *s, double *x) { outer_planets_take(s, s->x, x); }
@@ -545,18 +525,15 @@ double outer_planets_hamiltonian(const outer_planets_solver *s)
 {
     double density[outer_planets_BUFFER], sum = 0.0, rest = 0.0;
     outer_planets_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        outer_planets_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += outer_planets_BUFFER) {
-            const ptrdiff_t to = s->length - from > outer_planets_BUFFER ? from + outer_planets_BUFFER
-                : s->length;
-            outer_planets_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    outer_planets_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += outer_planets_BUFFER) {
+        const ptrdiff_t to = s->length - from > outer_planets_BUFFER ? from + outer_planets_BUFFER
+            : s->length;
+        outer_planets_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -569,10 +546,8 @@ typedef void outer_planets_kernel(const outer_planets_params *, const outer_plan
 static void outer_planets_fill(const outer_planets_solver *s, outer_planets_kernel *kernel, double *out)
 {
     outer_planets_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        outer_planets_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    outer_planets_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void outer_planets_density(const outer_planets_solver *s, double *out)

@@ -2,7 +2,7 @@
  * outer_planets.h: the declarations; outer_planets.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 56ed558d79093d94fc6e5fc398edb21cfb26e583d6a452727a9b9d0f4e92c815
+ * body-sha256: fa2f783e53edee26370e7299c29ff7972693a165ad9d8b4be517ad3e8e36277d
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -42,7 +42,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[outer_planets_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *gathered[outer_planets_GATHERED]; /* sums over other sites, for each site */
     double *before[outer_planets_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */

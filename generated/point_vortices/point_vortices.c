@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: f06b0605e1706e38c2729948005083e971ca7db2ee921b7aa35c30ce3711d241
+ * body-sha256: a7b1769e797292d91ec12976b4a01c3c2f61ecedc59eebb3f070b1043fa93fa1
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -30,9 +30,12 @@
 const point_vortices_params point_vortices_default_params = { NULL };
 
 enum { point_vortices_HALO = 0 };          /* sites that are copied beside a row */
-enum { point_vortices_LINES = 1 };         /* rows that kernels read: the row itself and those beside it */
+enum { point_vortices_LEAD = 0 };          /* doubles before the first site of a row */
+enum { point_vortices_RESERVED = 84 };     /* arrays over the sites in the memory of a solver */
 enum { point_vortices_ROW = 1 };           /* coefficients of one flow */
 enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
+enum { point_vortices_SIDES = 2 };         /* y before and after a sweep */
+enum { point_vortices_IMPLICIT = 75 };     /* of these for y, its guesses and its variations */
 enum { point_vortices_MOST_SWEEPS = 200 }; /* that a stage may take */
 
 /* Along each axis: the smallest size, what sizes are multiples of. */
@@ -62,9 +65,8 @@ static void point_vortices_prepare(const point_vortices_params *params, double h
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see point_vortices_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see point_vortices_solver */
+    ptrdiff_t length; /* sites of a row */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
     double *const *varied;   /* a variation of x */
@@ -83,11 +85,9 @@ typedef struct {
 #endif
 
 /* What kernels are told of a row. */
-static inline void point_vortices_locate(const point_vortices_solver *s, size_t index,
-    point_vortices_row *row)
+static inline void point_vortices_locate(const point_vortices_solver *s, point_vortices_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * point_vortices_LINES;
     row->length = s->length;
     row->start = row->out = s->x;
     row->gathered = s->gathered;
@@ -110,7 +110,7 @@ typedef struct {
 static inline point_vortices_piece point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
     point_vortices_piece piece;
-    point_vortices_locate(s, 0, &piece.row);
+    point_vortices_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * point_vortices_PIECE;
     piece.to = unit == point_vortices_units(s) - 1 ? s->length : piece.from + point_vortices_PIECE;
     return piece;
@@ -346,16 +346,6 @@ static void point_vortices_vector_field_row(const point_vortices_params *params,
     }
 }
 
-static void point_vortices_put_parameter(const point_vortices_solver *s, double *rows, const double *values,
-    double value);
-
-/* The parameters at sites into rows. */
-static void point_vortices_put_parameters(point_vortices_solver *s, const point_vortices_params *params)
-{
-    point_vortices_put_parameter(s, s->x[2], params->G, 1.0);
-    s->params.G = NULL;
-}
-
 /* ---- The lattice ---- */
 /* Before a loop over pieces: they are worked at in parallel. */
 #ifdef _OPENMP
@@ -366,30 +356,16 @@ static void point_vortices_put_parameters(point_vortices_solver *s, const point_
 #define point_vortices_ONE_BY_ONE
 #endif
 
-enum {
-    point_vortices_SIDES = 2, /* y before and after a sweep */
-    point_vortices_LEAD = (point_vortices_HALO + 7) / 8 * 8,
-    point_vortices_BUFFER = 256,
-    point_vortices_IMPLICIT = (point_vortices_SIDES /* arrays for y, its guesses and its variations */
-        + point_vortices_STAGES * point_vortices_DIFFERENCES
-        + point_vortices_DIRECTIONS + 1
-        ) * point_vortices_DIM
-        + 1 /* for sums over pieces */
-        ,
-    point_vortices_RESERVED = point_vortices_ARRAYS + point_vortices_DIM
-        + point_vortices_GATHERED
-        + point_vortices_IMPLICIT
-};
+enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < point_vortices_AXES; ++a) {
+    for (int a = 0; a < point_vortices_AXES; ++a)
         if (sizes[a] < point_vortices_least[a] || sizes[a] % point_vortices_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = point_vortices_LEAD + ((sizes[point_vortices_AXES - 1] + 7) / 8 * 8 + point_vortices_HALO
         + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -412,29 +388,30 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
     const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
-    return doubles * sizeof(double) + rows * point_vortices_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void point_vortices_put(const point_vortices_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - point_vortices_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-    }
+    double *row = rows;
+    memset(row - point_vortices_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void point_vortices_put_parameter(const point_vortices_solver *s, double *rows, const double *values,
     double value)
 {
-    if (values != NULL) {
-        point_vortices_put(s, rows, values);
-        return;
-    }
-    for (ptrdiff_t i = -point_vortices_LEAD; i < (ptrdiff_t)s->rows * s->width - point_vortices_LEAD; ++i)
-        rows[i] = value;
+    for (ptrdiff_t i = -point_vortices_LEAD; i < s->width - point_vortices_LEAD; ++i) rows[i] = value;
+    if (values != NULL) point_vortices_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void point_vortices_put_parameters(point_vortices_solver *s, const point_vortices_params *params)
+{
+    point_vortices_put_parameter(s, s->x[2], params->G, 1.0);
+    s->params.G = NULL;
 }
 
 /* ---- The solver ---- */
@@ -491,8 +468,6 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + point_vortices_LEAD;
     const size_t block = point_vortices_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - point_vortices_LEAD + point_vortices_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         s->before[k] = aligned + (point_vortices_ARRAYS + k) * block;
@@ -521,15 +496,14 @@ static point_vortices_status point_vortices_set_step(point_vortices_solver *s, d
 static int point_vortices_all_hold(const point_vortices_solver *s, double *const x[point_vortices_DIM])
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!point_vortices_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!point_vortices_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void point_vortices_copy(double *const to[point_vortices_DIM], double *const from[point_vortices_DIM],
     const point_vortices_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         memcpy(to[k] - point_vortices_LEAD, from[k] - point_vortices_LEAD, block);
 }
@@ -550,8 +524,7 @@ static void point_vortices_measure(const point_vortices_solver *s, int now, size
     const point_vortices_piece at = point_vortices_piece_of(s, unit);
     const ptrdiff_t whole = at.to - (at.to - at.from) % point_vortices_WIDTH;
     for (int k = 0; k < point_vortices_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after =
-            s->y[1 - now][k] + at.row.at[0];
+        const double *restrict before = s->y[now][k], *restrict after = s->y[1 - now][k];
         double changes[point_vortices_WIDTH] = { 0.0 }, sizes[point_vortices_WIDTH] = { 0.0 };
         for (ptrdiff_t i = at.from; i < whole; i += point_vortices_WIDTH)
             for (int l = 0; l < point_vortices_WIDTH; ++l) {
@@ -595,43 +568,13 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     return moved;
 }
 
-#define point_vortices_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
-#define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
-
-#define point_vortices_SLOW 0.6        /* changes that shrink by less are left to Newton's method, ... */
-enum { point_vortices_PATIENCE = 10 }; /* ... after so many sweeps */
-
-/* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in
-   s->y[*now]. */
-static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, int far,
-    int *now)
-{
-    double before = 0.0;
-    for (int sweep = 0; sweep < point_vortices_MOST_SWEEPS; ++sweep) {
-        const double change = point_vortices_relaxed(s, coef, far, *now), shrunk = before - change;
-        ++s->sweeps;
-        *now = 1 - *now;
-        if (!isfinite(change)) return sweep == 0 ? point_vortices_NOT_FINITE : point_vortices_NO_CONVERGENCE;
-        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
-        if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0
-            && change <= point_vortices_ROUNDING && sweep > 0)) {
-            if (point_vortices_all_hold(s, s->y[*now])) return point_vortices_OK;
-            return sweep == 0 ? point_vortices_NOT_FINITE : point_vortices_NO_CONVERGENCE;
-        }
-        if (sweep >= point_vortices_PATIENCE && change > point_vortices_SLOW * before && change > 0x1p-30)
-            break;
-        before = change;
-    }
-    return point_vortices_NO_CONVERGENCE;
-}
-
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
 static void point_vortices_predict(const point_vortices_solver *s, double *const *x, int stage)
 {
     point_vortices_EACH_PIECE
-    for (size_t r = 0; r < s->rows; ++r)
+    for (size_t row = 0; row < s->rows; ++row)
         for (int k = 0; k < point_vortices_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
+            const ptrdiff_t first = (ptrdiff_t)row * s->width - point_vortices_HALO,
                 end = first + s->length + 2 * point_vortices_HALO;
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
             for (int d = 0; d < s->guess[stage].order; ++d) {
@@ -648,10 +591,10 @@ static void point_vortices_remember(point_vortices_solver *s, double *const *fro
     point_vortices_guess *guess = &s->guess[stage];
     double size[point_vortices_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
     point_vortices_EACH_PIECE
-    for (size_t r = 0; r < s->rows; ++r) {
+    for (size_t row = 0; row < s->rows; ++row) {
         double own[point_vortices_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < point_vortices_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)r * s->width - point_vortices_HALO,
+            const ptrdiff_t first = (ptrdiff_t)row * s->width - point_vortices_HALO,
                 end = first + s->length + 2 * point_vortices_HALO;
             const double *restrict y = s->y[now][k], *restrict x = from[k];
             for (ptrdiff_t i = first; i < end; ++i) {
@@ -702,7 +645,7 @@ static double point_vortices_product(const point_vortices_solver *s, double *con
         const ptrdiff_t whole = at.to - (at.to - at.from) % point_vortices_WIDTH;
         s->sums[unit] = 0.0;
         for (int k = 0; k < point_vortices_DIM; ++k) {
-            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
+            const double *one = x[k], *other = y[k];
             double lanes[point_vortices_WIDTH] = { 0.0 };
             for (ptrdiff_t i = at.from; i < whole; i += point_vortices_WIDTH)
                 for (int l = 0; l < point_vortices_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
@@ -724,8 +667,8 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     for (size_t unit = 0; unit < units; ++unit) {
         const point_vortices_piece at = point_vortices_piece_of(s, unit);
         for (int k = 0; k < point_vortices_DIM; ++k) {
-            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
-            double *sum = to[k] + at.row.at[0];
+            const double *one = x[k], *other = y[k];
+            double *sum = to[k];
             point_vortices_EACH_SITE
             for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = a * one[i] + b * other[i];
         }
@@ -790,17 +733,15 @@ static double point_vortices_krylov(point_vortices_solver *s, const double *coef
 
 /* ---- Newton's method where sweeps fail ---- */
 #define point_vortices_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
-enum { point_vortices_MOST_ITERATIONS = 200 };
 
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double point_vortices_distance(const point_vortices_solver *s, int side, double added)
 {
     double sum = 0.0;
-    for (int k = 0; k < point_vortices_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r) {
-            const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
-            for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
-        }
+    for (int k = 0; k < point_vortices_DIM; ++k) {
+        const double *y = s->y[side][k], *x = s->x[k];
+        for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
+    }
     return sum;
 }
 
@@ -811,7 +752,6 @@ static double point_vortices_corrected(point_vortices_solver *s, const double *c
     if (!isfinite(point_vortices_relaxed(s, coef, 1, now))) return HUGE_VAL;
     point_vortices_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
     if (!isfinite(point_vortices_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
-    ++s->sweeps;
     return point_vortices_relaxed(s, NULL, 1, now);
 }
 
@@ -823,19 +763,33 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
     return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
 }
 
-/* y in the middle of a stage, from the guess in s->y[0]; it is in s->y[*now]. */
-static point_vortices_status point_vortices_newton(point_vortices_solver *s, const double *coef, double range,
-    int *now)
+#define point_vortices_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
+#define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
+#define point_vortices_SLOW 0.6         /* changes that shrink by less are left to Newton's method, ... */
+enum { point_vortices_PATIENCE = 10 };  /* ... after so many sweeps */
+
+/* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where
+   these have failed, by corrections, and then no farther from x than in that range. It is in s->y[*now]. */
+static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, int far,
+    double range, int *now)
 {
     double before = 0.0;
-    for (int iteration = 0; iteration < point_vortices_MOST_ITERATIONS; ++iteration) {
-        const double change = point_vortices_corrected(s, coef, *now), shrunk = before - change;
+    for (int count = 0; count < point_vortices_MOST_SWEEPS; ++count) {
+        const double change = s->stiff ? point_vortices_corrected(s, coef, *now) : point_vortices_relaxed(s,
+            coef, far, *now);
+        const double shrunk = before - change;
+        const point_vortices_status failed = count == 0 && !s->stiff ? point_vortices_NOT_FINITE
+            : point_vortices_NO_CONVERGENCE;
+        ++s->sweeps;
         *now = 1 - *now;
-        if (!isfinite(change)) return point_vortices_NO_CONVERGENCE;
+        if (!isfinite(change)) return failed;
+        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * point_vortices_SETTLED || (shrunk <= 0.0
-            && change <= point_vortices_ROUNDING && iteration > 0))
-            return point_vortices_distance(s, *now, 0.0) <= range ? point_vortices_OK
-                : point_vortices_NO_CONVERGENCE;
+            && change <= point_vortices_ROUNDING && count > 0))
+            return (s->stiff ? point_vortices_distance(s, *now, 0.0) <= range : point_vortices_all_hold(s,
+                s->y[*now])) ? point_vortices_OK : failed;
+        if (!s->stiff && count >= point_vortices_PATIENCE && change > point_vortices_SLOW * before
+            && change > 0x1p-30) break;
         before = change;
     }
     return point_vortices_NO_CONVERGENCE;
@@ -850,13 +804,13 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
         int now = 0;
         point_vortices_predict(s, s->x, stage);
         point_vortices_status status = s->stiff ? point_vortices_NO_CONVERGENCE : point_vortices_middle(s,
-            coef, far, &now);
+            coef, far, 0.0, &now);
         if (status != point_vortices_OK && (far || status != point_vortices_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             const double range = point_vortices_range(s, coef);
             point_vortices_predict(s, s->x, stage);
-            status = point_vortices_newton(s, coef, range, &now);
+            status = point_vortices_middle(s, coef, far, range, &now);
         }
         if (status != point_vortices_OK) return status;
         point_vortices_remember(s, s->x, stage, now);
@@ -901,9 +855,8 @@ static void point_vortices_take(const point_vortices_solver *s, double *const fi
     double *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
@@ -939,18 +892,15 @@ double point_vortices_hamiltonian(const point_vortices_solver *s)
 {
     double density[point_vortices_BUFFER], sum = 0.0, rest = 0.0;
     point_vortices_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        point_vortices_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += point_vortices_BUFFER) {
-            const ptrdiff_t to = s->length - from > point_vortices_BUFFER ? from + point_vortices_BUFFER
-                : s->length;
-            point_vortices_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    point_vortices_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += point_vortices_BUFFER) {
+        const ptrdiff_t to = s->length - from > point_vortices_BUFFER ? from + point_vortices_BUFFER
+            : s->length;
+        point_vortices_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -963,10 +913,8 @@ typedef void point_vortices_kernel(const point_vortices_params *, const point_vo
 static void point_vortices_fill(const point_vortices_solver *s, point_vortices_kernel *kernel, double *out)
 {
     point_vortices_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        point_vortices_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    point_vortices_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void point_vortices_density(const point_vortices_solver *s, double *out)

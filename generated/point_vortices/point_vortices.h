@@ -2,7 +2,7 @@
  * point_vortices.h: the declarations; point_vortices.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1356654a864990b9e71f4d2c7c6e66b50e3250cee1b31ce63b26c3adfcc16e88
+ * body-sha256: 3821dbd7e44c6379b0e67737890df0f5f1ee3280faa216edce91acd8c0537748
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -50,7 +50,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[point_vortices_ARRAYS];
-    ptrdiff_t *lines;                          /* of each row, where it is and where those beside it are */
     double *gathered[point_vortices_GATHERED]; /* sums over other sites, for each site */
     double *before[point_vortices_DIM];        /* the fields before the steps that are being made */
     /* the middle of a stage, before and after a sweep, with the parameters at sites */

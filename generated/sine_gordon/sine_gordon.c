@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a44a9bab1edb20951c8eb00dfd7880e5261cecfd47476517f40ab10014c9e797
+ * body-sha256: 402c955a16f068f95a89e688f45a1aea4b4875f16629e99746d46bcdcc2a7ae8
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const sine_gordon_params sine_gordon_default_params = { 0.25 };
 
 enum { sine_gordon_HALO = 1 }; /* sites that are copied beside a row */
-enum { sine_gordon_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { sine_gordon_LEAD = 8 }; /* doubles before the first site of a row */
+enum { sine_gordon_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
 enum { sine_gordon_ROW = 3 }; /* coefficients of one flow */
 enum { sine_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { sine_gordon_FLOWS = 13 }; /* in a step */
@@ -71,9 +72,8 @@ static void sine_gordon_prepare(const sine_gordon_params *params, double h, doub
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see sine_gordon_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see sine_gordon_solver */
+    ptrdiff_t length; /* sites of a row */
 } sine_gordon_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -98,10 +98,9 @@ static inline void sine_gordon_ends(double *row, ptrdiff_t length, ptrdiff_t fro
 }
 
 /* What kernels are told of a row. */
-static inline void sine_gordon_locate(const sine_gordon_solver *s, size_t index, sine_gordon_row *row)
+static inline void sine_gordon_locate(const sine_gordon_solver *s, sine_gordon_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * sine_gordon_LINES;
     row->length = s->length;
 }
 
@@ -122,7 +121,7 @@ typedef struct {
 static inline sine_gordon_piece sine_gordon_piece_of(const sine_gordon_solver *s, size_t unit)
 {
     sine_gordon_piece piece;
-    sine_gordon_locate(s, 0, &piece.row);
+    sine_gordon_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * sine_gordon_PIECE;
     piece.to = unit == sine_gordon_units(s) - 1 ? s->length : piece.from + sine_gordon_PIECE;
     return piece;
@@ -243,22 +242,17 @@ static void sine_gordon_vector_field_row(const sine_gordon_params *params, const
 }
 
 /* ---- The lattice ---- */
-enum {
-    sine_gordon_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    sine_gordon_LEAD = (sine_gordon_HALO + 7) / 8 * 8,
-    sine_gordon_BUFFER = 256,
-    sine_gordon_RESERVED = sine_gordon_ARRAYS + sine_gordon_DIM
-};
+enum { sine_gordon_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { sine_gordon_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / sine_gordon_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < sine_gordon_AXES; ++a) {
+    for (int a = 0; a < sine_gordon_AXES; ++a)
         if (sizes[a] < sine_gordon_least[a] || sizes[a] % sine_gordon_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-    }
     size_t wide = sine_gordon_LEAD + ((sizes[sine_gordon_AXES - 1] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8
         * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -276,18 +270,16 @@ size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
     const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = sine_gordon_RESERVED * sine_gordon_block(rows, width);
-    return doubles * sizeof(double) + rows * sine_gordon_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void sine_gordon_put(const sine_gordon_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - sine_gordon_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        sine_gordon_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - sine_gordon_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    sine_gordon_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -326,8 +318,6 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
     const size_t block = sine_gordon_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - sine_gordon_LEAD + sine_gordon_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < sine_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) s->before[k] = aligned + (sine_gordon_ARRAYS + k) * block;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) sine_gordon_put(s, s->x[k], x0 + k * sites);
@@ -351,15 +341,14 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
 static int sine_gordon_all_hold(const sine_gordon_solver *s, double *const x[sine_gordon_DIM])
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!sine_gordon_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!sine_gordon_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const from[sine_gordon_DIM],
     const sine_gordon_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
         memcpy(to[k] - sine_gordon_LEAD, from[k] - sine_gordon_LEAD, block);
 }
@@ -441,9 +430,8 @@ sine_gordon_status sine_gordon_step(sine_gordon_solver *s, double h)
 static void sine_gordon_take(const sine_gordon_solver *s, double *const fields[sine_gordon_DIM], double *x)
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void sine_gordon_state(const sine_gordon_solver *s, double *x) { sine_gordon_take(s, s->x, x); }
@@ -471,18 +459,14 @@ double sine_gordon_hamiltonian(const sine_gordon_solver *s)
 {
     double density[sine_gordon_BUFFER], sum = 0.0, rest = 0.0;
     sine_gordon_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        sine_gordon_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += sine_gordon_BUFFER) {
-            const ptrdiff_t to = s->length - from > sine_gordon_BUFFER ? from + sine_gordon_BUFFER
-                : s->length;
-            sine_gordon_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    sine_gordon_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += sine_gordon_BUFFER) {
+        const ptrdiff_t to = s->length - from > sine_gordon_BUFFER ? from + sine_gordon_BUFFER : s->length;
+        sine_gordon_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -495,10 +479,8 @@ typedef void sine_gordon_kernel(const sine_gordon_params *, const sine_gordon_ro
 static void sine_gordon_fill(const sine_gordon_solver *s, sine_gordon_kernel *kernel, double *out)
 {
     sine_gordon_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        sine_gordon_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    sine_gordon_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void sine_gordon_density(const sine_gordon_solver *s, double *out)

@@ -2,7 +2,7 @@
  * sine_gordon.h: the declarations; sine_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4b41106b2a197110db7849ded15151c7c3ef4f1f4f54a61148562415df67ab52
+ * body-sha256: 45250626619658a3f1752c4dde422bcedc0053525e35d751aa7b05e57da1c1b3
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
@@ -40,7 +40,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[sine_gordon_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[sine_gordon_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: d16750ca8d08ab592ef1901689c6c174f152c8a7580b5b391ee7fdba0e6df393
+ * body-sha256: 1be3ffae485c3aa4daeeb4fae8a0155a122d87e458b188f740d227873df0a46b
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -32,14 +32,15 @@
 /* ---- The model ---- */
 const thermal_heisenberg_params thermal_heisenberg_default_params = { 1.0, 0.2, NULL };
 
-enum { thermal_heisenberg_HALO = 1 }; /* sites that are copied beside a row */
-enum { thermal_heisenberg_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
-enum { thermal_heisenberg_ROW = 5 }; /* coefficients of one flow */
+enum { thermal_heisenberg_HALO = 1 };           /* sites that are copied beside a row */
+enum { thermal_heisenberg_LEAD = 8 };           /* doubles before the first site of a row */
+enum { thermal_heisenberg_RESERVED = 10 };      /* arrays over the sites in the memory of a solver */
+enum { thermal_heisenberg_ROW = 5 };            /* coefficients of one flow */
 enum { thermal_heisenberg_ROWS_OF_FLOWS = 12 }; /* rows of coefficients */
-enum { thermal_heisenberg_SOURCES = 3 }; /* of noise at a site: bath_x, bath_y, bath_z */
-enum { thermal_heisenberg_DRAWN = 4 }; /* the first of the arrays of increments */
-enum { thermal_heisenberg_PARTS = 2 }; /* increments of one source in a step, each of a part of it */
-enum { thermal_heisenberg_FLOWS = 15 }; /* in a step */
+enum { thermal_heisenberg_SOURCES = 3 };        /* of noise at a site: bath_x, bath_y, bath_z */
+enum { thermal_heisenberg_DRAWN = 4 };          /* the first of the arrays of increments */
+enum { thermal_heisenberg_PARTS = 2 };          /* increments of one source in a step, each of a part of it */
+enum { thermal_heisenberg_FLOWS = 15 };         /* in a step */
 /* the row of the last flow of a step and the first of the next together */
 enum { thermal_heisenberg_JOINED = 11 };
 enum { thermal_heisenberg_COLOUR_COUNT = 2 };  /* colours of sites */
@@ -87,10 +88,9 @@ static void thermal_heisenberg_prepare(const thermal_heisenberg_params *params, 
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see thermal_heisenberg_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
-    int colour;          /* of the first site */
+    double *const *x; /* see thermal_heisenberg_solver */
+    ptrdiff_t length; /* sites of a row */
+    int colour;       /* of the first site */
 } thermal_heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -125,11 +125,9 @@ static inline void thermal_heisenberg_ends(double *row, ptrdiff_t length, ptrdif
 }
 
 /* What kernels are told of a row. */
-static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s, size_t index,
-    thermal_heisenberg_row *row)
+static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s, thermal_heisenberg_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * thermal_heisenberg_LINES;
     row->length = s->length;
     row->colour = 0;
 }
@@ -152,7 +150,7 @@ static inline thermal_heisenberg_piece thermal_heisenberg_piece_of(const thermal
     size_t unit)
 {
     thermal_heisenberg_piece piece;
-    thermal_heisenberg_locate(s, 0, &piece.row);
+    thermal_heisenberg_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * thermal_heisenberg_PIECE;
     piece.to = unit == thermal_heisenberg_units(s) - 1 ? s->length : piece.from + thermal_heisenberg_PIECE;
     return piece;
@@ -488,17 +486,6 @@ static void thermal_heisenberg_vector_field_row(const thermal_heisenberg_params 
     }
 }
 
-static void thermal_heisenberg_put_parameter(const thermal_heisenberg_solver *s, double *rows,
-    const double *values, double value);
-
-/* The parameters at sites into rows. */
-static void thermal_heisenberg_put_parameters(thermal_heisenberg_solver *s,
-    const thermal_heisenberg_params *params)
-{
-    thermal_heisenberg_put_parameter(s, s->x[3], params->T, 0.2);
-    s->params.T = NULL;
-}
-
 /* ---- Random numbers ---- */
 /* Philox4x32-10 of J. Salmon, M. Moraes, R. Dror, D. Shaw, Parallel random numbers: as easy as 1, 2, 3
    (2011): the counter becomes four random words. */
@@ -553,9 +540,8 @@ static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, siz
     for (size_t unit = first; unit < end; ++unit) {
         const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
         for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
-            double *one = s->x[thermal_heisenberg_DRAWN + k] + at.row.at[0];
-            double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)]
-                + at.row.at[0];
+            double *one = s->x[thermal_heisenberg_DRAWN + k];
+            double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
             for (ptrdiff_t i = at.from; i < at.to; ++i) {
                 const uint64_t site = thermal_heisenberg_site(s, thermal_heisenberg_AXES > 1 ? unit : 0, i);
                 const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
@@ -568,8 +554,7 @@ static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, siz
             }
         }
         for (int k = 0; k < thermal_heisenberg_SOURCES; ++k)
-            thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k] + at.row.at[0], s->length, at.from,
-            at.to);
+            thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, at.from, at.to);
     }
 }
 
@@ -616,22 +601,18 @@ static void thermal_heisenberg_wait(void)
 #endif
 }
 
-enum {
-    thermal_heisenberg_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    thermal_heisenberg_LEAD = (thermal_heisenberg_HALO + 7) / 8 * 8,
-    thermal_heisenberg_BUFFER = 256,
-    thermal_heisenberg_RESERVED = thermal_heisenberg_ARRAYS + thermal_heisenberg_DIM
-};
+/* steps before the state is looked at: what is not finite stays so */
+enum { thermal_heisenberg_STRETCH = 32 };
+enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / thermal_heisenberg_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < thermal_heisenberg_AXES; ++a) {
+    for (int a = 0; a < thermal_heisenberg_AXES; ++a)
         if (sizes[a] < thermal_heisenberg_least[a] || sizes[a] % thermal_heisenberg_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = thermal_heisenberg_LEAD + ((sizes[thermal_heisenberg_AXES - 1] + 7) / 8 * 8
         + thermal_heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -649,30 +630,32 @@ size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
     const size_t rows = sizes == NULL ? 0 : thermal_heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = thermal_heisenberg_RESERVED * thermal_heisenberg_block(rows, width);
-    return doubles * sizeof(double) + rows * thermal_heisenberg_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void thermal_heisenberg_put(const thermal_heisenberg_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - thermal_heisenberg_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        thermal_heisenberg_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - thermal_heisenberg_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    thermal_heisenberg_ends(row, s->length, 0, s->length);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void thermal_heisenberg_put_parameter(const thermal_heisenberg_solver *s, double *rows,
     const double *values, double value)
 {
-    if (values != NULL) {
-        thermal_heisenberg_put(s, rows, values);
-        return;
-    }
-    for (ptrdiff_t i = -thermal_heisenberg_LEAD; i < (ptrdiff_t)s->rows * s->width - thermal_heisenberg_LEAD;
-        ++i) rows[i] = value;
+    for (ptrdiff_t i = -thermal_heisenberg_LEAD; i < s->width - thermal_heisenberg_LEAD; ++i) rows[i] = value;
+    if (values != NULL) thermal_heisenberg_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void thermal_heisenberg_put_parameters(thermal_heisenberg_solver *s,
+    const thermal_heisenberg_params *params)
+{
+    thermal_heisenberg_put_parameter(s, s->x[3], params->T, 0.2);
+    s->params.T = NULL;
 }
 
 /* ---- The solver ---- */
@@ -715,8 +698,6 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + thermal_heisenberg_LEAD;
     const size_t block = thermal_heisenberg_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - thermal_heisenberg_LEAD + thermal_heisenberg_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < thermal_heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
         s->before[k] = aligned + (thermal_heisenberg_ARRAYS + k) * block;
@@ -758,15 +739,14 @@ static int thermal_heisenberg_all_hold(const thermal_heisenberg_solver *s,
     double *const x[thermal_heisenberg_DIM])
 {
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!thermal_heisenberg_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!thermal_heisenberg_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void thermal_heisenberg_copy(double *const to[thermal_heisenberg_DIM],
     double *const from[thermal_heisenberg_DIM], const thermal_heisenberg_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
         memcpy(to[k] - thermal_heisenberg_LEAD, from[k] - thermal_heisenberg_LEAD, block);
 }
@@ -863,9 +843,8 @@ static void thermal_heisenberg_take(const thermal_heisenberg_solver *s,
     double *const fields[thermal_heisenberg_DIM], double *x)
 {
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x)
@@ -898,18 +877,15 @@ double thermal_heisenberg_hamiltonian(const thermal_heisenberg_solver *s)
 {
     double density[thermal_heisenberg_BUFFER], sum = 0.0, rest = 0.0;
     thermal_heisenberg_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        thermal_heisenberg_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += thermal_heisenberg_BUFFER) {
-            const ptrdiff_t to = s->length - from > thermal_heisenberg_BUFFER
-                ? from + thermal_heisenberg_BUFFER : s->length;
-            thermal_heisenberg_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    thermal_heisenberg_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += thermal_heisenberg_BUFFER) {
+        const ptrdiff_t to = s->length - from > thermal_heisenberg_BUFFER ? from + thermal_heisenberg_BUFFER
+            : s->length;
+        thermal_heisenberg_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -923,10 +899,8 @@ static void thermal_heisenberg_fill(const thermal_heisenberg_solver *s, thermal_
     double *out)
 {
     thermal_heisenberg_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        thermal_heisenberg_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    thermal_heisenberg_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void thermal_heisenberg_density(const thermal_heisenberg_solver *s, double *out)

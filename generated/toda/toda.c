@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3795f9852211c6757d14a7a08d13121ec2275eaadbb8313c64fab641401e0a30
+ * body-sha256: 3c8a56432e88399ec17a92fc67978c62b30f430a26d2df24ae2a05762e1c5b32
  */
 #include "toda.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const toda_params toda_default_params = { 0 };
 
 enum { toda_HALO = 1 };           /* sites that are copied beside a row */
-enum { toda_LINES = 1 };          /* rows that kernels read: the row itself and those beside it */
+enum { toda_LEAD = 8 };           /* doubles before the first site of a row */
+enum { toda_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
 enum { toda_ROW = 2 };            /* coefficients of one flow */
 enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { toda_FLOWS = 13 };         /* in a step */
@@ -67,9 +68,8 @@ static void toda_prepare(const toda_params *params, double h, double coef[restri
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see toda_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see toda_solver */
+    ptrdiff_t length; /* sites of a row */
 } toda_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -94,10 +94,9 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
 }
 
 /* What kernels are told of a row. */
-static inline void toda_locate(const toda_solver *s, size_t index, toda_row *row)
+static inline void toda_locate(const toda_solver *s, toda_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * toda_LINES;
     row->length = s->length;
 }
 
@@ -118,7 +117,7 @@ typedef struct {
 static inline toda_piece toda_piece_of(const toda_solver *s, size_t unit)
 {
     toda_piece piece;
-    toda_locate(s, 0, &piece.row);
+    toda_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * toda_PIECE;
     piece.to = unit == toda_units(s) - 1 ? s->length : piece.from + toda_PIECE;
     return piece;
@@ -248,21 +247,16 @@ static void toda_vector_field_row(const toda_params *params, const toda_row *row
 }
 
 /* ---- The lattice ---- */
-enum {
-    toda_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    toda_LEAD = (toda_HALO + 7) / 8 * 8,
-    toda_BUFFER = 256,
-    toda_RESERVED = toda_ARRAYS + toda_DIM
-};
+enum { toda_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < toda_AXES; ++a) {
+    for (int a = 0; a < toda_AXES; ++a)
         if (sizes[a] < toda_least[a] || sizes[a] % toda_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    }
     size_t wide = toda_LEAD + ((sizes[toda_AXES - 1] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -279,18 +273,16 @@ size_t toda_work_size(const size_t sizes[toda_AXES])
     const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = toda_RESERVED * toda_block(rows, width);
-    return doubles * sizeof(double) + rows * toda_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void toda_put(const toda_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - toda_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        toda_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - toda_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    toda_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -327,8 +319,6 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - toda_LEAD + toda_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < toda_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < toda_DIM; ++k) s->before[k] = aligned + (toda_ARRAYS + k) * block;
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->x[k], x0 + k * sites);
@@ -352,14 +342,13 @@ static toda_status toda_set_step(toda_solver *s, double h)
 static int toda_all_hold(const toda_solver *s, double *const x[toda_DIM])
 {
     for (size_t k = 0; k < toda_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!toda_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!toda_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], const toda_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < toda_DIM; ++k) memcpy(to[k] - toda_LEAD, from[k] - toda_LEAD, block);
 }
 
@@ -435,9 +424,8 @@ toda_status toda_step(toda_solver *s, double h) { return toda_integrate(s, h, 1)
 static void toda_take(const toda_solver *s, double *const fields[toda_DIM], double *x)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void toda_state(const toda_solver *s, double *x) { toda_take(s, s->x, x); }
@@ -464,17 +452,14 @@ double toda_hamiltonian(const toda_solver *s)
 {
     double density[toda_BUFFER], sum = 0.0, rest = 0.0;
     toda_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        toda_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += toda_BUFFER) {
-            const ptrdiff_t to = s->length - from > toda_BUFFER ? from + toda_BUFFER : s->length;
-            toda_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    toda_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += toda_BUFFER) {
+        const ptrdiff_t to = s->length - from > toda_BUFFER ? from + toda_BUFFER : s->length;
+        toda_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -487,10 +472,8 @@ typedef void toda_kernel(const toda_params *, const toda_row *, ptrdiff_t, ptrdi
 static void toda_fill(const toda_solver *s, toda_kernel *kernel, double *out)
 {
     toda_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        toda_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    toda_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void toda_density(const toda_solver *s, double *out) { toda_fill(s, toda_energy_row, out); }

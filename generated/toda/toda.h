@@ -2,7 +2,7 @@
  * toda.h: the declarations; toda.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ec00203aa5ad7e0347fa64c55779a21d90ece6cafb830aa2ad43e167320ef613
+ * body-sha256: e998ab09d9e04f908c620de24b45cca39172a9b82d40d745ffb2232a2ca00605
  */
 #ifndef TODA_H
 #define TODA_H
@@ -40,7 +40,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[toda_ARRAYS];
-    ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */
     double *before[toda_DIM]; /* the fields before the steps that are being made */
     int open;                 /* whether these lack the last flow of a step, which between calls x has made */
     size_t far;               /* steps to be made by functions for large arguments, where there are others */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c27f867e46346761cfdad137d9a00bcf2a7899d74e17c4b73f24c27f97db6d07
+ * body-sha256: f61a0cd0bf21671865928f9becc06ea6059bb9502be561d74c371d31d972dd5c
  */
 #include "volterra.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const volterra_params volterra_default_params = { 0 };
 
 enum { volterra_HALO = 1 }; /* sites that are copied beside a row */
-enum { volterra_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { volterra_LEAD = 8 }; /* doubles before the first site of a row */
+enum { volterra_RESERVED = 2 }; /* arrays over the sites in the memory of a solver */
 enum { volterra_ROW = 1 }; /* coefficients of one flow */
 enum { volterra_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { volterra_FLOWS = 13 }; /* in a step */
@@ -68,10 +69,9 @@ static void volterra_prepare(const volterra_params *params, double h, double coe
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see volterra_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
-    int colour;          /* of the first site */
+    double *const *x; /* see volterra_solver */
+    ptrdiff_t length; /* sites of a row */
+    int colour;       /* of the first site */
 } volterra_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -105,10 +105,9 @@ static inline void volterra_ends(double *row, ptrdiff_t length, ptrdiff_t from, 
 }
 
 /* What kernels are told of a row. */
-static inline void volterra_locate(const volterra_solver *s, size_t index, volterra_row *row)
+static inline void volterra_locate(const volterra_solver *s, volterra_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * volterra_LINES;
     row->length = s->length;
     row->colour = 0;
 }
@@ -130,7 +129,7 @@ typedef struct {
 static inline volterra_piece volterra_piece_of(const volterra_solver *s, size_t unit)
 {
     volterra_piece piece;
-    volterra_locate(s, 0, &piece.row);
+    volterra_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * volterra_PIECE;
     piece.to = unit == volterra_units(s) - 1 ? s->length : piece.from + volterra_PIECE;
     return piece;
@@ -256,22 +255,17 @@ static void volterra_vector_field_row(const volterra_params *params, const volte
 }
 
 /* ---- The lattice ---- */
-enum {
-    volterra_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    volterra_LEAD = (volterra_HALO + 7) / 8 * 8,
-    volterra_BUFFER = 256,
-    volterra_RESERVED = volterra_ARRAYS + volterra_DIM
-};
+enum { volterra_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { volterra_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / volterra_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < volterra_AXES; ++a) {
+    for (int a = 0; a < volterra_AXES; ++a)
         if (sizes[a] < volterra_least[a] || sizes[a] % volterra_periods[a] != 0 || sizes[a] > most / 2)
             return 0;
-    }
     size_t wide = volterra_LEAD + ((sizes[volterra_AXES - 1] + 7) / 8 * 8 + volterra_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     if (rows > most / wide) return 0;
@@ -288,18 +282,16 @@ size_t volterra_work_size(const size_t sizes[volterra_AXES])
     const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = volterra_RESERVED * volterra_block(rows, width);
-    return doubles * sizeof(double) + rows * volterra_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void volterra_put(const volterra_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - volterra_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        volterra_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - volterra_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    volterra_ends(row, s->length, 0, s->length);
 }
 
 /* ---- The solver ---- */
@@ -338,8 +330,6 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
     const size_t block = volterra_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - volterra_LEAD + volterra_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < volterra_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < volterra_DIM; ++k) s->before[k] = aligned + (volterra_ARRAYS + k) * block;
     for (size_t k = 0; k < volterra_DIM; ++k) volterra_put(s, s->x[k], x0 + k * sites);
@@ -363,15 +353,14 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
 static int volterra_all_hold(const volterra_solver *s, double *const x[volterra_DIM])
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!volterra_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!volterra_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void volterra_copy(double *const to[volterra_DIM], double *const from[volterra_DIM],
     const volterra_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < volterra_DIM; ++k) memcpy(to[k] - volterra_LEAD, from[k] - volterra_LEAD, block);
 }
 
@@ -447,9 +436,8 @@ volterra_status volterra_step(volterra_solver *s, double h) { return volterra_in
 static void volterra_take(const volterra_solver *s, double *const fields[volterra_DIM], double *x)
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void volterra_state(const volterra_solver *s, double *x) { volterra_take(s, s->x, x); }
@@ -476,17 +464,14 @@ double volterra_hamiltonian(const volterra_solver *s)
 {
     double density[volterra_BUFFER], sum = 0.0, rest = 0.0;
     volterra_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        volterra_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += volterra_BUFFER) {
-            const ptrdiff_t to = s->length - from > volterra_BUFFER ? from + volterra_BUFFER : s->length;
-            volterra_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    volterra_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += volterra_BUFFER) {
+        const ptrdiff_t to = s->length - from > volterra_BUFFER ? from + volterra_BUFFER : s->length;
+        volterra_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -499,10 +484,8 @@ typedef void volterra_kernel(const volterra_params *, const volterra_row *, ptrd
 static void volterra_fill(const volterra_solver *s, volterra_kernel *kernel, double *out)
 {
     volterra_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        volterra_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    volterra_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void volterra_density(const volterra_solver *s, double *out) { volterra_fill(s, volterra_energy_row, out); }

@@ -2,7 +2,7 @@
  * volterra.h: the declarations; volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: da0c77abc744172ddaffe5ce8519cee79b1f8a13f2db82529c5e236a500a0a92
+ * body-sha256: ba01c3af7325d2981ddbd0616da84b31501a6c836f30c08530ee4f9c2f6934ff
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
@@ -40,7 +40,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[volterra_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[volterra_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

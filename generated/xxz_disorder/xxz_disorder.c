@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e34b868d23586c17280d91db7418ae6b5d5d47e0cbba6525d70c9cf3f4324de2
+ * body-sha256: b9f687cc311f448c39ab781f27ca426c5b44135038fe930abfb4de93d6a1cd54
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -28,7 +28,8 @@
 const xxz_disorder_params xxz_disorder_default_params = { 1.0, 1.3, NULL };
 
 enum { xxz_disorder_HALO = 1 }; /* sites that are copied beside a row */
-enum { xxz_disorder_LINES = 1 }; /* rows that kernels read: the row itself and those beside it */
+enum { xxz_disorder_LEAD = 8 }; /* doubles before the first site of a row */
+enum { xxz_disorder_RESERVED = 7 }; /* arrays over the sites in the memory of a solver */
 enum { xxz_disorder_ROW = 3 }; /* coefficients of one flow */
 enum { xxz_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { xxz_disorder_FLOWS = 25 }; /* in a step */
@@ -74,9 +75,8 @@ static void xxz_disorder_prepare(const xxz_disorder_params *params, double h, do
 /* ---- Rows of sites ---- */
 /* Where one row is. */
 typedef struct {
-    double *const *x;    /* see xxz_disorder_solver */
-    const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    double *const *x; /* see xxz_disorder_solver */
+    ptrdiff_t length; /* sites of a row */
 } xxz_disorder_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -101,10 +101,9 @@ static inline void xxz_disorder_ends(double *row, ptrdiff_t length, ptrdiff_t fr
 }
 
 /* What kernels are told of a row. */
-static inline void xxz_disorder_locate(const xxz_disorder_solver *s, size_t index, xxz_disorder_row *row)
+static inline void xxz_disorder_locate(const xxz_disorder_solver *s, xxz_disorder_row *row)
 {
     row->x = s->x;
-    row->at = s->lines + index * xxz_disorder_LINES;
     row->length = s->length;
 }
 
@@ -125,7 +124,7 @@ typedef struct {
 static inline xxz_disorder_piece xxz_disorder_piece_of(const xxz_disorder_solver *s, size_t unit)
 {
     xxz_disorder_piece piece;
-    xxz_disorder_locate(s, 0, &piece.row);
+    xxz_disorder_locate(s, &piece.row);
     piece.from = (ptrdiff_t)unit * xxz_disorder_PIECE;
     piece.to = unit == xxz_disorder_units(s) - 1 ? s->length : piece.from + xxz_disorder_PIECE;
     return piece;
@@ -282,33 +281,18 @@ static void xxz_disorder_vector_field_row(const xxz_disorder_params *params, con
     }
 }
 
-static void xxz_disorder_put_parameter(const xxz_disorder_solver *s, double *rows, const double *values,
-    double value);
-
-/* The parameters at sites into rows. */
-static void xxz_disorder_put_parameters(xxz_disorder_solver *s, const xxz_disorder_params *params)
-{
-    xxz_disorder_put_parameter(s, s->x[3], params->B, 1.0);
-    s->params.B = NULL;
-}
-
 /* ---- The lattice ---- */
-enum {
-    xxz_disorder_STRETCH = 32, /* steps before the state is looked at: what is not finite stays so */
-    xxz_disorder_LEAD = (xxz_disorder_HALO + 7) / 8 * 8,
-    xxz_disorder_BUFFER = 256,
-    xxz_disorder_RESERVED = xxz_disorder_ARRAYS + xxz_disorder_DIM
-};
+enum { xxz_disorder_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { xxz_disorder_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
     size_t rows = 1;
-    for (int a = 0; a < xxz_disorder_AXES; ++a) {
+    for (int a = 0; a < xxz_disorder_AXES; ++a)
         if (sizes[a] < xxz_disorder_least[a] || sizes[a] % xxz_disorder_periods[a] != 0
             || sizes[a] > most / 2) return 0;
-    }
     size_t wide = xxz_disorder_LEAD + ((sizes[xxz_disorder_AXES - 1] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8
         * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
@@ -326,30 +310,31 @@ size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
     const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = xxz_disorder_RESERVED * xxz_disorder_block(rows, width);
-    return doubles * sizeof(double) + rows * xxz_disorder_LINES * sizeof(ptrdiff_t) + 64;
+    return doubles * sizeof(double) + 64;
 }
 
 /* Values of sites, the last axis fastest, into rows. */
 static void xxz_disorder_put(const xxz_disorder_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - xxz_disorder_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
-        xxz_disorder_ends(row, s->length, 0, s->length);
-    }
+    double *row = rows;
+    memset(row - xxz_disorder_LEAD, 0, (size_t)s->width * sizeof *row);
+    memcpy(row, values, (size_t)s->length * sizeof *row);
+    xxz_disorder_ends(row, s->length, 0, s->length);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void xxz_disorder_put_parameter(const xxz_disorder_solver *s, double *rows, const double *values,
     double value)
 {
-    if (values != NULL) {
-        xxz_disorder_put(s, rows, values);
-        return;
-    }
-    for (ptrdiff_t i = -xxz_disorder_LEAD; i < (ptrdiff_t)s->rows * s->width - xxz_disorder_LEAD; ++i)
-        rows[i] = value;
+    for (ptrdiff_t i = -xxz_disorder_LEAD; i < s->width - xxz_disorder_LEAD; ++i) rows[i] = value;
+    if (values != NULL) xxz_disorder_put(s, rows, values);
+}
+
+/* The parameters at sites into rows. */
+static void xxz_disorder_put_parameters(xxz_disorder_solver *s, const xxz_disorder_params *params)
+{
+    xxz_disorder_put_parameter(s, s->x[3], params->B, 1.0);
+    s->params.B = NULL;
 }
 
 /* ---- The solver ---- */
@@ -388,8 +373,6 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     s->params = own;
     double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
     const size_t block = xxz_disorder_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - xxz_disorder_LEAD + xxz_disorder_RESERVED * block);
-    s->lines[0] = 0;
     for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) s->before[k] = aligned + (xxz_disorder_ARRAYS + k) * block;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) xxz_disorder_put(s, s->x[k], x0 + k * sites);
@@ -414,15 +397,14 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
 static int xxz_disorder_all_hold(const xxz_disorder_solver *s, double *const x[xxz_disorder_DIM])
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!xxz_disorder_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        if (!xxz_disorder_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
 static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const from[xxz_disorder_DIM],
     const xxz_disorder_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
+    const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
         memcpy(to[k] - xxz_disorder_LEAD, from[k] - xxz_disorder_LEAD, block);
 }
@@ -504,9 +486,8 @@ xxz_disorder_status xxz_disorder_step(xxz_disorder_solver *s, double h)
 static void xxz_disorder_take(const xxz_disorder_solver *s, double *const fields[xxz_disorder_DIM], double *x)
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k],
+            (size_t)s->length * sizeof *x);
 }
 
 void xxz_disorder_state(const xxz_disorder_solver *s, double *x) { xxz_disorder_take(s, s->x, x); }
@@ -534,18 +515,14 @@ double xxz_disorder_hamiltonian(const xxz_disorder_solver *s)
 {
     double density[xxz_disorder_BUFFER], sum = 0.0, rest = 0.0;
     xxz_disorder_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        xxz_disorder_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += xxz_disorder_BUFFER) {
-            const ptrdiff_t to = s->length - from > xxz_disorder_BUFFER ? from + xxz_disorder_BUFFER
-                : s->length;
-            xxz_disorder_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
-                const double total = sum + density[i];
-                rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
-                    : (density[i] - total) + sum;
-                sum = total;
-            }
+    xxz_disorder_locate(s, &row);
+    for (ptrdiff_t from = 0; from < s->length; from += xxz_disorder_BUFFER) {
+        const ptrdiff_t to = s->length - from > xxz_disorder_BUFFER ? from + xxz_disorder_BUFFER : s->length;
+        xxz_disorder_energy_row(&s->params, &row, from, to, density, 0);
+        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            const double total = sum + density[i];
+            rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
+            sum = total;
         }
     }
     return sum + rest;
@@ -558,10 +535,8 @@ typedef void xxz_disorder_kernel(const xxz_disorder_params *, const xxz_disorder
 static void xxz_disorder_fill(const xxz_disorder_solver *s, xxz_disorder_kernel *kernel, double *out)
 {
     xxz_disorder_row row;
-    for (size_t r = 0; r < s->rows; ++r) {
-        xxz_disorder_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
-    }
+    xxz_disorder_locate(s, &row);
+    kernel(&s->params, &row, 0, s->length, out, s->sites);
 }
 
 void xxz_disorder_density(const xxz_disorder_solver *s, double *out)

@@ -2,7 +2,7 @@
  * xxz_disorder.h: the declarations; xxz_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7b762273b9797de4d216a73ca8d17723c99fa8857ca7a2ddd593ba2535854472
+ * body-sha256: 47b0ee3e599b8cd3a75a3cd873c00e66e8057af4e888bbff9f34649361532f59
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
@@ -42,7 +42,6 @@ typedef struct {
     ptrdiff_t length, width; /* sites of a row; doubles between the beginnings of two rows */
     /* in rows, each field, then each parameter at sites: the first site of the first row */
     double *x[xxz_disorder_ARRAYS];
-    ptrdiff_t *lines; /* of each row, where it is and where those beside it are */
     double *before[xxz_disorder_DIM]; /* the fields before the steps that are being made */
     int open; /* whether these lack the last flow of a step, which between calls x has made */
     size_t far; /* steps to be made by functions for large arguments, where there are others */

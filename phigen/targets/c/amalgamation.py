@@ -123,7 +123,7 @@ def one_stage(lines: Sequence[str]) -> list[str]:
 def _without_loops(
     lines: Sequence[str], over: re.Pattern[str], alone: Sequence[tuple[re.Pattern[str], str]]
 ) -> list[str]:
-    """The lines without loops of which but one turn is made, and with what stands for other texts where that is ``alone``."""
+    """The lines without loops of which but one turn is made, and with other texts where that one is ``alone``."""
     kept: list[str] = []
     ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
     for line in lines:

@@ -73,7 +73,7 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
     from phigen.targets.c.lattice import adjoint as lattice_adjoint
     from phigen.targets.c.lattice import layout as lattice_layout
     from phigen.targets.c.lattice import model as lattice_model
-    from phigen.targets.c.lattice.parts import sweeps
+    from phigen.targets.c.lattice.parts import parameters, sweeps
 
     assert isinstance(lanes, Rows)
     step = program.step
@@ -82,6 +82,7 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
         "declarations.h": lattice_model.declarations(program, step),
         "model.h": lattice_model.model(program, step),
         "sweeps.h": sweeps(program, step, lanes),
+        "parameters.h": parameters(program, step),
     }
     if step.adjoint:
         texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint, lanes)

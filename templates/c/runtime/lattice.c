@@ -66,52 +66,13 @@ static void phi_wait(void)
 }
 
 #endif
-enum {
-#if PHI_SERIES
-#if PHI_SLOPES
-    PHI_SIDES = 2, /* y before and after a sweep */
-#else
-    PHI_SIDES = 3, /* y before and after a sweep, and varied */
-#endif
-#else
-    PHI_STRETCH = 32,  /* steps before the state is looked at: what is not finite stays so */
+#if !PHI_SERIES
+enum { PHI_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 #if PHI_NEAR
-    PHI_FAR_STEPS = 64, /* steps by functions for large arguments, after one that needed them */
+enum { PHI_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
 #endif
 #endif
-    PHI_LEAD = (PHI_HALO + 7) / 8 * 8,
-    PHI_BUFFER = 256,
-#if PHI_SERIES
-    PHI_IMPLICIT = (PHI_SIDES /* arrays for y, its guesses and its variations */
-#if PHI_GUESSES
-        + PHI_STAGES * PHI_DIFFERENCES
-#endif
-#if PHI_BANDED
-        + 1
-#endif
-#if PHI_KRYLOV
-        + PHI_DIRECTIONS + 1
-#if PHI_SITE_BLOCKS
-        + PHI_DIM + 1
-#endif
-#endif
-        ) * PHI_DIM
-#if PHI_KRYLOV
-        + 1 /* for sums over pieces */
-#endif
-        ,
-#endif
-    PHI_RESERVED = PHI_ARRAYS + PHI_DIM
-#if PHI_COMPENSATED
-        + 2 * PHI_DIM
-#endif
-#if PHI_GATHER
-        + PHI_GATHERED
-#endif
-#if PHI_SERIES
-        + PHI_IMPLICIT
-#endif
-};
+enum { PHI_BUFFER = 256 }; /* densities that are added in one go */
 
 /* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
@@ -196,14 +157,13 @@ static void phi_put(const phi_solver *s, double *rows, const double *values)
 /* The values of a parameter at sites, or one value for all. */
 static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
 {
-    if (values != NULL) {
-        phi_put(s, rows, values);
-        return;
-    }
     for (ptrdiff_t i = -PHI_LEAD; i < (ptrdiff_t)s->rows * s->width - PHI_LEAD; ++i) rows[i] = value;
+    if (values != NULL) phi_put(s, rows, values);
 }
 
 #endif
+
+#include "parameters.h"
 #if !PHI_ONE_ROW
 /* Where a row is, and those beside it. */
 static void phi_find_lines(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])

@@ -40,12 +40,12 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept, 
     int now = 0;
     s->side = side;
     phi_predict(s, side, stage);
-    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, 1, &now);
+    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, 1, 0.0, &now);
     if (status != PHI_OK) {
         s->stiff = 1;
         now = 0;
         phi_predict(s, side, stage);
-        status = phi_newton(s, coef, HUGE_VAL, &now);
+        status = phi_middle(s, coef, 1, HUGE_VAL, &now);
     }
     s->side = NULL;
     if (status != PHI_OK) return PHI_SINGULAR;

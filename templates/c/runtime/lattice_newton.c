@@ -16,7 +16,6 @@
 
 /* ---- Newton's method where sweeps fail ---- */
 #define PHI_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
-enum { PHI_MOST_ITERATIONS = 200 };
 
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double phi_distance(const phi_solver *s, int side, double added)
@@ -47,7 +46,6 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
 #endif
     if (!isfinite(phi_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
 #endif
-    ++s->sweeps;
     return phi_relaxed(s, NULL, 1, now);
 }
 
@@ -59,18 +57,29 @@ static double phi_range(phi_solver *s, const double *coef)
     return PHI_PLAUSIBLE * phi_distance(s, 1, 1.0);
 }
 
-/* y in the middle of a stage, from the guess in s->y[0]; it is in s->y[*now]. */
-static phi_status phi_newton(phi_solver *s, const double *coef, double range, int *now)
+#define PHI_SETTLED 0x1p-55   /* what further sweeps may still change, in sizes of y */
+#define PHI_ROUNDING 0x1p-40  /* changes below this may be rounding */
+#define PHI_SLOW 0.6          /* changes that shrink by less are left to Newton's method, ... */
+enum { PHI_PATIENCE = 10 };   /* ... after so many sweeps */
+
+/* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where these have failed, by
+   corrections, and then no farther from x than in that range. It is in s->y[*now]. */
+static phi_status phi_middle(phi_solver *s, const double *coef, int far, double range, int *now)
 {
     double before = 0.0;
-    for (int iteration = 0; iteration < PHI_MOST_ITERATIONS; ++iteration) {
-        const double change = phi_corrected(s, coef, *now), shrunk = before - change;
+    for (int count = 0; count < PHI_MOST_SWEEPS; ++count) {
+        const double change = s->stiff ? phi_corrected(s, coef, *now) : phi_relaxed(s, coef, far, *now);
+        const double shrunk = before - change;
+        const phi_status failed = count == 0 && !s->stiff ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
+        ++s->sweeps;
         *now = 1 - *now;
-        if (!isfinite(change)) return PHI_NO_CONVERGENCE;
-        if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && iteration > 0))
-            return phi_distance(s, *now, 0.0) <= range ? PHI_OK : PHI_NO_CONVERGENCE;
+        if (!isfinite(change)) return failed;
+        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
+        if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && count > 0))
+            return (s->stiff ? phi_distance(s, *now, 0.0) <= range : phi_all_hold(s, s->y[*now])) ? PHI_OK : failed;
+        if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > 0x1p-30) break;
 #if PHI_BANDED
-        if (iteration > 0 && change > 0.25 * before && change > PHI_ROUNDING) s->factored = NULL;
+        if (count > 0 && change > 0.25 * before && change > PHI_ROUNDING) s->factored = NULL;
 #endif
         before = change;
     }
@@ -95,7 +104,7 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
 #endif
     const double size = sqrt(phi_product(s, side, side));
     phi_combine(s, dy, 1.0, side, 0.0, side);
-    for (int correction = 0; correction < PHI_MOST_ITERATIONS; ++correction) {
+    for (int correction = 0; correction < PHI_MOST_SWEEPS; ++correction) {
         phi_multiply(s, coef, now, dy, s->space[0]);
         phi_combine(s, s->space[0], 1.0, s->space[0], -1.0, side);
         const double left = phi_krylov(s, coef, now, dy, dy);

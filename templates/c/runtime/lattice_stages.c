@@ -84,32 +84,6 @@ static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
     return moved;
 }
 
-#define PHI_SETTLED 0x1p-55   /* what further sweeps may still change, in sizes of y */
-#define PHI_ROUNDING 0x1p-40  /* changes below this may be rounding */
-
-#define PHI_SLOW 0.6          /* changes that shrink by less are left to Newton's method, ... */
-enum { PHI_PATIENCE = 10 };   /* ... after so many sweeps */
-
-/* y in the middle of a stage, by sweeps from the guess in s->y[0] until only rounding would change; it is in s->y[*now]. */
-static phi_status phi_middle(phi_solver *s, const double *coef, int far, int *now)
-{
-    double before = 0.0;
-    for (int sweep = 0; sweep < PHI_MOST_SWEEPS; ++sweep) {
-        const double change = phi_relaxed(s, coef, far, *now), shrunk = before - change;
-        ++s->sweeps;
-        *now = 1 - *now;
-        if (!isfinite(change)) return sweep == 0 ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
-        /* what further sweeps would change, with the rate change / before; or changes shrink no more */
-        if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && sweep > 0)) {
-            if (phi_all_hold(s, s->y[*now])) return PHI_OK;
-            return sweep == 0 ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
-        }
-        if (sweep >= PHI_PATIENCE && change > PHI_SLOW * before && change > 0x1p-30) break;
-        before = change;
-    }
-    return PHI_NO_CONVERGENCE;
-}
-
 #if !PHI_GUESSES
 #define phi_predict(s, x, stage) phi_copy((s)->y[0], x, s)
 #define phi_forget(s) ((s)->stiff = 0)
@@ -220,13 +194,13 @@ static phi_status phi_stages(phi_solver *s, int far)
 #endif
         int now = 0;
         phi_predict(s, s->x, stage);
-        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, &now);
+        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, 0.0, &now);
         if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             const double range = phi_range(s, coef);
             phi_predict(s, s->x, stage);
-            status = phi_newton(s, coef, range, &now);
+            status = phi_middle(s, coef, far, range, &now);
         }
 #if PHI_TANGENT
         for (size_t k = 0; k < s->vectors && status == PHI_OK; ++k) status = phi_vary(s, coef, now, k);

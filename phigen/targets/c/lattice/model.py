@@ -8,7 +8,15 @@ from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c.kernels import function, members
-from phigen.targets.c.lattice.layout import DIRECTIONS, MOST_DIFFERENCES, MOST_REMEMBERED, bounds, layout_of, switches
+from phigen.targets.c.lattice.layout import (
+    DIRECTIONS,
+    MOST_DIFFERENCES,
+    MOST_REMEMBERED,
+    Layout,
+    bounds,
+    layout_of,
+    switches,
+)
 from phigen.targets.header import plain
 from phigen.targets.rendering import render
 
@@ -25,15 +33,10 @@ def declarations(program: Program, step: Sweeps) -> str:
     if step.equation:
         stages, has = len(program.fractions), switches(program, step, layout)
         sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
-        kept = max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // stages))
         sizes += [("DIRECTIONS", DIRECTIONS, "of a Krylov space")] if has["KRYLOV"] else []
-        sizes += [("DIFFERENCES", kept, "that a guess is extrapolated from")] if has["GUESSES"] else []
+        sizes += [("DIFFERENCES", _differences(program), "that a guess is extrapolated from")] if has["GUESSES"] else []
     if step.partners:
-        every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
-        swept = [sweep.gather for sweep in every if sweep.gather]
-        own = layout.partners
-        most = max(len(g.names) for g in (*swept, own.energy, own.field, own.varied))
-        sizes.append(("GATHERED", most, "sums over other sites that are held for each site"))
+        sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are held for each site"))
     if step.sites.at_bonds:
         sizes.append(("BOND_ARRAYS", len(step.sites.at_bonds), "parameters at bonds"))
     values = {
@@ -53,6 +56,30 @@ def declarations(program: Program, step: Sweeps) -> str:
         "bars": _bars(program, member) if step.adjoint else [],
     }
     return render("c", "lattice.h", values)
+
+
+def _differences(program: Program) -> int:
+    """Differences of the y of a stage that its guess is extrapolated from."""
+    return max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // len(program.fractions)))
+
+
+def _gathered(layout: Layout) -> int:
+    """Sums over bonds or pairs that are held for each site at once."""
+    every = [s for part in layout.step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
+    own = layout.partners
+    return max(len(g.names) for g in (*(s.gather for s in every if s.gather), own.energy, own.field, own.varied))
+
+
+def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> tuple[int, int]:
+    """Arrays over the sites in the memory of a solver, and those of them that a stage needs."""
+    own, stage = program.dimension, 0
+    if layout.step.equation:
+        stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
+        stage += len(program.fractions) * _differences(program) * has["GUESSES"]
+        stage += has["BANDED"] + (DIRECTIONS + 1 + (own + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
+        stage = stage * own + has["KRYLOV"]  # one for sums over pieces
+    fields = own + 2 * own * has["COMPENSATED"]  # before a step, and what rounding leaves out
+    return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage, stage
 
 
 def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
@@ -81,8 +108,12 @@ def model(program: Program, step: Sweeps) -> str:
     flows, several = schedule.flows, len(sites.axes) > 1
     joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
     multiples = [*schedule.multiples, *schedule.multiples[:1]]
+    has = switches(program, step, layout)
+    reserved, of_stage = _reserved(program, layout, has)
     constants = [
         ("HALO", layout.halo, "sites that are copied beside a row"),
+        ("LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"),
+        ("RESERVED", reserved, "arrays over the sites in the memory of a solver"),
         *[("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it")] * several,
         ("ROW", max(1, step.row), "coefficients of one flow"),
         ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
@@ -96,8 +127,12 @@ def model(program: Program, step: Sweeps) -> str:
         constants += [("DRAWN", drawn, "the first of the arrays of increments")]
         constants += [("PARTS", program.noise.parts, "increments of one source in a step, each of a part of it")]
     if step.equation:
+        constants += [
+            ("SIDES", 2 if layout.slopes else 3, "y before and after a sweep" + ", and varied" * (not layout.slopes))
+        ]
+        constants += [("IMPLICIT", of_stage, "of these for y, its guesses and its variations")]
         constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
-        if switches(program, step, layout)["BANDED"]:
+        if has["BANDED"]:
             constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]
             constants += [("BAND", layout.band, "diagonals beside that of the matrix of Newton's method")]
     else:
@@ -105,7 +140,7 @@ def model(program: Program, step: Sweeps) -> str:
             ("FLOWS", len(flows), "in a step"),
             ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
         ]
-    if switches(program, step, layout)["WAVES"]:
+    if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = 1 if len(sites.axes) == 1 else max(1, *far)
         constants += [("SPAN", span, "slices beside one that a flow reads: pieces of a row, or of the first axis")]
@@ -127,7 +162,7 @@ def model(program: Program, step: Sweeps) -> str:
         "least": ", ".join(map(str, sites.least)),
         "periods": ", ".join(map(str, sites.periods)),
         "several": several,
-        "ends": several or switches(program, step, layout)["BANDED"],
+        "ends": several or has["BANDED"],
         "open": ", ".join(str(int(o)) for o in sites.open),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
         "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
@@ -146,7 +181,7 @@ def model(program: Program, step: Sweeps) -> str:
         "rows": ", ".join(str(row) for _, row in flows),
         "allowed": [*_allowed(asked, arrays)],
         "stages": ", ".join(_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts)))
-        if switches(program, step, layout)["BY_HAND"]
+        if has["BY_HAND"]
         else "",
     }
     timed = step.refresh or (program.time and step.equation)

@@ -32,7 +32,7 @@ from phigen.targets.rendering import render
 
 def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     """All kernels as loops over sites, and which of them make which part of H."""
-    layout, name, member = layout_of(program, step), program.name, members(program)
+    layout = layout_of(program, step)
     found = [
         *functions.called(program, [step.equation.slope] if step.equation and not layout.slopes else ()),
         *functions.phi_lanes(program, set(rows.near)),
@@ -53,9 +53,15 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and layout.slopes else ():
         found += _of_equation(program, layout, kernel, {"": in_loops(program)})
     found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field) if k.roots]
+    return "\n".join(found)
+
+
+def parameters(program: Program, step: Sweeps) -> str:
+    """What puts parameters at sites and bonds where loops read them."""
+    layout, member = layout_of(program, step), members(program)
     sites = [p for p in program.parameters if p.at == "sites"]
     values = {
-        "NAME": name,
+        "NAME": program.name,
         "arrays": [(member[p.name], layout.arrays.index(p.name), repr(float(p.value))) for p in sites],
         "at_bonds": [
             (member[p.name], step.sites.at_bonds.index(p.name), repr(float(p.value)))
@@ -63,7 +69,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
             if p.at == "bonds"
         ],
     }
-    return "\n".join([*found, render("c", "lattice_parameters.c", values)])
+    return render("c", "lattice_parameters.c", values)
 
 
 def call_forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
