@@ -11,6 +11,7 @@ from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import loaded, prepared, run_of, with_steps
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.lattice_run import expect_no, run_lattice
+from phigen.cli.resizing import resized, sizes_option
 from phigen.cli.run_summary import described_run, finite, print_summary
 from phigen.cli.sources import (
     FIGURES,
@@ -41,6 +42,7 @@ _TABLES = (".csv", ".npz")
 @scheme_option
 @click.option("--step", metavar="H", type=float, help="Step size, instead of the run's.")
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
+@sizes_option
 @click.option("--until", metavar="T", type=float, help="The time where the run ends, by a part of a step if need be.")
 @click.option(
     "--every", metavar="DT", type=float, help="Store states at times so far apart, instead of every stride-th."
@@ -79,6 +81,7 @@ def command(
     scheme: str | None,
     step: float | None,
     steps: int | None,
+    sizes: str | None,
     until: float | None,
     every: float | None,
     at: str | None,
@@ -106,7 +109,7 @@ def command(
         from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
-    spec = load_one(spec_file)
+    spec = resized(load_one(spec_file), name, sizes)
     if spec.lattice:
         expect_no(section=section, until=until, every=every, at=at, extend=extend)
         expect_no(**{"from": source})

@@ -13,6 +13,7 @@ import click
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, expect_system, prepared
 from phigen.cli.failures import Collector
+from phigen.cli.resizing import resized, sizes_option
 from phigen.cli.sources import FIGURES, file_ending, load_all, many_specs, order_option, run_option, scheme_option
 from phigen.errors import CheckError, StepError
 from phigen.registry import loadable
@@ -31,6 +32,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @run_option
 @order_option
 @scheme_option
+@sizes_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
@@ -43,6 +45,7 @@ def command(
     name: str | None,
     order: int | None,
     scheme: str | None,
+    sizes: str | None,
     quick: bool,
     plot: Path | None,
     as_json: bool,
@@ -63,8 +66,9 @@ def command(
         require_matplotlib()
         if len(specs) > 1:
             raise click.BadParameter(f"one spec is drawn, not {len(specs)}", param_hint="--plot")
-    for spec in specs:
+    for given in specs:
         with collector.collecting():
+            spec = resized(given, name, sizes)
             if plot:
                 expect_system(spec)
             compilation = compile_proved(spec, order=order, scheme=scheme, extras=with_tangent(spec))

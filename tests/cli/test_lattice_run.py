@@ -137,3 +137,46 @@ def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_p
     refused = phigen("run", chain, "--plot", tmp_path / "chain.mp4")
     assert (refused.exit_code, "needs ffmpeg" in refused.stderr) == (2, True)
     assert "films are of lattices" in phigen("run", "pendulum", "--plot", tmp_path / "p.gif").stderr
+
+
+def test_a_run_has_other_sizes_on_request(phigen, chain, tmp_path):
+    out = tmp_path / "wave.npz"
+    told = json.loads(phigen("run", chain, "-t", "numpy", "--json", "-o", out, "--sizes", "30").stdout)
+    assert told["sizes"] == [30]
+    with np.load(out) as stored:
+        np.testing.assert_allclose(stored["x"][0, 0], np.sin(np.pi * np.arange(30) / 30))
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("3x3", "3x3 has 2 sizes; chain has one axis"),
+        ("1", "1 is too small for the stencil; sizes are at least 2"),
+        ("3,3", "'3,3' is not sizes such as 64x64"),
+        ("0", "'0' is not sizes"),
+    ],
+)
+@pytest.mark.parametrize("command", ["run", "verify"])
+def test_sizes_that_do_not_fit_are_errors_of_the_command_line(phigen, chain, command, given, said):
+    done = phigen(command, chain, "--sizes", given)
+    assert done.exit_code == 2
+    assert said in " ".join(done.stderr.split())
+
+
+def test_systems_without_sizes_say_so(phigen):
+    for name, said in (("kepler", "is no lattice"), ("chiral_magnet", "whose sites are those of its bonds")):
+        assert said in " ".join(phigen("run", name, "--sizes", "4").stderr.split())
+
+
+def test_a_run_of_other_sizes_is_not_gone_on_with(phigen, chain, tmp_path):
+    from phigen import compile
+
+    def stop(done):
+        if done > 10:
+            raise KeyboardInterrupt
+
+    kept = tmp_path / "wave.npz.checkpoint"
+    with pytest.raises(KeyboardInterrupt):
+        compile(chain, target="numpy").integrate(np.zeros((2, 12)), 0.05, 40, 10, checkpoints=kept, progress=stop)
+    asked = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume", "--sizes", "14")
+    assert "belongs to another run" in phigen(*asked).stderr
