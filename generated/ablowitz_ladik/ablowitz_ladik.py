@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 5c2dfcf564f8391a5e57e15bb5a7b6294fd53f88cfe0668e5ea042580bfd24d0
+# body-sha256: 3b89a7df6fa738b5d1bc6e066b457341867d4ee98d7454b6e8b1c90fe362ff50
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "fdcac05ca3267c8d72f9b764571bd16dc6325331ec1c10b08ff5e44d3ea449c7"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('x', 'y',)
+AXES = ("i",)
+COORDINATES = ("x", "y",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
 }

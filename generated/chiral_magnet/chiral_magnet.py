@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c9648c7b3e54035adc79aabf9b22f3acbe5b8aa988d0ee74c51f476366d963a2
+# body-sha256: 18be6e42d4c16f0a5bb452dbfac0ba1b9fdf443cd5fe5e0f83a38fa03aba5ee9
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "951098f106e3e9505e7b54f47119d35c2adcfdd59783776db46bd20c3077d190"
 DIM = 3
 ORDER = 2
-AXES = ('i',)
-COORDINATES = ('x', 'y', 'z',)
-CASIMIRS = ('C',)
+AXES = ("i",)
+COORDINATES = ("x", "y", "z",)
+CASIMIRS = ("C",)
 DEFAULT_PARAMETERS = {
     "J": 1.0,
     "D": 0.5,
@@ -133,7 +133,7 @@ class _Sites:
 
 
 # Parameters that may be arrays with a value at each bond.
-AT_BONDS = ('Dx', 'Dy',)
+AT_BONDS = ("Dx", "Dy",)
 
 
 class _Graph(_Sites):

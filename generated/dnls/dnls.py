@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 8a7daefe737e12b316a1d9a769352023733e2708f580866bbbb4d3c9119fa8be
+# body-sha256: af1dacf249e66b057bdaa4345f26f846902426f1348210f0d5974c7a50fddae5
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "5cde5645113223952e3b4a673969332fadcf80fc1a8985d29150efc71f64e2bb"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('q', 'p',)
+AXES = ("i",)
+COORDINATES = ("q", "p",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "beta": 1.0,

@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 03398776b31a40b182500e5fa34909547111cfbec5d0de7e6e5d8583cac1a2cf
+# body-sha256: c47caee59bd36d10df3ddd33d0f5ef7fff665d0555a3edd38f5e9855ca12665b
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "42d91db27e3f486cfdaf2925c387320de242ded35973e01dfa602c1731ae5ee2"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('q', 'p',)
+AXES = ("i",)
+COORDINATES = ("q", "p",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "beta": 0.72,
@@ -26,7 +26,7 @@ DEFAULT_PARAMETERS = {
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('e',)
+AT_SITES = ("e",)
 POSITIVE = ()
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.

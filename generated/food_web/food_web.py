@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 099123ecf645ad6820dd4d693cfbcef3444b5a22a5c2f92cb9064e7df93c4c36
+# body-sha256: c8a1199a3954d2e2fc66de5c00adc9d844c5e914537993c77aadb2e794581b09
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "16de8419a3297fb765426a07b8e18fed9d20fb7f25dc58b93db682eba04bd5c3"
 DIM = 1
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('x',)
+AXES = ("i",)
+COORDINATES = ("x",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "A": 1.0,
@@ -26,8 +26,8 @@ DEFAULT_PARAMETERS = {
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('k',)
-POSITIVE = ('k',)
+AT_SITES = ("k",)
+POSITIVE = ("k",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (False,)
@@ -129,7 +129,7 @@ class _Sites:
 
 
 # Parameters that may be arrays with a value at each bond.
-AT_BONDS = ('A',)
+AT_BONDS = ("A",)
 
 
 class _Graph(_Sites):

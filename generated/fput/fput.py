@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: df9b5ec1b748fabccaa61ae29773b6881a4debcc4f2aeda895d327c296bc8943
+# body-sha256: 85c1e268574c29a47187b52733328f162228af1e544d901c99e529ad4c14f9b5
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "920c8e7d73465dacb3469db42d998ea7ea21c0581ec9a57019e9692074a2c0da"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('q', 'p',)
+AXES = ("i",)
+COORDINATES = ("q", "p",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "alpha": 0.25,

@@ -10,23 +10,23 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 9ffd68b5d32efd5581aa0e7f799014e7b9980414b4b67a30551fecde63b186f3
+# body-sha256: 9718f0fffb47d030d27f2785119359895acaac9e92229e0f167fddbfc6bc543a
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "db9e76c21c97df18ba40343805d35a8a7c249010c0d791ca8dab69a55383c332"
 DIM = 3
 ORDER = 2
-AXES = ('i', 'j', 'k',)
-COORDINATES = ('x', 'y', 'z',)
-CASIMIRS = ('C',)
+AXES = ("i", "j", "k",)
+COORDINATES = ("x", "y", "z",)
+CASIMIRS = ("C",)
 DEFAULT_PARAMETERS = {
     "J": 1.0,
     "B": 0.2,
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('B',)
+AT_SITES = ("B",)
 POSITIVE = ()
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.

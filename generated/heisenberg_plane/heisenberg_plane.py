@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 0d48e9d941578fdf015c38724126b92b3ab7f22c03135b7e0f40ff3fc0133245
+# body-sha256: 6c5f32916b331c6f8a2112c674d38f9a58aa316a7d4362ae7237e53e5564f8e5
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "b4d9835fedde5fe8efc99c52b6d75d2aea230d5d018b706b644d6c59a4034bd1"
 DIM = 3
 ORDER = 4
-AXES = ('i', 'j',)
-COORDINATES = ('x', 'y', 'z',)
-CASIMIRS = ('C',)
+AXES = ("i", "j",)
+COORDINATES = ("x", "y", "z",)
+CASIMIRS = ("C",)
 DEFAULT_PARAMETERS = {
     "J": 1.0,
     "delta": 0.9,

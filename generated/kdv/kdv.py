@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: b002ef47deb45ff603d92bc2e11adf6d720d0f8168c935365854109fc38c1c34
+# body-sha256: 990247718073adce04015ac34bea41b5e6ea7dd1bde81f7b50cf5882c968a8e7
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "32cf81a7dcc830b212362da02129fd35222f755f500facee761ebba58d437add"
 DIM = 1
 ORDER = 2
-AXES = ('i',)
-COORDINATES = ('u',)
-CASIMIRS = ('mass',)
+AXES = ("i",)
+COORDINATES = ("u",)
+CASIMIRS = ("mass",)
 DEFAULT_PARAMETERS = {
     "delta": 0.022,
     "d": 0.015625,
@@ -27,7 +27,7 @@ DEFAULT_PARAMETERS = {
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
 AT_SITES = ()
-POSITIVE = ('d',)
+POSITIVE = ("d",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (False,)

@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 2f0a0e5305524d8598a11cd78dd3f94167de328f8797fdb12c6844944fed55f5
+# body-sha256: 69df183689045e2e35e8672d9d120ac0d9eedffbc54f277d7e74e10a6eb662c8
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "7112ca265099ca014624ad4b2296070ddc860c26540d0b80acc378e27176e991"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('q', 'p',)
+AXES = ("i",)
+COORDINATES = ("q", "p",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "d": 0.2,
@@ -26,7 +26,7 @@ DEFAULT_PARAMETERS = {
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
 AT_SITES = ()
-POSITIVE = ('d',)
+POSITIVE = ("d",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (False,)

@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 4520c6041cf713c0c7e3d79345e62174d6ba00d7b45eec2d93bfc59e6da7f607
+# body-sha256: dfdd2375b8b5ca242eeda3d7d64e5895472a63e88841117a2ef426d60e069086
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "f0c49779027b870cd3b3bcb19eb5389ff368b584889beabb43e7fb7cd9590295"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('u', 'v',)
-CASIMIRS = ('elongation', 'momentum',)
+AXES = ("i",)
+COORDINATES = ("u", "v",)
+CASIMIRS = ("elongation", "momentum",)
 DEFAULT_PARAMETERS = {
     "beta": 1.0,
     "d": 0.1,
@@ -27,7 +27,7 @@ DEFAULT_PARAMETERS = {
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
 AT_SITES = ()
-POSITIVE = ('d',)
+POSITIVE = ("d",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (False,)

@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: f0f1bed53711802f8039b9b87d0a6cd05d029fb29dcc285e3f4e6ce3caf2113c
+# body-sha256: 1add6c7b9a4f3350ad514a6446bdd65ba5f40e229ef384e8dc1bce9d051d54b3
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "4872d6ba15e2cf42961dec733b70ccb6eb8874221d7c80170561b402f7c63524"
 DIM = 6
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('x', 'y', 'z', 'px', 'py', 'pz',)
+AXES = ("i",)
+COORDINATES = ("x", "y", "z", "px", "py", "pz",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "G": 0.000295912208286,
@@ -26,8 +26,8 @@ DEFAULT_PARAMETERS = {
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('m',)
-POSITIVE = ('m',)
+AT_SITES = ("m",)
+POSITIVE = ("m",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (False,)

@@ -11,22 +11,22 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 1bf2b45ee242313c5f203f09d2f609aed8777eeb322098f4876c904f9fec4126
+# body-sha256: 57f8c82ff0a0732b9acb33304321161fa35e9074456bf31ac78c6993c41b44c0
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "804a59fbd6a75ce4716246b77b3269259aad5901c7b5e0f87e175f5913fb28ec"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('x', 'y',)
+AXES = ("i",)
+COORDINATES = ("x", "y",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "G": 1.0,
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('G',)
+AT_SITES = ("G",)
 POSITIVE = ()
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.

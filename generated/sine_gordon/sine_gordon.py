@@ -10,15 +10,15 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 64feaa56da5c3c7f7c49cc70347e6f50fa896d49d678cb973ce10e7f2da912e6
+# body-sha256: 40eb15f225d5c5ff07e313d7ad18472005933a52de184ab69bff4ff69bbfd371
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "bbdf381e8130e0006aabbc4d0520ecb9190dd9410337e3a09499570017526a61"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('q', 'p',)
+AXES = ("i",)
+COORDINATES = ("q", "p",)
 CASIMIRS = ()
 DEFAULT_PARAMETERS = {
     "d": 0.25,
@@ -26,7 +26,7 @@ DEFAULT_PARAMETERS = {
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
 AT_SITES = ()
-POSITIVE = ('d',)
+POSITIVE = ("d",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (False,)

@@ -14,16 +14,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 556693f807060a4c9c1dfb0f7064c0c43d4f238d0e775a874a89818d9145f847
+# body-sha256: 11fb24d3438187e25cf1b60aad2b7995e20db9339f2a77fc9b8ed4303459a8d2
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "748117241853e75caf7a5478eb51e46695d29311bb8a01069042f022c6a72ad3"
 DIM = 3
 ORDER = 2
-AXES = ('i',)
-COORDINATES = ('x', 'y', 'z',)
-CASIMIRS = ('C',)
+AXES = ("i",)
+COORDINATES = ("x", "y", "z",)
+CASIMIRS = ("C",)
 DEFAULT_PARAMETERS = {
     "J": 1.0,
     "lambda": 0.2,
@@ -31,8 +31,8 @@ DEFAULT_PARAMETERS = {
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('T',)
-POSITIVE = ('lambda', 'T',)
+AT_SITES = ("T",)
+POSITIVE = ("lambda", "T",)
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.
 OPEN = (True,)
@@ -137,7 +137,7 @@ class _Sites:
 
 # The sources of noise of a site; the increments that each has in a step, of a part of it; where normal variates are cut off,
 # so that no rare one makes a step impossible.
-SOURCES = ('bath_x', 'bath_y', 'bath_z',)
+SOURCES = ("bath_x", "bath_y", "bath_z",)
 PARTS_OF_NOISE = 2
 BOUND = 6.0
 

@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3778d4997da47f44f16cda424894c6c46f57244995d3d098254ab4153a29deba
+# body-sha256: 34b9dbf54e2c974510197c644e29d19d4b17634b65aef3e066ff218debb5822d
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402"
 DIM = 2
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('a', 'b',)
-CASIMIRS = ('momentum', 'length',)
+AXES = ("i",)
+COORDINATES = ("a", "b",)
+CASIMIRS = ("momentum", "length",)
 DEFAULT_PARAMETERS = {
 }
 

@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3cc6e44b045bb1609da03d69725dc33f5e377b7b3208a39bf5b003a818ed6ff4
+# body-sha256: 4b7216246a02ade653d91b425627e4e6f9d9ca4217c2a49168ccff35a654a1ba
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "c5b173d647010b0d2f2acd87d0dc22593f2b1c1fbce2fb51bb44ed0467462b1a"
 DIM = 1
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('a',)
-CASIMIRS = ('product',)
+AXES = ("i",)
+COORDINATES = ("a",)
+CASIMIRS = ("product",)
 DEFAULT_PARAMETERS = {
 }
 

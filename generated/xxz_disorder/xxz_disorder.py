@@ -10,16 +10,16 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 6601122bc131f92fe308c4b9cd278529aa15294859c8b0724e29f134632c0c9c
+# body-sha256: 003463b30f5392534eed93a9d31d98aa5683aa94efd8b72a67eb4da1a830ed6f
 import numpy as np
 
 VERSION = "0.1.0"
 SPEC_SHA256 = "57aba2c6c3ad4f3008d97959f0a4311ced73e77cf7bc96f76a9bd9865ce837b8"
 DIM = 3
 ORDER = 4
-AXES = ('i',)
-COORDINATES = ('x', 'y', 'z',)
-CASIMIRS = ('C',)
+AXES = ("i",)
+COORDINATES = ("x", "y", "z",)
+CASIMIRS = ("C",)
 DEFAULT_PARAMETERS = {
     "J": 1.0,
     "delta": 1.3,
@@ -27,7 +27,7 @@ DEFAULT_PARAMETERS = {
 }
 
 # Parameters that may be arrays with a value at each site, and those that have to be positive.
-AT_SITES = ('B',)
+AT_SITES = ("B",)
 POSITIVE = ()
 
 # Along each axis: whether the ends are open, the smallest size, what sizes are multiples of.

@@ -6,9 +6,9 @@ import hashlib
 import re
 import textwrap
 import unicodedata
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
-from phigen.scheme.program import Program
+from phigen.scheme.program import BOUND, Program
 
 CHECKSUM = "body-sha256:"
 
@@ -47,6 +47,27 @@ def header_lines(program: Program, command: str) -> list[str]:
 
 def _kind(program: Program) -> str:
     return "An integrator on the leaves, with forces," if program.forced else "A Poisson Hamiltonian integrator"
+
+
+def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Callable[[str], str]) -> dict[str, object]:
+    """What a module states of its system: ``listed`` writes a sequence, ``key`` the name of a parameter."""
+    noise = program.noise
+    return {
+        "name": program.name,
+        "n": program.dimension,
+        "order": program.order,
+        "version": program.version,
+        "sha256": program.about.spec_sha256,
+        "coordinates": listed(program.coordinates),
+        "casimirs": listed(program.casimirs),
+        "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
+        "positive": listed([p.name for p in program.parameters if p.positive]),
+        "noise": noise is not None,
+        "sources": listed(noise.sources) if noise else "",
+        "parts": noise.parts if noise else 0,
+        "draws": noise.draws if noise else 0,
+        "bound": repr(BOUND),
+    }
 
 
 def sealed(lines: Sequence[str], body: str, mark: str = " * ", begin: str = "/*\n", end: str = " */\n") -> str:

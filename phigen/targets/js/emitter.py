@@ -10,11 +10,11 @@ from dataclasses import replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
-from phigen.scheme.program import BOUND, Attitude, Program
+from phigen.scheme.program import Attitude, Program
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import special
 from phigen.targets.features import switches
-from phigen.targets.header import header_lines, sealed
+from phigen.targets.header import facts, header_lines, sealed
 from phigen.targets.js.functions import definitions
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
@@ -88,25 +88,12 @@ def _model(program: Program) -> str:
 
 
 def _system(program: Program) -> Mapping[str, object]:
-    parameters = program.parameters
     return {
         "contents": [f" * {part}".rstrip() for line in _contents(program) for part in textwrap.wrap(line, 100) or [""]],
-        "name": program.name,
-        "version": program.version,
-        "sha256": program.about.spec_sha256,
-        "dimension": program.dimension,
-        "order": program.order,
-        "coordinates": json.dumps(program.coordinates),
-        "casimirs": json.dumps(program.casimirs),
-        "properties": properties(parameters),
-        "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in parameters],
-        "positive": json.dumps([p.name for p in parameters if p.positive]),
+        **facts(program, json.dumps, key),
+        "properties": properties(program.parameters),
         "gauge": json.dumps(program.held) if program.held else "",
         "monitored": program.monitor is not None,
-        "sources": json.dumps(program.noise.sources) if program.noise else "",
-        "parts": program.noise.parts if program.noise else 0,
-        "draws": program.noise.draws if program.noise else 0,
-        "bound": json.dumps(BOUND),
         "attitude": render("js", "attitude.mjs", _sizes(program.attitude)) if program.attitude else "",
         "fractions": json.dumps(program.fractions),
         "table": render("js", "table.mjs", _table(program)).strip("\n"),

@@ -7,11 +7,12 @@ import re
 from collections.abc import Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.program import BOUND, Program
+from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol, kind_of
 from phigen.targets.code import lower
 from phigen.targets.features import switches
+from phigen.targets.header import facts
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.names import Scope
 from phigen.targets.rendering import render
@@ -63,24 +64,13 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
     """What users see."""
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
-        "name": program.name,
-        "version": program.version,
-        "sha256": program.about.spec_sha256,
-        "dimension": program.dimension,
-        "order": program.order,
+        **facts(program, json.dumps, key),
         "axes": json.dumps(step.sites.axes),
-        "coordinates": json.dumps(program.coordinates),
-        "casimirs": json.dumps(program.casimirs),
         "kinds": json.dumps(step.casimir_kinds),
         "properties": properties(program.parameters),
-        "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
-        "positive": json.dumps([p.name for p in program.parameters if p.positive]),
         "at_sites": json.dumps(step.sites.parameters),
         "at_bonds": json.dumps(step.sites.at_bonds),
         "graph": _partners(step).graph,
-        "sources": json.dumps(program.noise.sources) if program.noise else "",
-        "parts": program.noise.parts if program.noise else 0,
-        "bound": json.dumps(BOUND),
     }
 
 

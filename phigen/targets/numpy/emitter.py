@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from phigen.scheme.kernel import SCALARS, Kernel, Output
 from phigen.scheme.path import Recurrences
-from phigen.scheme.program import BOUND, Attitude, Program
+from phigen.scheme.program import Attitude, Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import (
     LONGEST_PATH,
@@ -29,9 +29,9 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
-from phigen.targets.header import header_lines, plain, sealed, sentence
+from phigen.targets.header import facts, header_lines, plain, sealed, sentence
 from phigen.targets.names import Scope
-from phigen.targets.numpy.language import LANGUAGE
+from phigen.targets.numpy.language import LANGUAGE, listed, quoted
 from phigen.targets.path import TERMS, Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
@@ -159,8 +159,8 @@ def _monitor(program: Program) -> list[str]:
 def _splitting_values(step: Splitting) -> dict[str, object]:
     schedule, numbers = step.schedule, range(1, len(step.flows) + 1)
     return {
-        "times": "(" + "".join(f"{t!r}, " for t in schedule.times).rstrip() + ")",
-        "multiples": "(" + "".join(f"{m!r}, " for m in schedule.multiples).rstrip() + ")",
+        "times": listed(schedule.times),
+        "multiples": listed(schedule.multiples),
         "row": step.row,
         "schedule": repr(tuple(schedule.flows)),
         "flows": ", ".join(f"_flow{k}" for k in numbers),
@@ -311,15 +311,8 @@ def _values(program: Program) -> dict[str, object]:
     inner = step.inner if isinstance(step, Implicit) else InnerSolve()
     return {
         "title": plain(program.about.title) or program.name,
-        "n": program.dimension,
-        "order": program.order,
-        "version": program.version,
-        "sha256": program.about.spec_sha256,
-        "coordinates": _strings(program.coordinates),
-        "casimirs": _strings(program.casimirs),
-        "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
-        "positive": _strings([p.name for p in program.parameters if p.positive]),
-        "gauge": _strings(program.held),
+        **facts(program, listed, quoted),
+        "gauge": listed(program.held),
         "monitored": program.monitor is not None,
         "said_of_tau": _OF_TAU * bool(program.monitor),
         "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
@@ -339,11 +332,9 @@ def _values(program: Program) -> dict[str, object]:
         "said_of_each": "h, t0 and parameters" if program.time else "h and parameters",
         "renewed": step.renewed,
         "prepared": step.prepared,
-        "moments": "(" + "".join(f"{m!r}, " for m in step.schedule.moments).rstrip() + ")"
-        if isinstance(step, Splitting) and step.refresh
-        else "",
-        "middles": "(" + "".join(f"{m!r}, " for m in program.midpoints).rstrip() + ")",
-        "fractions": "(" + "".join(f"{f!r}, " for f in program.fractions).rstrip() + ")",
+        "moments": listed(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
+        "middles": listed(program.midpoints),
+        "fractions": listed(program.fractions),
         "terms": TERMS,
         "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
         "max_iterations": inner.max_iterations,
@@ -362,10 +353,6 @@ def _noise_values(program: Program) -> dict[str, object]:
     first += ["_drawing(float(h), len(x), seed, member, step0, increments)(0)"] if noise else []
     named = ("seed", "member", "step0", "increments")
     return {
-        "noise": noise is not None,
-        "sources": _strings(noise.sources) if noise else "",
-        "noise_parts": noise.parts if noise else 0,
-        "bound": repr(BOUND),
         "noise_given": ", seed=0, member=0, step0=0, increments=None" * bool(noise),
         "noise_passed": "".join(f", {name}={name}" for name in named) * bool(noise),
         "said_of_noise": _NOISE_ARGUMENTS * bool(noise),
@@ -373,10 +360,6 @@ def _noise_values(program: Program) -> dict[str, object]:
         "stages_now": f"[_renewed({now}) for s in stages]" if renewed else "stages",
         "renewed_stage": f"            stage = _renewed({', '.join(['stage', *first])})\n" if renewed else "",
     }
-
-
-def _strings(names: Sequence[str]) -> str:
-    return "(" + "".join(f'"{n}", ' for n in names).rstrip() + ")"
 
 
 def _function(program: Program, kernel: Kernel) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from phigen.symbolic import functions as elementary
 from phigen.targets.language import Language
 from phigen.targets.reserved import PYTHON_RESERVED
@@ -16,3 +18,13 @@ LANGUAGE = Language(
     subscript="{array}[..., {index}]",
     parameter='parameters["{name}"]',
 )
+
+
+def listed(items: Iterable[object]) -> str:
+    """A tuple."""
+    return "(" + "".join(f"{quoted(i) if isinstance(i, str) else repr(i)}, " for i in items).rstrip() + ")"
+
+
+def quoted(name: str) -> str:
+    """A name as a string."""
+    return f'"{name}"'

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.program import BOUND, Program
+from phigen.scheme.program import Program
 from phigen.scheme.steps import VARIED, Gather, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets import special
 from phigen.targets.code import Code, lower
+from phigen.targets.header import facts
 from phigen.targets.names import Scope
 from phigen.targets.numpy import lattice_adjoint
-from phigen.targets.numpy.language import LANGUAGE
+from phigen.targets.numpy.language import LANGUAGE, listed, quoted
 from phigen.targets.numpy.lattice_adjoint import chosen
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
@@ -29,35 +30,24 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     """The text of the module; ``prepare`` are the functions that compute coefficients."""
     sites, schedule = step.sites, step.schedule
     values = {
-        "version": program.version,
-        "sha256": program.about.spec_sha256,
-        "n": program.dimension,
-        "order": program.order,
-        "axes": _tuple(map(repr, sites.axes)),
-        "coordinates": _tuple(map(repr, program.coordinates)),
-        "casimirs": _tuple(map(repr, program.casimirs)),
-        "defaults": [f'"{p.name}": {float(p.value)!r}' for p in program.parameters],
-        "at_sites": _tuple(map(repr, sites.parameters)),
-        "positive": _tuple(repr(p.name) for p in program.parameters if p.positive),
-        "open": _tuple(map(repr, sites.open)),
-        "least": _tuple(map(repr, sites.least)),
-        "periods": _tuple(map(repr, sites.periods)),
+        **facts(program, listed, quoted),
+        "axes": listed(sites.axes),
+        "at_sites": listed(sites.parameters),
+        "open": listed(sites.open),
+        "least": listed(sites.least),
+        "periods": listed(sites.periods),
         "colours": sites.colours,
-        "colour_weights": _tuple(map(repr, sites.weights)),
-        "times": _tuple(map(repr, schedule.times)),
-        "multiples": _tuple(map(repr, schedule.multiples)),
+        "colour_weights": listed(sites.weights),
+        "times": listed(schedule.times),
+        "multiples": listed(schedule.multiples),
         "schedule": repr(tuple(schedule.flows)),
         "time": program.time,
         "renewed": step.refresh is not None,
         "row": step.row,
         "prepared": step.prepared,
-        "noise": program.noise is not None,
-        "sources": _tuple(map(repr, program.noise.sources)) if program.noise else "",
-        "noise_parts": program.noise.parts if program.noise else 0,
-        "bound": BOUND,
-        "moments": _tuple(map(repr, program.midpoints if step.equation else schedule.moments)),
+        "moments": listed(program.midpoints if step.equation else schedule.moments),
         "kicks": bool(schedule.multiples),
-        "at_bonds": _tuple(map(repr, sites.at_bonds)),
+        "at_bonds": listed(sites.at_bonds),
         "by_colour": repr(step.by_colour),
         "tangent": program.extras.tangent,
         "split": step.equation is None,
@@ -104,10 +94,6 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     seen = program.observables
     pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
-
-
-def _tuple(items: Iterable[str]) -> str:
-    return "(" + "".join(f"{i}, " for i in items).rstrip() + ")"
 
 
 def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]]) -> str:
