@@ -1,15 +1,16 @@
-"""A kernel as lines of assignments, with names chosen: what C and NumPy printing share."""
+"""A kernel as lines of assignments, with names chosen: what all printing shares."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import SCALARS, Kernel
 from phigen.scheme.lowering import Assignment, assign, expand_powers
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
 from phigen.symbolic.symbols import WORK, Symbol
+from phigen.targets.names import Scope
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,34 @@ def lower(kernel: Kernel) -> Code:
     stores = tuple(Store(a, i, t) for (a, i), t in zip(places, trees, strict=True))
     nodes = topological(expanded[: len(roots)])
     return Code(tuple(assignments), stores, frozenset(e.value for e in nodes if e.op == "symbol"))
+
+
+def bound(
+    kernel: Kernel,
+    code: Code,
+    scope: Scope,
+    parameter: Callable[[str], str],
+    entry: Callable[[str, int, str], str],
+    *,
+    named: bool,
+) -> list[tuple[str, str]]:
+    """Call the inputs that are used what they are; the names of those that get one, with what they stand for.
+
+    ``parameter`` is a parameter by its name, ``entry`` one of an array, or a number, by argument, place and symbol.
+    Entries that are symbols of phigen's own are read where they are, and parameters unless they are ``named``.
+    """
+    names = []
+    for argument, symbols in kernel.inputs.items():
+        for i, s in enumerate(symbols):
+            if s not in code.used:
+                continue
+            place = parameter(s) if argument == "params" else entry(argument, i, s)
+            own = named if argument == "params" else not (argument in SCALARS or isinstance(s, Symbol))
+            if own:
+                names.append((scope[s], place))
+            else:
+                scope.bind(s, place)
+    return names
 
 
 #: Entries of an array that are zero whatever the arguments, from which on it is cleared first.

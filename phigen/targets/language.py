@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from phigen.scheme.kernel import SCALARS, Kernel
-from phigen.symbolic.symbols import Symbol
-from phigen.targets.code import lower, with_zeros_first
+from phigen.targets.code import bound, lower, with_zeros_first
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
@@ -46,19 +45,13 @@ class Language:
         """The body of a kernel: its arguments are called as ``arrays`` says, entries are read and stored."""
         code = with_zeros_first(lower(kernel)) if self.clear else lower(kernel)
         taken = [*arrays.values(), *self.functions.values()]
-        scope, lines = Scope(self.reserved | taken), list[str]()
-        for argument, symbols in kernel.inputs.items():
-            for i, s in enumerate(symbols):
-                if s not in code.used:
-                    continue
-                if argument == "params":
-                    scope.bind(s, self.parameter.format(name=s))
-                elif argument in SCALARS:
-                    scope.bind(s, arrays[argument])
-                elif isinstance(s, Symbol):
-                    scope.bind(s, self.entry(arrays[argument], i))
-                else:
-                    lines.append(self.declare.format(name=scope[s], value=self.entry(arrays[argument], i)))
+        scope = Scope(self.reserved | taken)
+
+        def entry(argument: str, i: int, s: str) -> str:
+            return arrays[argument] if argument in SCALARS else self.entry(arrays[argument], i)
+
+        named = bound(kernel, code, scope, lambda s: self.parameter.format(name=s), entry, named=False)
+        lines = [self.declare.format(name=name, value=place) for name, place in named]
         show = self.printer(scope)
         lines += [self.declare.format(name=scope[a.target], value=show(a.value)) for a in code.assignments]
         lines += [self.clear.format(array=arrays[array], size=size) for array, size in code.cleared]

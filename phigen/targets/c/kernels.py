@@ -14,7 +14,7 @@ from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import Expression, topological
 from phigen.symbolic.symbols import TEMPORARY, WORK, Symbol, kind_of
 from phigen.targets.c.layout import comment
-from phigen.targets.code import Code, Store, lower, parts, with_zeros_first
+from phigen.targets.code import Code, Store, bound, lower, parts, with_zeros_first
 from phigen.targets.header import plain, sentence
 from phigen.targets.language import Language
 from phigen.targets.names import Scope, identifiers
@@ -208,23 +208,17 @@ def _default_parameters(program: Program, kernel: Kernel, form: Form) -> list[st
 
 
 def _bound(program: Program, kernel: Kernel, form: Form, code: Code, scope: Scope) -> list[str]:
-    """Binds the inputs that are used to what they are called; the declarations of those that get a name."""
-    member, declared = members(program), []
-    for array, symbols in kernel.inputs.items():
-        for i, s in enumerate(symbols):
-            if s not in code.used:
-                continue
-            if array in SCALARS:
-                scope.bind(s, array)
-            elif array == "params" and not form.exported:
-                scope.bind(s, f"params->{member[s]}")
-            elif array == "params":  # all is read before anything is written: arguments of the API may overlap
-                declared.append(f"{scope[s]} = params->{member[s]}")
-            elif isinstance(s, Symbol):
-                scope.bind(s, f"{array}[{i}]{form.lane(array)}")
-            else:
-                declared.append(f"{scope[s]} = {array}[{i}]{form.lane(array)}")
-    return declared
+    """Binds the inputs that are used to what they are called; the declarations of those that get a name.
+
+    Of functions of the API all is read before anything is written: their arguments may overlap.
+    """
+    member = members(program)
+
+    def entry(array: str, i: int, s: str) -> str:
+        return array if array in SCALARS else f"{array}[{i}]{form.lane(array)}"
+
+    named = bound(kernel, code, scope, lambda s: f"params->{member[s]}", entry, named=form.exported)
+    return [f"{name} = {place}" for name, place in named]
 
 
 def _statements(

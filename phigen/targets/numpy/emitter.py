@@ -28,7 +28,7 @@ from phigen.scheme.steps import (
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets import special
-from phigen.targets.code import Code, lower
+from phigen.targets.code import Code, bound, lower
 from phigen.targets.header import facts, header_lines, plain, sealed, sentence
 from phigen.targets.names import Scope
 from phigen.targets.numpy.language import LANGUAGE, listed, quoted
@@ -381,20 +381,11 @@ def _docstring(text: str) -> list[str]:
 
 
 def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:
-    lines = []
-    for array, symbols in kernel.inputs.items():
-        for i, s in enumerate(symbols):
-            if s not in code.used:
-                continue
-            if array in SCALARS:
-                scope.bind(s, array)
-            elif array == "params":
-                lines.append(f'    {scope[s]} = parameters["{s}"]')
-            elif isinstance(s, Symbol):
-                scope.bind(s, f"{array}[{i}]")
-            else:
-                lines.append(f"    {scope[s]} = {array}[..., {i}]")
-    return lines
+    def entry(array: str, i: int, s: str) -> str:
+        return array if array in SCALARS else f"{array}[{i}]" if isinstance(s, Symbol) else f"{array}[..., {i}]"
+
+    named = bound(kernel, code, scope, lambda s: f'parameters["{s}"]', entry, named=True)
+    return [f"    {name} = {place}" for name, place in named]
 
 
 def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> str:
