@@ -10,6 +10,7 @@ from support import BODY, TARGETS, compile_text, compiled, setting, slow_but, so
 from phigen import solve_ivp
 from phigen.errors import StepError
 from phigen.runtime.crossings import CrossingFinder, root
+from phigen.runtime.ending import where_zero
 
 pytestmark = pytest.mark.corpus
 
@@ -75,6 +76,7 @@ poisson: {canonical: {q: [x, y], p: [u, v]}}
 hamiltonian: (u**2 + v**2)/2 - 1/sqrt(x**2 + y**2)
 runs: {r: {initial: [0.5, 0, 0, 1.7], step: 0.1, steps: 1}}
 """
+TORQUE = "forces: {vector: {x3: 0.1 - x3/20}}\n"
 #: The other kinds of step, with where they start and the coordinate that passes through 0.3.
 KINDS = {
     "composed": (f"{BODY}order: 4\ncomposition: triple-jump\n", [2, 4, 0.8], 1),
@@ -84,20 +86,23 @@ KINDS = {
     "monitor": (f"{BODY}monitor: 1/(1 + x1**2/20)\norder: 2\n", [2, 4, 0.8], 1),
     "log": (f"{KEPLER}monitor: log\norder: 4\nscheme: splitting\n", [0.5, 0, 0, 1.7], 1),
     "forces": (f"{BODY}damping: 0.01\norder: 2\n", [2, 4, 0.8], 1),
+    "vector forces, split": (f"{BODY}scheme: splitting\norder: 4\n{TORQUE}", [2, 4, 0.8], 1),
     "attitude": (f"{BODY}reconstruct: quaternion\norder: 2\n", [2, 4, 0.8], 1),
+    "attitude, split": (f"{BODY}reconstruct: quaternion\nscheme: splitting\norder: 4\n", [2, 4, 0.8], 1),
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind):
-    """Within the step in which its sign changes, to round-off; and a terminal event is the first of the section."""
+@pytest.mark.parametrize(("kind", "target"), slow_but(product(KINDS, ["numpy"]), product(KINDS, TARGETS)))
+def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind, target):
+    """Within the step in which its sign changes, to round-off; and a terminal event is the first of the section, as the
+    end of a run by ``stop`` is, with the attitude there."""
     text, start, i = KINDS[kind]
     drift = 0.01 * kind.startswith("time")
 
     def g(x, t=0.0):
         return x[..., i] - 0.3 - drift * t
 
-    it = solver(compile_text(text), "numpy")
+    it = solver(compile_text(text), target)
     rows, section = it.integrate(start, 0.1, 60), it.section(start, 0.1, 60, g, direction="both")
     values = g(rows.x, rows.t)
     before = np.flatnonzero(values[:-1] * values[1:] < 0)
@@ -112,6 +117,14 @@ def test_every_kind_of_step_is_cut_and_ends_where_a_function_vanishes(kind):
     ended = solve_ivp(it, (0, rows.t[-1]), start, h=0.1, events=event)
     assert ended.t[-1] == pytest.approx(section.t[0], rel=1e-14)
     assert np.max(np.abs(ended.y[:, -1] - section.x[0])) < 1e-13
+    begun = it.backend.start(np.array(start, float), it.interface.parameters)
+    end = where_zero(begun, 0.1, 60, g, 0.0, timed=bool(it.interface.time))
+    there, at = end.finish(begun)
+    assert np.max(np.abs(there.state() - section.x[0])) < 1e-13
+    if it.interface.attitude:
+        cut = it.integrate(start, 0.1, until=float(section.t[0]))
+        assert at * 0.1 == pytest.approx(section.t[0], rel=1e-14)
+        assert np.max(np.abs(there.element() - cut.attitude[-1])) < 1e-13
 
 
 def test_a_step_in_a_block_of_its_own_changes_nothing():
