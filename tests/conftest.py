@@ -5,6 +5,7 @@ import re
 import signal
 
 import pytest
+from hypothesis import settings
 from systems import NAMES, QUICK
 from tools import WARNINGS, not_tested
 
@@ -21,6 +22,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    settings.register_profile("phigen", max_examples=400 if config.option.all else 130, deadline=None)
+    settings.load_profile("phigen")
     # What is compiled is kept for the tests that follow: there is much to go through, and little of it is garbage.
     gc.set_threshold(200_000, 20, 100)
     if hasattr(config, "workerinput"):

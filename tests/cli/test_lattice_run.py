@@ -84,8 +84,8 @@ def test_a_page_shows_the_cell_and_a_run_over_space_and_time(phigen, chain, tmp_
     ("wrong", "said"),
     [
         (lambda x, h: x * (1 + 1e-6 * h), "tangent map against differences on 3 sites"),
-        (lambda x, h: x + 1e-3 * h**2 * x[::-1], "observed order"),
-        (lambda x, h: x + 1e-12, "reversibility"),
+        pytest.param(lambda x, h: x + 1e-3 * h**2 * x[::-1], "observed order", marks=pytest.mark.slow),
+        pytest.param(lambda x, h: x + 1e-12, "reversibility", marks=pytest.mark.slow),
     ],
 )
 def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, said):

@@ -151,7 +151,10 @@ def observed_order(compilation, x0):
 
 @pytest.mark.parametrize(
     ("build", "right", "wrong", "x0"),
-    [(species, 1, -1, [0.3, 0.9, 0.6]), (body, 2, 4, [0.7, -1.1, 0.9])],
+    [
+        pytest.param(species, 1, -1, [0.3, 0.9, 0.6], marks=pytest.mark.slow),
+        (body, 2, 4, [0.7, -1.1, 0.9]),
+    ],
     ids=["the sign of the paper", "the Cayley transform of the paper"],
 )
 def test_misprints_of_the_paper_are_no_bi_realisations(build, right, wrong, x0):

@@ -248,7 +248,7 @@ def test_results_do_not_depend_on_threads(tmp_path):
 # --- orders
 
 
-@pytest.mark.parametrize("kind", SYSTEMS)
+@pytest.mark.parametrize("kind", slow_but(["thermal", "path"], SYSTEMS))
 def test_the_strong_order_is_reached(kind):
     _, start, stated = SYSTEMS[kind]
     found = strong_order(

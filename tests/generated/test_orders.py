@@ -47,7 +47,7 @@ SYMMETRIC = {
     "rigid body by exponential": (BODY + "birealisation: exponential\n", [0.7, -1.1, 0.9], 6.0),
     "Lotka–Volterra": (SPECIES, [0.3, 0.9, 0.6], 3.0),
 }
-QUICK_SYMMETRIC = [*zip(2 * list(SYMMETRIC), [2, 4, 6, 8, 10, 12], strict=True)]
+QUICK_SYMMETRIC = [*zip(2 * list(SYMMETRIC), [2, 4, 6, 8, 10, 12], strict=True)][:-1]
 
 
 @pytest.mark.parametrize(("name", "order"), slow_but(QUICK_SYMMETRIC, product(SYMMETRIC, [2, 4, 6, 8, 10, 12])))

@@ -221,7 +221,7 @@ def test_steps_of_the_series_are_those_of_the_ordinary_system(name: str) -> None
         ("fput", 6),
         ("ablowitz_ladik", 2),
         ("dnls", 8),
-        *((name, 2) for name in SERIES),
+        *(pytest.param(name, 2, marks=pytest.mark.slow) for name in SERIES),
         ("twisted", 6),
         ("dragged", 8),
     ],

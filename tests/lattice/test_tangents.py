@@ -199,7 +199,7 @@ NOISY = "noise: {kicks: {hamiltonian: x, amplitude: 0.3}, turns: {hamiltonian: z
     [
         (LatticeSolver, RING + NOISY, []),
         (Midpoint, RING, ["Poisson identity"]),
-        (Backwards, RING, ["Poisson identity", "tangent map"]),
+        pytest.param(Backwards, RING, ["Poisson identity", "tangent map"], marks=pytest.mark.slow),
         (Rounded, RING, ["Poisson identity"]),
     ],
 )

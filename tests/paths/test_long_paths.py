@@ -27,7 +27,7 @@ hamiltonian: {hamiltonian}
 
 
 @pytest.mark.parametrize("target", slow_but(["c"], TARGETS))
-@pytest.mark.parametrize(("coordinates", "form", "hamiltonian", "start", "h"), LONG)
+@pytest.mark.parametrize(("coordinates", "form", "hamiltonian", "start", "h"), slow_but(LONG[1:4], LONG))
 def test_long_path_is_followed_in_pieces(coordinates, form, hamiltonian, start, h, target):
     compilation = compile_paths(f"coordinates: {coordinates}\npoisson: {form}\nhamiltonian: {hamiltonian}\n", 2)
     with mpmath.workdps(PATH_DIGITS):

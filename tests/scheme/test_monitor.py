@@ -55,7 +55,7 @@ def kepler():
     return compilation, {target: solver_of(compilation, target) for target in ("c", "numpy")}
 
 
-@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize("order", slow_but([2], [2, 4]))
 def test_it_is_the_system_with_the_pair_typed_by_hand(order):
     own = solver_of(compiled_text(KEPLER, order), "numpy").integrate(START, STEP, 60)
     by_hand = solver_of(compiled_text(BY_HAND, order), "numpy")

@@ -8,7 +8,7 @@ from fractions import Fraction
 from typing import Any
 
 import pytest
-from hypothesis import assume, example, given, settings
+from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from phigen.spec.grammar import Scope, constant, parse
@@ -97,7 +97,6 @@ def arithmetic() -> st.SearchStrategy[str]:
 @example("2**3**2")
 @example("2**-1*3")
 @example("8/2/2*3-1-1")
-@settings(max_examples=400)
 def test_arithmetic_agrees_with_python(source: str) -> None:
     # A test may evaluate what it wrote itself; phigen never does. Exponents stay plain integers.
     exact = re.sub(r"(?<![*\d])(?<!\*\*-)(\d+)", r"F(\1)", source)
@@ -162,7 +161,6 @@ def value(e: Expression, point: dict[str, float]) -> float:
 
 
 @given(trees(), st.tuples(*[st.floats(0.1, 3)] * 3))
-@settings(max_examples=400)
 def test_printed_expression_parses_to_equal_values(tree: Expression, point: tuple[float, ...]) -> None:
     errors: list[str] = []
     printed = text(tree)
@@ -185,7 +183,6 @@ def test_printed_expression_parses_to_equal_values(tree: Expression, point: tupl
 
 
 @given(st.text(alphabet="x12.e+-*/(), \nsinqrt^_'\"[]{}=λ0abs", max_size=40))
-@settings(max_examples=500)
 def test_any_text_gives_an_expression_or_an_error_inside_it(source: str) -> None:
     places: list[int] = []
     result = parse(source, SCOPE, lambda message, index, hint="", *, limit=False: places.append(index))

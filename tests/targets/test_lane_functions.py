@@ -1,7 +1,7 @@
 """The functions for the loops over lanes agree with the library to a few units of the last place."""
 
 import pytest
-from support import run, tool, write
+from support import run, slow_but, tool, write
 
 from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS, with_formulas
 from phigen.symbolic.special import SPECIAL
@@ -35,9 +35,12 @@ int main(void)
 """
 
 
-@pytest.mark.parametrize("flags", ["-O0", "-O3 -march=native -ffp-contract=fast"])
+FAST = "-O3 -march=native -ffp-contract=fast"
+COMPILED = [("double", FAST), ("double", "-O0"), ("float", FAST), ("float", "-O0")]
+
+
+@pytest.mark.parametrize(("real", "flags"), slow_but([("double", FAST), ("float", "-O0")], COMPILED))
 @pytest.mark.parametrize("name", RANGES)
-@pytest.mark.parametrize("real", ["double", "float"])
 def test_lane_functions_agree_with_the_library(real, name, flags, tmp_path):
     """Over the whole range and, closer together, near 0; no number beyond it, so that steps there are made singly."""
     single = real == "float"

@@ -41,8 +41,9 @@ def defined(switches):
     return [f"-DPHI_{switch}=1" for switch in switches]
 
 
-#: Each switch with one kind of step that has code for it, and all that go together.
-FEW = [(kind, *more) for kind in ("NEWTON", "PATH") for more in ((), ("FAST",), ("COMPOSED", "ADJOINT", "TANGENT"))]
+#: Each switch with one kind of step that has code for it, and all that go together; tests/generated/test_compilers.py
+#: has the fast code of implicit steps looked at.
+FEW = [(kind, *more) for kind in ("NEWTON", "PATH") for more in ((), ("COMPOSED", "ADJOINT", "TANGENT"))]
 FEW += [("NEWTON", "GAUGE"), ("EXPLICIT",), ("EXPLICIT", "FAST"), ("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST"),
         ("SPLITTING", "TANGENT")]  # fmt: skip
 

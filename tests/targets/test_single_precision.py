@@ -6,7 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from support import as_given, first_run, run, setting, small, solver, spec_of, tool, write
+from support import as_given, first_run, run, setting, slow_but, small, solver, spec_of, tool, write
 
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec, emit
@@ -96,7 +96,7 @@ def test_lattices_move_as_in_double_precision(name):
     assert 1e-9 < np.abs(found.x - right.x).max() / np.abs(right.x).max() < 50 * ONE_STEP
 
 
-@pytest.mark.parametrize("name", ["rigid_body", "nambu_pendulum"])
+@pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "nambu_pendulum"]))
 def test_derivatives_are_those_of_double_precision(name):
     """The tangent map of a step, and gradients of a run; along paths they are traced one by one."""
     (made, other), (at, given) = in_single(name, tangent=True, adjoint=True), numbers(in_single(name)[0])
