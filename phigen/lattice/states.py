@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen.errors import SpecError
+from phigen.runtime.memory import expect_room
 from phigen.spec.model import LatticeRun, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate
 
@@ -60,6 +62,7 @@ class _Reader:
         sizes = self.given.sizes or (self._sites(bonds),)
         if len(bonds) and bonds.max() >= sizes[0]:
             raise self._error("bonds", f"a bond ends at site {bonds.max()}, but there are {sizes[0]} sites")
+        self._expect_room(sizes)
         self.indices = self._counters(sizes)
         parameters: dict[str, float | Floats] = dict(self.spec.parameters_of(self.run))
         for p in self.spec.parameters:
@@ -76,6 +79,13 @@ class _Reader:
                     message = f"the parameter {p.name!r} is positive by declaration, but not all its values are"
                     raise self._error("parameters", message)
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
+
+    def _expect_room(self, sizes: Sequence[int]) -> None:
+        """The indices of sites, the state, and parameters at sites are arrays at once."""
+        arrays = len(self.lattice.indices) + len(self.spec.coordinates)
+        arrays += sum(p.at == "sites" for p in self.spec.parameters)
+        place = self.spec.diagnostic(("runs", self.run.name, "sizes"), "").location
+        expect_room(f"{' × '.join(map(str, sizes))} sites", 8 * arrays * math.prod(sizes), place)
 
     def _error(self, key: str, message: str, hint: str = "") -> SpecError:
         return SpecError([self.spec.diagnostic(("runs", self.run.name, key), message, hint)])

@@ -21,6 +21,7 @@ from phigen.runtime.interface import (
     MissingExtraError,
     status_name,
 )
+from phigen.runtime.memory import expect_room
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -117,6 +118,7 @@ class CLatticeSession:
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
         given = np.array([len(bonds), bonds.ctypes.data], dtype=np.uintp)  # the struct of bonds
         needed = functions.work_size(sizes.ctypes.data, *([len(bonds)] if interface.graph else []))
+        expect_room(f"the arrays of a solver of {' × '.join(map(str, sizes))} sites", needed)
         self._beside = np.zeros(0, dtype=np.uint8)  # for tangent vectors
         self._work = np.zeros(max(needed, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data

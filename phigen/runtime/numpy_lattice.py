@@ -17,6 +17,7 @@ from phigen.runtime.interface import (
     LatticeInterface,
     MissingExtraError,
 )
+from phigen.runtime.memory import expect_room
 from phigen.runtime.modules import load_module
 
 
@@ -34,6 +35,7 @@ class NumpyLatticeSession:
         timed: bool,
     ) -> None:
         self.steps = 0
+        expect_room("the states before and after a sweep", 2 * x0.nbytes)
         self._module, self._x, self._timed = module, np.array(x0), timed
         self._clock, self._draws = Clock(t0), draws
         try:

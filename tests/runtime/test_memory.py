@@ -1,0 +1,67 @@
+"""Arrays over sites that cannot fit are refused before they are made."""
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from phigen import compile
+from phigen.cli import group
+from phigen.errors import LimitError
+from phigen.runtime import memory
+
+#: The arrays of a state of 12 sites, (q, p).
+STATE = 8 * 2 * 12
+CHAIN = """phigen: 1
+name: chain
+lattice: {axes: [i]}
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + (q[i+1] - q)**2/2
+order: 2
+runs:
+  wave: {sizes: [12], initial: {q: sin(pi*i/N_i), p: 0}, step: 0.05, steps: 40}
+"""
+
+
+@pytest.fixture
+def chain(tmp_path):
+    path = tmp_path / "chain.yaml"
+    path.write_text(CHAIN, encoding="utf-8")
+    return path
+
+
+def test_what_is_available_is_less_than_there_is_and_not_nothing():
+    free = memory.available()
+    assert free is not None
+    assert 2**20 < free < 2**50
+
+
+def test_groups_count_what_they_use_but_for_pages_of_files(tmp_path):
+    for name, text in (("memory.max", "1000"), ("memory.current", "800"), ("memory.stat", "anon 500\nfile 300\n")):
+        (tmp_path / name).write_text(text)
+    assert list(memory._of_groups(tmp_path)) == [500]
+    (tmp_path / "memory.max").write_text("max\n")
+    assert list(memory._of_groups(tmp_path)) == []
+
+
+def test_a_run_that_cannot_fit_ends_with_what_to_do(chain):
+    asked = ["run", str(chain), "--sizes", "9999999999", "-t", "numpy"]
+    done = CliRunner().invoke(group, asked, prog_name="phigen")
+    assert done.exit_code == 3
+    assert "9999999999 sites take 224 GiB of memory at least" in done.stderr
+    assert "phigen.mpi on several machines" in done.stderr
+
+
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_solvers_and_frames_are_refused_where_they_do_not_fit_and_only_there(chain, target, monkeypatch, tmp_path):
+    solver, x = compile(chain, target=target), np.zeros((2, 12))
+    monkeypatch.setattr(memory, "available", lambda: 101 * STATE)
+    assert len(solver.integrate(x, 0.05, 100)) == 101
+    with pytest.raises(LimitError, match=r"102 frames take .* of memory at least"):
+        solver.integrate(x, 0.05, 101)
+    assert len(solver.integrate(x, 0.05, 101, output=tmp_path / "a.npy")) == 102
+    monkeypatch.setattr(memory, "available", lambda: 2 * STATE - 1)
+    with pytest.raises(LimitError, match="of memory at least"):
+        solver.integrate(x, 0.05, 0)
+    monkeypatch.setattr(memory, "available", lambda: None)
+    solver.integrate(x, 0.05, 101)
