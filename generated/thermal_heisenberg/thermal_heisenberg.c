@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: 1be3ffae485c3aa4daeeb4fae8a0155a122d87e458b188f740d227873df0a46b
+ * body-sha256: 40ff8f7b7b158405bf6146155743816f5df195c8e02eafa0ac75bdf8819eb525
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -91,6 +91,7 @@ typedef struct {
     double *const *x; /* see thermal_heisenberg_solver */
     ptrdiff_t length; /* sites of a row */
     int colour;       /* of the first site */
+    int swept;        /* that of the sites which are swept */
 } thermal_heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -130,6 +131,7 @@ static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s,
     row->x = s->x;
     row->length = s->length;
     row->colour = 0;
+    row->swept = 0;
 }
 
 enum { thermal_heisenberg_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -220,8 +222,10 @@ static inline double thermal_heisenberg_sinroot(double s)
     return a + s4 * (b + s4 * c);
 }
 
-/* the flow of the noise bath_x: y, z turned */
-static inline void thermal_heisenberg_sweep1(const double *coef, const thermal_heisenberg_row *row,
+/* the flow of the noise bath_x: y, z turned
+   the flow of the noise bath_y: x, z turned, where x, y, z stand for its y, z, x
+   the flow of the noise bath_z: x, y turned, where x, y, z stand for its z, x, y */
+static inline void thermal_heisenberg_sweep_y_z(const double *coef, const thermal_heisenberg_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
@@ -241,56 +245,15 @@ static inline void thermal_heisenberg_sweep1(const double *coef, const thermal_h
     }
 }
 
-/* the flow of the noise bath_y: x, z turned */
-static inline void thermal_heisenberg_sweep2(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    const double *restrict T_row = row->x[3], *restrict dw_1_row = row->x[5];
-    double *x_row = row->x[0], *z_row = row->x[2];
-    thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double T = T_row[i], dw_1 = dw_1_row[i], x = x_row[i], z = z_row[i];
-        const double t1 = dw_1 * sqrt(T * c0);
-        const double t2 = thermal_heisenberg_sin_lane(t1);
-        const double t3 = (2.0 * thermal_heisenberg_sin_lane(0.5 * (t1)) * thermal_heisenberg_sin_lane(0.5
-            * (t1)));
-        const double change0 = z * t2 - x * t3;
-        const double change1 = -(x * t2 + z * t3);
-        x_row[i] = x + change0;
-        z_row[i] = z + change1;
-    }
-}
-
-/* the flow of the noise bath_z: x, y turned */
-static inline void thermal_heisenberg_sweep3(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    const double *restrict T_row = row->x[3], *restrict dw_2_row = row->x[6];
-    double *x_row = row->x[0], *y_row = row->x[1];
-    thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double T = T_row[i], dw_2 = dw_2_row[i], x = x_row[i], y = y_row[i];
-        const double t1 = dw_2 * sqrt(T * c0);
-        const double t2 = thermal_heisenberg_sin_lane(t1);
-        const double t3 = (2.0 * thermal_heisenberg_sin_lane(0.5 * (t1)) * thermal_heisenberg_sin_lane(0.5
-            * (t1)));
-        const double change0 = -(y * t2 + x * t3);
-        const double change1 = x * t2 - y * t3;
-        x_row[i] = x + change0;
-        y_row[i] = y + change1;
-    }
-}
-
-/* the flow of F_1, a force: x, y, z moved on a sphere, as by a boost */
-static inline void thermal_heisenberg_sweep4(const double *coef, const thermal_heisenberg_row *row,
+/* the flow of F_1, a force: x, y, z moved on a sphere, as by a boost
+   the flow of F_5, a force: x, y, z moved on a sphere, as by a boost */
+static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const thermal_heisenberg_row *row,
     ptrdiff_t from, ptrdiff_t to)
 {
     const double c1 = coef[1], c2 = coef[2], c3 = coef[3];
     double *x_row = row->x[0], *y_row = row->x[1], *z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = thermal_heisenberg_first(row, 0, from); i < to; i += 2) {
+    for (ptrdiff_t i = thermal_heisenberg_first(row, row->swept, from); i < to; i += 2) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
         const double w0 = i + 1 < row->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
@@ -342,67 +305,35 @@ static inline void thermal_heisenberg_sweep_x_y(const double *coef, const therma
     }
 }
 
-/* the flow of F_5, a force: x, y, z moved on a sphere, as by a boost */
-static inline void thermal_heisenberg_sweep8(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
-{
-    const double c1 = coef[1], c2 = coef[2], c3 = coef[3];
-    double *x_row = row->x[0], *y_row = row->x[1], *z_row = row->x[2];
-    thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = thermal_heisenberg_first(row, 1, from); i < to; i += 2) {
-        const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
-        const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
-        const double t1 = w1 * x_row[i - 1] + w0 * x_row[i + 1];
-        const double t2 = z * z + (x * x + y * y);
-        const double t3 = w0 * z_row[i + 1] + w1 * z_row[i - 1];
-        const double t4 = w1 * y_row[i - 1] + w0 * y_row[i + 1];
-        const double t5 = c1 * (t2 * (t3 * t3 + (t4 * t4 + t1 * t1)));
-        const double t6 = t2 * (thermal_heisenberg_sinroot(t5) / thermal_heisenberg_cosroot(t5));
-        const double t7 = t1 * t6;
-        const double t8 = x + c2 * t7;
-        const double t9 = t3 * t6;
-        const double t10 = z + c2 * t9;
-        const double t11 = t4 * t6;
-        const double t12 = y + c2 * t11;
-        const double t13 = (t9 * t10 + (t11 * t12 + t7 * t8)) * (t10 * t10 + (t12 * t12 + t8 * t8) > 0.0
-            ? 1.0 / (t10 * t10 + (t12 * t12 + t8 * t8)) : 0.0);
-        const double change0 = c3 * (t7 - t8 * t13);
-        const double change1 = c3 * (t11 - t12 * t13);
-        const double change2 = c3 * (t9 - t10 * t13);
-        x_row[i] = x + change0;
-        y_row[i] = y + change1;
-        z_row[i] = z + change2;
-    }
-}
-
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
 static void thermal_heisenberg_sweep_rows(const thermal_heisenberg_solver *s, int part, const double *coef,
     int far, size_t first, size_t end)
 {
     (void)far;
-    double *const y_z_x[] = { s->x[1], s->x[2], s->x[0], s->x[3], s->x[4], s->x[5], s->x[6] };
-    double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3], s->x[4], s->x[5], s->x[6] };
+    double *const y_z_x[] = { s->x[1], s->x[2], s->x[0], s->x[3], s->x[5], s->x[6], s->x[4] };
+    double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3], s->x[6], s->x[4], s->x[5] };
     for (size_t unit = first; unit < end; ++unit) {
         thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
-            thermal_heisenberg_sweep1(coef, &at.row, at.from, at.to);
+            thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
             thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
             break;
         case 2: /* H_2 */
-            thermal_heisenberg_sweep2(coef, &at.row, at.from, at.to);
+            at.row.x = y_z_x;
+            thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
             thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
             break;
         case 3: /* H_3 */
-            thermal_heisenberg_sweep3(coef, &at.row, at.from, at.to);
+            at.row.x = z_x_y;
+            thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
             thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
             break;
         case 4: /* H_4 */
-            thermal_heisenberg_sweep4(coef, &at.row, at.from, at.to);
+            thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
             thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
@@ -425,7 +356,8 @@ static void thermal_heisenberg_sweep_rows(const thermal_heisenberg_solver *s, in
             thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
             break;
         default: /* H_8 */
-            thermal_heisenberg_sweep8(coef, &at.row, at.from, at.to);
+            at.row.swept = 1;
+            thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
             thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
             thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
@@ -522,12 +454,6 @@ static void thermal_heisenberg_two_normals(uint64_t seed, uint32_t c[4], double 
 }
 
 /* ---- Noise ---- */
-/* The number of a site in the whole lattice, of which this one may be some planes. */
-static uint64_t thermal_heisenberg_site(const thermal_heisenberg_solver *s, size_t row, ptrdiff_t i)
-{
-    return (uint64_t)row * (uint64_t)s->length + (uint64_t)i;
-}
-
 /* The increments of a part of a step after so many others, for pieces of rows: a function of seed, member,
    step, part and site alone. A step of -h has them in the order in which it undoes one of h. */
 static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, size_t steps, int part,
@@ -543,7 +469,7 @@ static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, siz
             double *one = s->x[thermal_heisenberg_DRAWN + k];
             double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
             for (ptrdiff_t i = at.from; i < at.to; ++i) {
-                const uint64_t site = thermal_heisenberg_site(s, thermal_heisenberg_AXES > 1 ? unit : 0, i);
+                const uint64_t site = (uint64_t)i;
                 const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
                 uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
                     (uint32_t)site };
@@ -569,38 +495,6 @@ thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver
 }
 
 /* ---- The lattice ---- */
-#ifdef _OPENMP
-int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
-int omp_get_thread_num(void);
-#define thermal_heisenberg_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
-#define thermal_heisenberg_THREADS (size_t)omp_get_num_threads()
-#define thermal_heisenberg_THREAD (size_t)omp_get_thread_num()
-#else
-#define thermal_heisenberg_PARALLEL
-#define thermal_heisenberg_THREADS (size_t)1
-#define thermal_heisenberg_THREAD (size_t)0
-#endif
-
-/* The part of so many units that a thread works at, from *first on; returns its end. */
-static size_t thermal_heisenberg_share(size_t units, size_t *first)
-{
-    const size_t threads = thermal_heisenberg_THREADS, own = thermal_heisenberg_THREAD,
-        each = units / threads, more = units % threads;
-    *first = each * own + (own < more ? own : more);
-    return *first + each + (own < more);
-}
-
-/* Until all threads are here. */
-static void thermal_heisenberg_wait(void)
-{
-#ifdef _OPENMP
-    /* of one thread, too, a barrier may ask the operating system to wake the others */
-    if (thermal_heisenberg_THREADS > 1) {
-#pragma omp barrier
-    }
-#endif
-}
-
 /* steps before the state is looked at: what is not finite stays so */
 enum { thermal_heisenberg_STRETCH = 32 };
 enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go */
@@ -756,9 +650,12 @@ static void thermal_heisenberg_copy(double *const to[thermal_heisenberg_DIM],
 static void thermal_heisenberg_sweep_part(const thermal_heisenberg_solver *s, int part, const double *coef,
     int far)
 {
-    size_t first, end = thermal_heisenberg_share(thermal_heisenberg_units(s), &first);
-    thermal_heisenberg_sweep_rows(s, part, coef, far, first, end);
-    thermal_heisenberg_wait();
+    const size_t units = thermal_heisenberg_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit)
+        thermal_heisenberg_sweep_rows(s, part, coef, far, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -774,13 +671,15 @@ static void thermal_heisenberg_make_flow(const thermal_heisenberg_solver *s, siz
 /* The increments of a part of a step after so many, at all sites. */
 static void thermal_heisenberg_draw(const thermal_heisenberg_solver *s, size_t steps, int part)
 {
-    size_t first, end = thermal_heisenberg_share(thermal_heisenberg_units(s), &first);
-    thermal_heisenberg_draw_rows(s, steps, part, first, end);
-    thermal_heisenberg_wait();
+    const size_t units = thermal_heisenberg_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_draw_rows(s, steps, part, unit, unit + 1);
 }
 
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
-static void thermal_heisenberg_shared_steps(const thermal_heisenberg_solver *s, size_t steps)
+static void thermal_heisenberg_steps(const thermal_heisenberg_solver *s, size_t steps)
 {
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
         for (int flow = 0; flow < thermal_heisenberg_FLOWS; ++flow) {
@@ -789,12 +688,6 @@ static void thermal_heisenberg_shared_steps(const thermal_heisenberg_solver *s, 
             thermal_heisenberg_make_flow(s, step, flow);
         }
     }
-}
-
-static void thermal_heisenberg_steps(const thermal_heisenberg_solver *s, size_t steps)
-{
-    thermal_heisenberg_PARALLEL
-    thermal_heisenberg_shared_steps(s, steps);
 }
 
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */

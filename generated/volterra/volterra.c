@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f61a0cd0bf21671865928f9becc06ea6059bb9502be561d74c371d31d972dd5c
+ * body-sha256: 78d6291c8c4baa6c28ac9e5739c355c85bc32f0e8fdbbd3b72604d45aa492765
  */
 #include "volterra.h"
 #include <float.h>
@@ -72,6 +72,7 @@ typedef struct {
     double *const *x; /* see volterra_solver */
     ptrdiff_t length; /* sites of a row */
     int colour;       /* of the first site */
+    int swept;        /* that of the sites which are swept */
 } volterra_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -110,6 +111,7 @@ static inline void volterra_locate(const volterra_solver *s, volterra_row *row)
     row->x = s->x;
     row->length = s->length;
     row->colour = 0;
+    row->swept = 0;
 }
 
 enum { volterra_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -171,25 +173,14 @@ static inline double volterra_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* the flow of H_1 = sum of a: a scaled */
-static inline void volterra_sweep1(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
+/* the flow of H_1 = sum of a: a scaled
+   the flow of H_2 = sum of a: a scaled */
+static inline void volterra_sweep_a(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
 {
     const double c0 = coef[0];
     double *a_row = row->x[0];
     volterra_EACH_SITE
-    for (ptrdiff_t i = volterra_first(row, 1, from); i < to; i += 2) {
-        const double a = a_row[i];
-        a_row[i] = a + a * volterra_expm1_lane(c0 * (a_row[i + 1] - a_row[i - 1]));
-    }
-}
-
-/* the flow of H_2 = sum of a: a scaled */
-static inline void volterra_sweep2(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
-{
-    const double c0 = coef[0];
-    double *a_row = row->x[0];
-    volterra_EACH_SITE
-    for (ptrdiff_t i = volterra_first(row, 0, from); i < to; i += 2) {
+    for (ptrdiff_t i = volterra_first(row, row->swept, from); i < to; i += 2) {
         const double a = a_row[i];
         a_row[i] = a + a * volterra_expm1_lane(c0 * (a_row[i + 1] - a_row[i - 1]));
     }
@@ -201,14 +192,15 @@ static void volterra_sweep_rows(const volterra_solver *s, int part, const double
 {
     (void)far;
     for (size_t unit = first; unit < end; ++unit) {
-        const volterra_piece at = volterra_piece_of(s, unit);
+        volterra_piece at = volterra_piece_of(s, unit);
         switch (part) {
         case 1: /* H_1 */
-            volterra_sweep1(coef, &at.row, at.from, at.to);
+            at.row.swept = 1;
+            volterra_sweep_a(coef, &at.row, at.from, at.to);
             volterra_ends(s->x[0], s->length, at.from, at.to);
             break;
         default: /* H_2 */
-            volterra_sweep2(coef, &at.row, at.from, at.to);
+            volterra_sweep_a(coef, &at.row, at.from, at.to);
             volterra_ends(s->x[0], s->length, at.from, at.to);
             break;
         }

@@ -332,14 +332,6 @@ def test_large_angles_are_turned_exactly_too() -> None:
     np.testing.assert_allclose(by[0], by[1], atol=2e-13)
 
 
-def test_code_does_not_grow_with_the_lattice() -> None:
-    for name in TEXTS.keys() - {"sheet", "magnet"}:  # three parts of two colours with nine neighbours; of five parts
-        program = compile_spec(specs.loads(f"phigen: 1\nname: {name}\n{TEXTS[name]}\n"), profile="small").program
-        lines = sum(len(text.splitlines()) for text in emit(program, "c", "phigen").values())
-        graph, series = "graph" in TEXTS[name], name in SERIES  # whose derivatives Newton's method needs
-        assert lines <= 800 + 90 * graph + (420 + 130 * graph) * series, (name, lines)
-
-
 def test_loops_say_which_rows_they_read() -> None:
     text = emit(compiled("sheet").program, "c", "phigen")["sheet.c"]
     assert set(re.findall(r"row->at\[[1-9]\];(.*)", text)) == {" /* i - 1 */", " /* i + 1 */"}

@@ -110,9 +110,17 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 /* The increments of a part of a step after so many, at all sites. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
+#if PHI_SHARED
     size_t first, end = phi_share(phi_units(s), &first);
     phi_draw_rows(s, steps, part, first, end);
     phi_wait();
+#else
+    const size_t units = phi_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) phi_draw_rows(s, steps, part, unit, unit + 1);
+#endif
 }
 
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */

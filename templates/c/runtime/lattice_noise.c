@@ -8,6 +8,7 @@
 #include "philox.c"
 
 /* ---- Noise ---- */
+#if PHI_BY_HAND || !PHI_ONE_ROW
 /* The number of a site in the whole lattice, of which this one may be some planes. */
 static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 {
@@ -23,6 +24,7 @@ static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 #endif
 }
 
+#endif
 /* The increments of a part of a step after so many others, for pieces of rows: a function of seed, member, step, part and site
    alone. A step of -h has them in the order in which it undoes one of h. */
 static void phi_draw_rows(const phi_solver *s, size_t steps, int part, size_t first, size_t end)
@@ -36,7 +38,11 @@ static void phi_draw_rows(const phi_solver *s, size_t steps, int part, size_t fi
             double *one = s->x[PHI_DRAWN + k] + at.row.at[0];
             double *other = s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)] + at.row.at[0];
             for (ptrdiff_t i = at.from; i < at.to; ++i) {
+#if PHI_BY_HAND || !PHI_ONE_ROW
                 const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
+#else
+                const uint64_t site = (uint64_t)i;
+#endif
                 const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
                 uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member, (uint32_t)site };
                 double pair[2];

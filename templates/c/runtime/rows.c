@@ -49,6 +49,9 @@ typedef struct {
 #endif
 #if PHI_COLOURS
     int colour;                   /* of the first site */
+#if PHI_SWEPT
+    int swept;                    /* that of the sites which are swept */
+#endif
 #endif
 } phi_row;
 
@@ -146,6 +149,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 #if PHI_COLOURS
     row->colour = 0;
+#if PHI_SWEPT
+    row->swept = 0;
+#endif
 #endif
 #if !PHI_ONE_ROW && PHI_OPEN || !PHI_ONE_ROW && PHI_COLOURS
     ptrdiff_t place[PHI_AXES];

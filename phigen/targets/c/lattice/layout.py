@@ -128,6 +128,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "COLOURS": step.sites.colours > 1,
+        "SWEPT": program.profile == "small",
         "PAIRS": step.partners is not None and not layout.graph,
         "GATHER": step.partners is not None,
         "GRAPH": layout.graph,
@@ -148,7 +149,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "COMPENSATED": program.compensated,
         "SLOPES": layout.slopes,
         "SHARED": bool(step.adjoint)
-        or (step.equation is None and (program.profile == "fast" or bool(program.extras.tangent or program.noise))),
+        or (step.equation is None and (program.profile == "fast" or program.extras.tangent)),
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }

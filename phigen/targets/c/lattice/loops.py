@@ -124,7 +124,8 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     else:
         body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
     coloured = layout.leaves_out(sweep.colour)
-    start = f"{name}_first(row, {sweep.colour}, from)" if coloured else "from"
+    swept = sweep.colour if program.profile == "fast" or sweep.is_tangent else "row->swept"
+    start = f"{name}_first(row, {swept}, from)" if coloured else "from"
     onward = f"i += {layout.colour_step}" if coloured else "++i"
     text = _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
     shared = (

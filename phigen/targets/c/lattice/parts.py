@@ -26,7 +26,7 @@ from phigen.targets.c.lattice.loops import (
     sweep_loop,
 )
 from phigen.targets.c.lattice.partners import gathering, partners
-from phigen.targets.c.lattice.turned import orders, turned
+from phigen.targets.c.lattice.turned import orders, turned, turned_increments
 from phigen.targets.rendering import render
 
 
@@ -195,11 +195,12 @@ class Case:
 
 @dataclass(frozen=True)
 class _Call:
-    """A loop for some sites of a piece: the text of the last two arguments; the fields in the ``order`` that it takes
-    for its own, if another one; ``others`` would do the same."""
+    """A loop for some sites of a piece: the text of the last two arguments; the ``colour`` that it is told, if any; the
+    fields in the ``order`` that it takes for its own, if another one; ``others`` would do the same."""
 
     loop: Loop
     sites: str = "at.from, at.to"
+    colour: int | None = None
     order: tuple[str, ...] = ()
     others: tuple[_Call, ...] = ()
 
@@ -212,7 +213,11 @@ class _Call:
 def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str]) -> Iterator[str]:
     """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
     order: tuple[str, ...] = ()
+    colour: int | None = 0
     for call in called:
+        if call.colour not in (colour, None):
+            colour = call.colour
+            yield f"at.row.swept = {colour};"
         if call.order != order:
             order = call.order
             yield f"at.row.x = {'_'.join(order) or 's->x'};"
@@ -222,7 +227,11 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
 def _reordered(program: Program, layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
     """The arrays over the sites, with the fields in other orders that are used."""
     for order in dict.fromkeys(order for order in used if order):
-        arrays = [*order, *layout.arrays[len(order) :]]
+        turned = {
+            **dict(zip(layout.arrays, order, strict=False)),
+            **turned_increments(layout.step.sites, layout.arrays, order),
+        }
+        arrays = [turned.get(a, a) for a in layout.arrays]
         places = ", ".join(f"s->x[{layout.arrays.index(a)}]" for a in arrays)
         yield f"double *const {'_'.join(order)}[] = {{ {places} }};"
 
@@ -239,7 +248,8 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
     if plain and len(layout.step.sites.axes) > 1:
         yield _Call(loops[0], "at.from, at.wide")  # whole vectors: what lies beside a row is copied afresh
     else:
-        yield from calls_over_sites(loops)
+        told = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
+        yield from (replace(call, colour=sweep.colour if told else None) for call in calls_over_sites(loops))
 
 
 def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:

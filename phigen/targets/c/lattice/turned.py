@@ -21,12 +21,21 @@ def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
     return (order for order in permutations(own) if order != own and len(own) <= MOST_FIELDS)
 
 
+def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
+    """Increments of noise in an order of the fields: where each field has a source, that of its own is meant for it."""
+    if len(sites.increments) != len(order):
+        return {}
+    own = dict(zip(fields, sites.increments, strict=False))
+    return {own[f]: own[g] for f, g in zip(fields, order, strict=False)}
+
+
 def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Sweep) -> Sweep | None:
     """A sweep as a function of other fields: in place of those of an ``order`` it has the ``fields``, one by one.
 
     None where it would read neighbours that no sweep reads.
     """
     into = dict(zip(order, fields, strict=True))
+    into |= {there: own for own, there in turned_increments(sites, fields, order).items()}
     known = {place: name for name, place in (*sites.places.items(), *sites.ends.items())}
     kernels = [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
     names: dict[str, str] = {}
