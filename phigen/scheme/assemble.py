@@ -17,8 +17,10 @@ from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import (
     explicit_kernel,
+    full,
     generate_kernel,
     inverse,
+    is_centred,
     linearise_kernel,
     newton_solvers,
     noise_fields,
@@ -135,7 +137,7 @@ def _step(
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
-        solvers = newton_solvers(linearise)
+        solvers = newton_solvers(linearise, centred=is_centred(system, realisation))
         refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
         newton = Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, refresh=refresh)
         if extras.adjoint:
@@ -163,7 +165,7 @@ def _path(
     elif lanes and n <= MOST_IN_LANES:
         slopes = build_slopes(system, coefficients)
     if lanes and n <= MOST_IN_LANES:
-        several = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(n))
+        several = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(full(n)))
     if extras.tangent or extras.adjoint:
         kernel = several.curvature if several else curvature(system, generating, coefficients)
     if extras.tangent:

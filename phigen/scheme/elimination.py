@@ -108,12 +108,10 @@ def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, .
     return factors.solved([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
-def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expression]]:
-    """J⁻¹ and K J⁻¹ of full n×n matrices, row by row, by Gauss–Jordan elimination; the reciprocal pivots.
-
-    Symbols ``J:i:j`` and ``K:i:j``.
-    """
-    a = [[symbol(Symbol("J", i, j)) for j in range(n)] for i in range(n)]
+def inversion(pattern: Pattern) -> tuple[list[Expression], list[Expression]]:
+    """J⁻¹, row by row, by Gauss–Jordan elimination, and the reciprocal pivots; symbols ``J:i:j`` by the pattern."""
+    n = len(pattern)
+    a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
     reciprocals: list[Expression] = []
     for k in range(n):
         reciprocals.append(1 / a[k][k])
@@ -121,5 +119,4 @@ def inversion(n: int) -> tuple[list[Expression], list[Expression], list[Expressi
         for i in (i for i in range(n) if i != k):
             factor = a[i][k]
             a[i] = [-(factor * a[k][j]) if j == k else a[i][j] - factor * a[k][j] for j in range(n)]
-    product = [total(symbol(Symbol("K", i, k)) * a[k][j] for k in range(n)) for i in range(n) for j in range(n)]
-    return [e for row in a for e in row], product, reciprocals
+    return [e for row in a for e in row], reciprocals

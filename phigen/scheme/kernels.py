@@ -17,7 +17,7 @@ from phigen.scheme.staging import Coefficients
 from phigen.scheme.step import at_momenta, explicit_increment, explicit_order, linearise
 from phigen.scheme.steps import Factorisation
 from phigen.spec import limits
-from phigen.symbolic.expression import ONE, ZERO, Expression, number, symbol, total
+from phigen.symbolic.expression import ONE, ZERO, Expression, number, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP, Symbol, momentum
 
 #: Largest dimension whose elimination is unrolled in any case; beyond, where zeros leave no more than such a part of n³
@@ -35,6 +35,14 @@ def ends(system: System, realisation: BiRealisation) -> tuple[Sequence[Expressio
     impulse, half = [symbol(STEP) * f for f in system.forces.vector], number(Fraction(1, 2))
     apart = [a - half * f for a, f in zip(realisation.displacement, impulse, strict=True)]
     return apart, [d + f for d, f in zip(realisation.increment, impulse, strict=True)]
+
+
+def is_centred(system: System, realisation: BiRealisation) -> bool:
+    """Whether y is seen to be the mean of the ends of a step: then the Jacobian of the increment is 2(1 − J)."""
+    half = number(Fraction(1, 2))
+    means = [a + half * d for a, d in zip(*ends(system, realisation), strict=True)]
+    names = [*system.coordinates, *map(momentum, system.coordinates)]
+    return not any(e for row in sparse_derivatives(means, names) for e in row.values() if not e.is_zero)
 
 
 def explicit_kernel(
@@ -93,12 +101,12 @@ class Solvers:
     factors: Factorisation | None = None
 
 
-def newton_solvers(linearised: Kernel) -> Solvers:
-    """Elimination by the pattern of the Jacobian, where it is worth writing out."""
+def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
+    """Elimination by the pattern of the Jacobian, where it is worth writing out; ``centred`` as in `is_centred`."""
     jacobian, slope = (_pattern(o.values) for o in linearised.outputs[2:])
     n = len(jacobian)
     if n <= UNROLLED:
-        return Solvers(_elimination_kernel(jacobian), inverse(n))
+        return Solvers(_elimination_kernel(jacobian), inverse(jacobian, centred=centred))
     if operations(jacobian) > min(SPARSE * n**3, limits.OPERATIONS):
         return Solvers()
     return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factorise(jacobian), slope))
@@ -109,7 +117,8 @@ def _pattern(entries: Sequence[Expression]) -> Pattern:
     return [[not entries[i * n + j].is_zero for j in range(n)] for i in range(n)]
 
 
-def _full(n: int) -> Pattern:
+def full(n: int) -> Pattern:
+    """That of a matrix of which nothing is known."""
     return [[True] * n] * n
 
 
@@ -150,9 +159,16 @@ def _factorisation(factors: Factors, slope: Pattern) -> Factorisation:
     )
 
 
-def inverse(n: int) -> Kernel:
-    """The inverse of a matrix, and a product with it, unrolled."""
-    entries, gain, reciprocals = inversion(n)
+def inverse(pattern: Pattern, *, centred: bool = False) -> Kernel:
+    """The inverse of a matrix J, and that times the slope, unrolled; ``centred``: the slope is 2(1 − J)."""
+    n = len(pattern)
+    entries, reciprocals = inversion(pattern)
+    if centred:
+        gain = [2 * (e - ONE if k % (n + 1) == 0 else e) for k, e in enumerate(entries)]
+    else:
+        gain = [
+            total(symbol(Symbol("K", i, k)) * entries[k * n + j] for k in range(n)) for i in range(n) for j in range(n)
+        ]
     return Kernel(
         "invert",
         "elimination without pivoting: the inverse, the slope times the inverse, the reciprocals of the pivots",
@@ -181,7 +197,7 @@ def generate_kernel(system: System, generating: GeneratingFunction, coefficients
 
 def path_elimination(n: int) -> Kernel | None:
     """Elimination for the equation for p, whose matrix is full; None where a loop does better."""
-    return _elimination_kernel(_full(n)) if n <= UNROLLED else None
+    return _elimination_kernel(full(n)) if n <= UNROLLED else None
 
 
 def _outputs(values: Sequence[Expression], names: Sequence[str], sizes: Sequence[int]) -> tuple[Output, ...]:

@@ -58,7 +58,7 @@ def _times(a: Matrix, b: Matrix) -> Matrix:
 
 def _inverse(a: Matrix) -> tuple[Matrix, list[Expression]]:
     n = len(a)
-    inverse, _, reciprocals = inversion(n)
+    inverse, reciprocals = inversion([[True] * n] * n)
     values: dict[str, Expression] = {Symbol("J", i, j): a[i][j] for i in range(n) for j in range(n)}
     done = substitute([*inverse, *reciprocals], values)
     return _matrix(done, n, n, 0), done[n * n :]
