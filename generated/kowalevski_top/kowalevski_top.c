@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 5b462ce7eec345f4b0cee58bf2632d25cf39c1dc5af59879620af6f4367a8d7d
+ * body-sha256: cb5a834c22a4b8f206e7f39391949fd84c53d2fa869a83d48aa3b1d7bcd1383d
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -2644,7 +2644,7 @@ typedef struct {
     kowalevski_top_lanes unit[kowalevski_top_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     kowalevski_top_lanes inverse[kowalevski_top_DIM * kowalevski_top_DIM],
-        slope[kowalevski_top_DIM * kowalevski_top_DIM], gain[kowalevski_top_DIM * kowalevski_top_DIM];
+        gain[kowalevski_top_DIM * kowalevski_top_DIM];
 } kowalevski_top_model;
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
@@ -2701,17 +2701,35 @@ static void kowalevski_top_keep_largest(kowalevski_top_lanes most, const kowalev
     memcpy(most, bits_of_most, sizeof bits);
 }
 
+/* The product of a matrix and a vector. */
+static void kowalevski_top_apply(kowalevski_top_lanes matrix[restrict kowalevski_top_DIM
+    * kowalevski_top_DIM], kowalevski_top_lanes vector[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes product[restrict kowalevski_top_DIM])
+{
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+            double sum = matrix[i * kowalevski_top_DIM][lane] * vector[0][lane];
+            for (int j = 1; j < kowalevski_top_DIM; ++j)
+                sum += matrix[i * kowalevski_top_DIM + j][lane] * vector[j][lane];
+            product[i][lane] = sum;
+        }
+    }
+}
+
+/* What a residual takes from the increment. */
+static void kowalevski_top_gain(kowalevski_top_model *model,
+    kowalevski_top_lanes residual[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes gained[restrict kowalevski_top_DIM])
+{
+    kowalevski_top_apply(model->gain, residual, gained);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
 {
     kowalevski_top_lanes delta[kowalevski_top_DIM];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < kowalevski_top_DIM; ++i)
-        for (int j = 0; j < kowalevski_top_DIM; ++j) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * kowalevski_top_DIM + j][lane] * model->residual[j][lane];
-        }
+    kowalevski_top_apply(model->inverse, model->residual, delta);
     kowalevski_top_take(model, delta, size);
 }
 
@@ -2760,8 +2778,9 @@ static void kowalevski_top_invert(kowalevski_top_lanes matrix[restrict kowalevsk
 /* Linearise a stage around the points y. */
 static void kowalevski_top_linearise_stage(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model)
 {
+    kowalevski_top_lanes slope[kowalevski_top_DIM * kowalevski_top_DIM];
     kowalevski_top_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse,
-        model->slope);
+        slope);
     kowalevski_top_invert(model->inverse);
     for (int i = 0; i < kowalevski_top_DIM; ++i)
         for (int j = 0; j < kowalevski_top_DIM; ++j) {
@@ -2769,7 +2788,7 @@ static void kowalevski_top_linearise_stage(kowalevski_top_lanes coef[restrict], 
             for (int k = 0; k < kowalevski_top_DIM; ++k) {
                 kowalevski_top_EACH_LANE
                 for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                    sum[lane] += model->slope[i * kowalevski_top_DIM + k][lane]
+                    sum[lane] += slope[i * kowalevski_top_DIM + k][lane]
                         * model->inverse[k * kowalevski_top_DIM + j][lane];
             }
             memcpy(model->gain[i * kowalevski_top_DIM + j], sum, sizeof sum);
@@ -2792,7 +2811,7 @@ static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevsk
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevski_top_DIM],
+static double kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevski_top_DIM],
     double carry[kowalevski_top_DIM])
 {
     double residual[kowalevski_top_DIM], sum[kowalevski_top_DIM], small[kowalevski_top_DIM];
@@ -2825,6 +2844,9 @@ static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevsk
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+    kowalevski_top_lanes largest;
+    kowalevski_top_correct(model, largest);
+    return kowalevski_top_largest(largest);
 }
 
 /* ---- Blocks of steps ---- */
@@ -2962,7 +2984,6 @@ static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_model model;
-    kowalevski_top_lanes largest;
     double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
@@ -2972,9 +2993,7 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         kowalevski_top_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        kowalevski_top_chain(&model, x, carry);
-        kowalevski_top_correct(&model, largest);
-        const double size = kowalevski_top_largest(largest);
+        const double size = kowalevski_top_chain(&model, x, carry);
         s->evaluations += kowalevski_top_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = kowalevski_top_remaining(size, bend, bound);
@@ -3381,19 +3400,15 @@ static int kowalevski_top_group_solve(kowalevski_top_group *group, kowalevski_to
 static void kowalevski_top_group_advance(kowalevski_top_lanes x[restrict kowalevski_top_DIM],
     kowalevski_top_lanes carry[restrict kowalevski_top_DIM], kowalevski_top_model *model)
 {
-    for (int i = 0; i < kowalevski_top_DIM; ++i)
-        for (int j = 0; j < kowalevski_top_DIM; ++j) {
-            kowalevski_top_EACH_LANE
-            for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * kowalevski_top_DIM + j][lane] * model->residual[j][lane];
-        }
+    kowalevski_top_lanes gained[kowalevski_top_DIM];
+    kowalevski_top_gain(model, model->residual, gained);
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
             const double change = model->increment[i][lane], sum = x[i][lane] + change,
                 added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-            const double small = lost + carry[i][lane];
+            const double small = lost + (carry[i][lane] - gained[i][lane]);
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }

@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 991762c01231c3378af5696f3603c0d55dd18b5512f77173bbf416ff9d50d4b8
+ * body-sha256: 4fd014c15d4e64fe9c3c3ea9c2f0fae03164b826e388fc2d6f7a1b14ccf7f766
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -795,7 +795,7 @@ typedef struct {
     lotka_volterra_lanes unit[lotka_volterra_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     lotka_volterra_lanes inverse[lotka_volterra_DIM * lotka_volterra_DIM],
-        slope[lotka_volterra_DIM * lotka_volterra_DIM], gain[lotka_volterra_DIM * lotka_volterra_DIM];
+        gain[lotka_volterra_DIM * lotka_volterra_DIM];
 } lotka_volterra_model;
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
@@ -852,17 +852,35 @@ static void lotka_volterra_keep_largest(lotka_volterra_lanes most, const lotka_v
     memcpy(most, bits_of_most, sizeof bits);
 }
 
+/* The product of a matrix and a vector. */
+static void lotka_volterra_apply(lotka_volterra_lanes matrix[restrict lotka_volterra_DIM
+    * lotka_volterra_DIM], lotka_volterra_lanes vector[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes product[restrict lotka_volterra_DIM])
+{
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+            double sum = matrix[i * lotka_volterra_DIM][lane] * vector[0][lane];
+            for (int j = 1; j < lotka_volterra_DIM; ++j)
+                sum += matrix[i * lotka_volterra_DIM + j][lane] * vector[j][lane];
+            product[i][lane] = sum;
+        }
+    }
+}
+
+/* What a residual takes from the increment. */
+static void lotka_volterra_gain(lotka_volterra_model *model,
+    lotka_volterra_lanes residual[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes gained[restrict lotka_volterra_DIM])
+{
+    lotka_volterra_apply(model->gain, residual, gained);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
 {
     lotka_volterra_lanes delta[lotka_volterra_DIM];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < lotka_volterra_DIM; ++i)
-        for (int j = 0; j < lotka_volterra_DIM; ++j) {
-            lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * lotka_volterra_DIM + j][lane] * model->residual[j][lane];
-        }
+    lotka_volterra_apply(model->inverse, model->residual, delta);
     lotka_volterra_take(model, delta, size);
 }
 
@@ -880,9 +898,9 @@ static double lotka_volterra_remaining(double size, double bend, double bound)
 static void lotka_volterra_linearise_stage(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model)
 {
     lotka_volterra_lanes jacobian[lotka_volterra_DIM * lotka_volterra_DIM], reciprocal[lotka_volterra_DIM];
-    lotka_volterra_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian,
-        model->slope);
-    lotka_volterra_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
+    lotka_volterra_lanes slope[lotka_volterra_DIM * lotka_volterra_DIM];
+    lotka_volterra_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, slope);
+    lotka_volterra_invert_lanes(jacobian, slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
@@ -907,7 +925,7 @@ static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_vol
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_volterra_DIM],
+static double lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_volterra_DIM],
     double carry[lotka_volterra_DIM])
 {
     double residual[lotka_volterra_DIM], sum[lotka_volterra_DIM], small[lotka_volterra_DIM];
@@ -940,6 +958,9 @@ static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_vol
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+    lotka_volterra_lanes largest;
+    lotka_volterra_correct(model, largest);
+    return lotka_volterra_largest(largest);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1077,7 +1098,6 @@ static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
     lotka_volterra_model model;
-    lotka_volterra_lanes largest;
     double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
@@ -1087,9 +1107,7 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         lotka_volterra_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        lotka_volterra_chain(&model, x, carry);
-        lotka_volterra_correct(&model, largest);
-        const double size = lotka_volterra_largest(largest);
+        const double size = lotka_volterra_chain(&model, x, carry);
         s->evaluations += lotka_volterra_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = lotka_volterra_remaining(size, bend, bound);
@@ -1496,19 +1514,15 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, lotka_volterr
 static void lotka_volterra_group_advance(lotka_volterra_lanes x[restrict lotka_volterra_DIM],
     lotka_volterra_lanes carry[restrict lotka_volterra_DIM], lotka_volterra_model *model)
 {
-    for (int i = 0; i < lotka_volterra_DIM; ++i)
-        for (int j = 0; j < lotka_volterra_DIM; ++j) {
-            lotka_volterra_EACH_LANE
-            for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * lotka_volterra_DIM + j][lane] * model->residual[j][lane];
-        }
+    lotka_volterra_lanes gained[lotka_volterra_DIM];
+    lotka_volterra_gain(model, model->residual, gained);
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
             const double change = model->increment[i][lane], sum = x[i][lane] + change,
                 added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-            const double small = lost + carry[i][lane];
+            const double small = lost + (carry[i][lane] - gained[i][lane]);
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }

@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: b9e4c72a58d27ff2b01988d29ebbb5fc26932d727dfd184b85716ec6b6f1d874
+ * body-sha256: 6869c3261b9878c7cc1106e3de73febb0000efb6fa11a24bd93905e49eab31a9
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1109,7 +1109,7 @@ typedef struct {
     nambu_pendulum_lanes unit[nambu_pendulum_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     nambu_pendulum_lanes inverse[nambu_pendulum_DIM * nambu_pendulum_DIM],
-        slope[nambu_pendulum_DIM * nambu_pendulum_DIM], gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
+        gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
     nambu_pendulum_lanes middle[nambu_pendulum_DIM]; /* of the path, less y */
     /* of alpha and beta - alpha, with p held fixed */
     nambu_pendulum_lanes alpha_y[nambu_pendulum_DIM * nambu_pendulum_DIM],
@@ -1170,17 +1170,35 @@ static void nambu_pendulum_keep_largest(nambu_pendulum_lanes most, const nambu_p
     memcpy(most, bits_of_most, sizeof bits);
 }
 
+/* The product of a matrix and a vector. */
+static void nambu_pendulum_apply(nambu_pendulum_lanes matrix[restrict nambu_pendulum_DIM
+    * nambu_pendulum_DIM], nambu_pendulum_lanes vector[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes product[restrict nambu_pendulum_DIM])
+{
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+            double sum = matrix[i * nambu_pendulum_DIM][lane] * vector[0][lane];
+            for (int j = 1; j < nambu_pendulum_DIM; ++j)
+                sum += matrix[i * nambu_pendulum_DIM + j][lane] * vector[j][lane];
+            product[i][lane] = sum;
+        }
+    }
+}
+
+/* What a residual takes from the increment. */
+static void nambu_pendulum_gain(nambu_pendulum_model *model,
+    nambu_pendulum_lanes residual[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes gained[restrict nambu_pendulum_DIM])
+{
+    nambu_pendulum_apply(model->gain, residual, gained);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes delta[nambu_pendulum_DIM];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        for (int j = 0; j < nambu_pendulum_DIM; ++j) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * nambu_pendulum_DIM + j][lane] * model->residual[j][lane];
-        }
+    nambu_pendulum_apply(model->inverse, model->residual, delta);
     nambu_pendulum_take(model, delta, size);
 }
 
@@ -1616,11 +1634,11 @@ static void nambu_pendulum_linearise_paths(nambu_pendulum_lanes coef[restrict], 
     nambu_pendulum_lanes hessian[restrict nambu_pendulum_DIM * nambu_pendulum_DIM])
 {
     nambu_pendulum_lanes jacobian[nambu_pendulum_DIM * nambu_pendulum_DIM],
-        reciprocal[2 * nambu_pendulum_DIM];
+        slope[nambu_pendulum_DIM * nambu_pendulum_DIM], reciprocal[2 * nambu_pendulum_DIM];
     nambu_pendulum_vary(coef, e, nambu_pendulum_SLOPE_ACCURACY);
     nambu_pendulum_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y,
-        model->increment_y, jacobian, model->slope, reciprocal);
-    nambu_pendulum_invert_lanes(jacobian, model->slope, model->inverse, model->gain,
+        model->increment_y, jacobian, slope, reciprocal);
+    nambu_pendulum_invert_lanes(jacobian, slope, model->inverse, model->gain,
         reciprocal + nambu_pendulum_DIM);
     for (int i = 0; i < 2 * nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
@@ -1654,7 +1672,7 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pendulum_DIM],
+static double nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pendulum_DIM],
     double carry[nambu_pendulum_DIM])
 {
     double residual[nambu_pendulum_DIM], sum[nambu_pendulum_DIM], small[nambu_pendulum_DIM];
@@ -1687,6 +1705,9 @@ static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pen
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+    nambu_pendulum_lanes largest;
+    nambu_pendulum_correct(model, largest);
+    return nambu_pendulum_largest(largest);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1824,7 +1845,6 @@ static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
     nambu_pendulum_model model;
-    nambu_pendulum_lanes largest;
     double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0,
         bound = HUGE_VAL;
     int passes = 0, solved = 0;
@@ -1834,9 +1854,7 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         nambu_pendulum_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        nambu_pendulum_chain(&model, x, carry);
-        nambu_pendulum_correct(&model, largest);
-        const double size = nambu_pendulum_largest(largest);
+        const double size = nambu_pendulum_chain(&model, x, carry);
         s->evaluations += nambu_pendulum_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = nambu_pendulum_remaining(size, bend, bound);
@@ -2243,19 +2261,15 @@ static int nambu_pendulum_group_solve(nambu_pendulum_group *group, nambu_pendulu
 static void nambu_pendulum_group_advance(nambu_pendulum_lanes x[restrict nambu_pendulum_DIM],
     nambu_pendulum_lanes carry[restrict nambu_pendulum_DIM], nambu_pendulum_model *model)
 {
-    for (int i = 0; i < nambu_pendulum_DIM; ++i)
-        for (int j = 0; j < nambu_pendulum_DIM; ++j) {
-            nambu_pendulum_EACH_LANE
-            for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * nambu_pendulum_DIM + j][lane] * model->residual[j][lane];
-        }
+    nambu_pendulum_lanes gained[nambu_pendulum_DIM];
+    nambu_pendulum_gain(model, model->residual, gained);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
             const double change = model->increment[i][lane], sum = x[i][lane] + change,
                 added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-            const double small = lost + carry[i][lane];
+            const double small = lost + (carry[i][lane] - gained[i][lane]);
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }

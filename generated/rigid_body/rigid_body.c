@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: ed2278dbffceb90061f5677f070884a628e900f6b363ec98a274b04f8abc6f25
+ * body-sha256: 6ac2cdb022e10eb90413e9c0c7635da2acb94bb840bd57d02dc5558fefc9dc28
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1184,8 +1184,7 @@ typedef struct {
         residual[rigid_body_DIM];
     rigid_body_lanes unit[rigid_body_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], slope[rigid_body_DIM * rigid_body_DIM],
-        gain[rigid_body_DIM * rigid_body_DIM];
+    rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
@@ -1242,17 +1241,33 @@ static void rigid_body_keep_largest(rigid_body_lanes most, const rigid_body_lane
     memcpy(most, bits_of_most, sizeof bits);
 }
 
+/* The product of a matrix and a vector. */
+static void rigid_body_apply(rigid_body_lanes matrix[restrict rigid_body_DIM * rigid_body_DIM],
+    rigid_body_lanes vector[restrict rigid_body_DIM], rigid_body_lanes product[restrict rigid_body_DIM])
+{
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+            double sum = matrix[i * rigid_body_DIM][lane] * vector[0][lane];
+            for (int j = 1; j < rigid_body_DIM; ++j)
+                sum += matrix[i * rigid_body_DIM + j][lane] * vector[j][lane];
+            product[i][lane] = sum;
+        }
+    }
+}
+
+/* What a residual takes from the increment. */
+static void rigid_body_gain(rigid_body_model *model, rigid_body_lanes residual[restrict rigid_body_DIM],
+    rigid_body_lanes gained[restrict rigid_body_DIM])
+{
+    rigid_body_apply(model->gain, residual, gained);
+}
+
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
 {
     rigid_body_lanes delta[rigid_body_DIM];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < rigid_body_DIM; ++i)
-        for (int j = 0; j < rigid_body_DIM; ++j) {
-            rigid_body_EACH_LANE
-            for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * rigid_body_DIM + j][lane] * model->residual[j][lane];
-        }
+    rigid_body_apply(model->inverse, model->residual, delta);
     rigid_body_take(model, delta, size);
 }
 
@@ -1270,8 +1285,9 @@ static double rigid_body_remaining(double size, double bend, double bound)
 static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_body_model *model)
 {
     rigid_body_lanes jacobian[rigid_body_DIM * rigid_body_DIM], reciprocal[rigid_body_DIM];
-    rigid_body_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    rigid_body_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
+    rigid_body_lanes slope[rigid_body_DIM * rigid_body_DIM];
+    rigid_body_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, slope);
+    rigid_body_invert_lanes(jacobian, slope, model->inverse, model->gain, reciprocal);
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
@@ -1295,7 +1311,8 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. */
-static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], double carry[rigid_body_DIM])
+static double rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM],
+    double carry[rigid_body_DIM])
 {
     double residual[rigid_body_DIM], sum[rigid_body_DIM], small[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
@@ -1327,6 +1344,9 @@ static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], 
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+    rigid_body_lanes largest;
+    rigid_body_correct(model, largest);
+    return rigid_body_largest(largest);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1460,7 +1480,6 @@ static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
     rigid_body_model model;
-    rigid_body_lanes largest;
     double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!rigid_body_guess(s, table, &model)) return 0;
@@ -1469,9 +1488,7 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
         rigid_body_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        rigid_body_chain(&model, x, carry);
-        rigid_body_correct(&model, largest);
-        const double size = rigid_body_largest(largest);
+        const double size = rigid_body_chain(&model, x, carry);
         s->evaluations += rigid_body_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = rigid_body_remaining(size, bend, bound);
@@ -1866,19 +1883,15 @@ static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *mod
 static void rigid_body_group_advance(rigid_body_lanes x[restrict rigid_body_DIM],
     rigid_body_lanes carry[restrict rigid_body_DIM], rigid_body_model *model)
 {
-    for (int i = 0; i < rigid_body_DIM; ++i)
-        for (int j = 0; j < rigid_body_DIM; ++j) {
-            rigid_body_EACH_LANE
-            for (int lane = 0; lane < rigid_body_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * rigid_body_DIM + j][lane] * model->residual[j][lane];
-        }
+    rigid_body_lanes gained[rigid_body_DIM];
+    rigid_body_gain(model, model->residual, gained);
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
             const double change = model->increment[i][lane], sum = x[i][lane] + change,
                 added = sum - x[i][lane];
             const double lost = (x[i][lane] - (sum - added)) + (change - added);
-            const double small = lost + carry[i][lane];
+            const double small = lost + (carry[i][lane] - gained[i][lane]);
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);
         }

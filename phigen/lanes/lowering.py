@@ -157,14 +157,16 @@ def _rows(program: Program, step: Sweeps) -> Rows:
 def _newton(program: Program, step: Newton) -> Blocks | None:
     if _block(program) > MOST_STACK:
         return None
-    found = [LaneKernel(step.linearise, sparse=step.factors is not None)]
+    centred = step.centred and len(program.fractions) > 1 and step.factors is None
+    linearise = _without(step.linearise, "increment_jacobian") if centred else step.linearise
+    found = [LaneKernel(linearise, sparse=step.factors is not None)]
     found.append(LaneKernel(_without_matrices(step.linearise)))
     if step.factors:
         substitute = step.factors.substitute
         found += [LaneKernel(step.factors.factorise), LaneKernel(substitute)]
         found.append(LaneKernel(substitute, shared=("side",), single=True))
     elif step.invert:
-        found.append(LaneKernel(step.invert))
+        found.append(LaneKernel(_without(step.invert, "slope", "gain") if centred else step.invert))
     found += _elapsed(program)
     found += _turns(program)
     ops = operations([step.linearise, *(k.kernel for k in _turns(program))])
@@ -233,6 +235,12 @@ def _group(program: Program) -> int:
     """Values in each lane that a group of members takes."""
     n = program.dimension
     return len(program.fractions) * program.step.coefficients + 7 * n + 3 * n * n
+
+
+def _without(kernel: Kernel, *names: str) -> Kernel:
+    """The kernel without these inputs and outputs."""
+    inputs = {name: symbols for name, symbols in kernel.inputs.items() if name not in names}
+    return replace(kernel, inputs=inputs, outputs=tuple(o for o in kernel.outputs if o.name not in names))
 
 
 def _without_matrices(kernel: Kernel) -> Kernel:

@@ -137,9 +137,12 @@ def _step(
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
-        solvers = newton_solvers(linearise, centred=is_centred(system, realisation))
+        centred = is_centred(system, realisation)
+        solvers = newton_solvers(linearise, centred=centred)
         refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
-        newton = Newton(prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, refresh=refresh)
+        newton = Newton(
+            prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, centred, refresh=refresh
+        )
         if extras.adjoint:
             transposed = newton_adjoint(linearise, coefficients)
             newton = replace(newton, adjoint=completed(coefficients, [transposed], prepare, refresh))

@@ -113,7 +113,7 @@ class Newton(_Staged):
     """α(y, ∇S_h(y)) = x, solved for y by Newton's method; then x + (β − α)(y, ∇S_h(y)).
 
     ``eliminate`` solves with one matrix; of ``invert`` and ``factors``, for many right-hand sides, there is at most
-    one. What is None is left to a loop.
+    one. What is None is left to a loop. ``centred`` says that y is the mean of x and x'.
     """
 
     linearise: Kernel
@@ -121,6 +121,7 @@ class Newton(_Staged):
     eliminate: Kernel | None = None
     invert: Kernel | None = None
     factors: Factorisation | None = None
+    centred: bool = False
 
     #: What the operation counts of `main` refer to.
     unit = "Newton iteration"

@@ -55,8 +55,9 @@ def test_vectorised_blocks_and_groups_equal_single_steps(name, tmp_path):
     exercise(compiled(name), "-O3", tmp_path)
 
 
-@pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "volterra5"]))
+@pytest.mark.parametrize("name", slow_but(["rigid_body", "pendulum"], ["rigid_body", "pendulum", "volterra5"]))
 def test_blocks_of_several_stages_equal_single_steps(name, tmp_path):
+    """Of the pendulum y is the mean of the ends of a stage."""
     composed = replace(compiled(name).spec, composition="suzuki")
     compilation = compile_spec(composed, order=4)
     assert len(compilation.program.fractions) == 5

@@ -46,6 +46,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
     full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not kept as factors
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))
+    yield Feature("CENTRED", lambda p: isinstance(p.step, Newton) and p.step.centred, ("SWEPT",))
     yield Feature("INVERSE_UNROLLED", lambda p: isinstance(p.step, Newton) and p.step.invert, ("BLOCKS",))
     yield from (Feature(f"CALLS_{f.upper()}", _calls(lanes, f)) for f in ("exp", "expm1", "log", "sin", "cos"))
 

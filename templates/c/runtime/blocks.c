@@ -313,10 +313,6 @@ static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_models models;
-#if PHI_COMPOSED
-    phi_lanes sizes;
-#endif
-    phi_lanes largest;
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!phi_guess(s, table, &models)) return 0;
@@ -328,17 +324,7 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 #if PHI_SWEPT
         if (matrices) phi_turn_residuals(&models);
 #endif
-        phi_chain(&models, x, carry);
-#if PHI_COMPOSED
-        memset(largest, 0, sizeof largest);
-        for (int stage = 0; stage < PHI_STAGES; ++stage) {
-            phi_correct(&models.stage[stage], sizes);
-            phi_keep_largest(largest, sizes);
-        }
-#else
-        phi_correct(&models.stage[0], largest);
-#endif
-        const double size = phi_largest(largest);
+        const double size = phi_chain(&models, x, carry);
         s->evaluations += PHI_STAGES * PHI_LANES;
         bend = matrices ? 0.0 : bend + previous;
         bound = phi_remaining(size, bend, bound);

@@ -22,16 +22,13 @@ static void phi_turn_residuals(phi_models *models)
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = &models->stage[stage];
         for (int j = 0; j < PHI_DIM; ++j) {
-            phi_lanes column[PHI_DIM];
+            phi_lanes column[PHI_DIM], gained[PHI_DIM];
             for (int i = 0; i < PHI_DIM; ++i) memcpy(column[i], models->turn[i * PHI_DIM + j], sizeof column[i]);
+            phi_gain(this_stage, column, gained);
             for (int i = 0; i < PHI_DIM; ++i) {
-                phi_lanes sum;
-                memcpy(sum, column[i], sizeof sum);
-                for (int k = 0; k < PHI_DIM; ++k) {
-                    PHI_EACH_LANE
-                    for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += this_stage->gain[i * PHI_DIM + k][lane] * column[k][lane];
-                }
-                memcpy(models->turn[i * PHI_DIM + j], sum, sizeof sum);
+                PHI_EACH_LANE
+                for (int lane = 0; lane < PHI_LANES; ++lane)
+                    models->turn[i * PHI_DIM + j][lane] = column[i][lane] + gained[i][lane];
             }
         }
     }
@@ -57,17 +54,6 @@ static void phi_shift(const phi_models *models, int stage, phi_lanes shift[restr
             shift[i][lane] = (y[lane] - this_stage->y[i][lane]) + turn;
         }
     }
-}
-
-/* gained becomes gain times residual. */
-static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
-{
-    memset(gained, 0, PHI_DIM * sizeof gained[0]);
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int j = 0; j < PHI_DIM; ++j) {
-            PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane) gained[i][lane] += model->gain[i * PHI_DIM + j][lane] * residual[j][lane];
-        }
 }
 
 /* The residuals of the first stages of all steps: each step is affine in that of its first stage. */
@@ -99,29 +85,46 @@ static void phi_first_residuals(phi_models *models, const double x[PHI_DIM], con
     }
 }
 
-/* The residuals of all stages along their linear models, in lanes, and where the steps lead. As X, the state with its carry,
-   gains increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+/* What a residual takes from y, and from the increment. */
+static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes delta[restrict PHI_DIM],
+    phi_lanes gained[restrict PHI_DIM])
 {
-    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
+    phi_apply(model->inverse, residual, delta);
+#if PHI_CENTRED
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) gained[i][lane] = 2.0 * (delta[i][lane] - residual[i][lane]);
+    }
+#else
+    phi_gain(model, residual, gained);
+#endif
+}
+
+/* Correct the points of all stages by the residuals along their linear models, and find where the steps lead. As X, the
+   state with its carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
+   apart. The largest correction. */
+static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+{
+    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM], size, largest = { 0.0 };
     phi_first_residuals(models, x, carry, residual);
     memset(sum, 0, sizeof sum);
     memset(small, 0, sizeof small);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = &models->stage[stage];
-        phi_lanes gained[PHI_DIM];
-        phi_gain(this_stage, residual, gained);
+        phi_lanes delta[PHI_DIM], gained[PHI_DIM];
+        phi_answer(this_stage, residual, delta, gained);
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) {
-                const double change = this_stage->increment[i][lane], total = sum[i][lane] + change, added = total - sum[i][lane];
-                const double here = residual[i][lane];
+                const double change = this_stage->increment[i][lane], total = sum[i][lane] + change;
+                const double added = total - sum[i][lane];
                 small[i][lane] += ((sum[i][lane] - (total - added)) + (change - added)) - gained[i][lane];
                 sum[i][lane] = total;
-                residual[i][lane] = (here + gained[i][lane]) + this_stage->residual[i][lane];
-                this_stage->residual[i][lane] = here;
+                residual[i][lane] = (residual[i][lane] + gained[i][lane]) + this_stage->residual[i][lane];
             }
         }
+        phi_take(this_stage, delta, size);
+        phi_keep_largest(largest, size);
     }
     for (int i = 0; i < PHI_DIM; ++i) {
         double whole = x[i], rest = carry[i];
@@ -133,6 +136,7 @@ static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DI
         x[i] = whole + rest;
         carry[i] = rest - (x[i] - whole);
     }
+    return phi_largest(largest);
 }
 
 #else
@@ -140,7 +144,7 @@ typedef struct { phi_model stage[PHI_STAGES]; } phi_models; /* the stages of a s
 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
 {
     double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
 #if PHI_SPARSE
@@ -191,6 +195,17 @@ static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DI
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
+#if PHI_COMPOSED
+    phi_lanes size, largest = { 0.0 };
+    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+        phi_correct(&models->stage[stage], size);
+        phi_keep_largest(largest, size);
+    }
+#else
+    phi_lanes largest;
+    phi_correct(&models->stage[0], largest);
+#endif
+    return phi_largest(largest);
 }
 
 #endif

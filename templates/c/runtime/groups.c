@@ -215,12 +215,8 @@ static int phi_group_solve(phi_group *group, int stage, phi_model *model)
 static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[restrict PHI_DIM], phi_model *model)
 {
 #if !PHI_SPARSE
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int j = 0; j < PHI_DIM; ++j) {
-            PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane)
-                carry[i][lane] -= model->gain[i * PHI_DIM + j][lane] * model->residual[j][lane];
-        }
+    phi_lanes gained[PHI_DIM];
+    phi_gain(model, model->residual, gained);
 #endif
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
@@ -230,7 +226,7 @@ static void phi_group_advance(phi_lanes x[restrict PHI_DIM], phi_lanes carry[res
 #if PHI_SPARSE
             const double small = lost + (carry[i][lane] - model->gained[i][lane]);
 #else
-            const double small = lost + carry[i][lane];
+            const double small = lost + (carry[i][lane] - gained[i][lane]);
 #endif
             x[i][lane] = sum + small;
             carry[i][lane] = small - (x[i][lane] - sum);

@@ -25,9 +25,11 @@ typedef struct {
 #if PHI_SPARSE
     /* of the Jacobian of alpha(y); that of the increment; what corrections take from the increment */
     phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];
+#elif PHI_CENTRED
+    phi_lanes inverse[PHI_DIM * PHI_DIM]; /* a residual r of alpha(y) = x takes inverse r from y */
 #else
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
-    phi_lanes inverse[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM], gain[PHI_DIM * PHI_DIM];
+    phi_lanes inverse[PHI_DIM * PHI_DIM], gain[PHI_DIM * PHI_DIM];
 #endif
 #if PHI_PATH
     phi_lanes middle[PHI_DIM]; /* of the path, less y */
@@ -77,20 +79,44 @@ static void phi_correct(phi_model *model, phi_lanes size)
 }
 
 #else
+/* The product of a matrix and a vector. */
+static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes vector[restrict PHI_DIM],
+    phi_lanes product[restrict PHI_DIM])
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            double sum = matrix[i * PHI_DIM][lane] * vector[0][lane];
+            for (int j = 1; j < PHI_DIM; ++j) sum += matrix[i * PHI_DIM + j][lane] * vector[j][lane];
+            product[i][lane] = sum;
+        }
+    }
+}
+
+/* What a residual takes from the increment. */
+static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
+{
+#if PHI_CENTRED
+    phi_apply(model->inverse, residual, gained);
+    for (int i = 0; i < PHI_DIM; ++i) { /* y is the mean of the ends, alpha and beta */
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) gained[i][lane] = 2.0 * (gained[i][lane] - residual[i][lane]);
+    }
+#else
+    phi_apply(model->gain, residual, gained);
+#endif
+}
+
+#if !PHI_SWEPT || PHI_GROUPS
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void phi_correct(phi_model *model, phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];
-    memset(delta, 0, sizeof delta);
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int j = 0; j < PHI_DIM; ++j) {
-            PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane)
-                delta[i][lane] += model->inverse[i * PHI_DIM + j][lane] * model->residual[j][lane];
-        }
+    phi_apply(model->inverse, model->residual, delta);
     phi_take(model, delta, size);
 }
 
+#endif
 #endif
 /* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
    they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
@@ -123,8 +149,14 @@ static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
     phi_lanes jacobian[PHI_DIM * PHI_DIM], reciprocal[PHI_DIM];
-    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, model->slope);
-    phi_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal);
+#if PHI_CENTRED
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian);
+    phi_invert_lanes(jacobian, model->inverse, reciprocal);
+#else
+    phi_lanes slope[PHI_DIM * PHI_DIM];
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, jacobian, slope);
+    phi_invert_lanes(jacobian, slope, model->inverse, model->gain, reciprocal);
+#endif
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane)
@@ -165,7 +197,12 @@ static void phi_invert(phi_lanes matrix[restrict PHI_DIM * PHI_DIM])
 /* Linearise a stage around the points y. */
 static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 {
-    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, model->slope);
+#if PHI_CENTRED
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse);
+    phi_invert(model->inverse);
+#else
+    phi_lanes slope[PHI_DIM * PHI_DIM];
+    phi_linearise_lanes(coef, model->y, model->displacement, model->increment, model->inverse, slope);
     phi_invert(model->inverse);
     for (int i = 0; i < PHI_DIM; ++i)
         for (int j = 0; j < PHI_DIM; ++j) {
@@ -173,10 +210,11 @@ static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
             for (int k = 0; k < PHI_DIM; ++k) {
                 PHI_EACH_LANE
                 for (int lane = 0; lane < PHI_LANES; ++lane)
-                    sum[lane] += model->slope[i * PHI_DIM + k][lane] * model->inverse[k * PHI_DIM + j][lane];
+                    sum[lane] += slope[i * PHI_DIM + k][lane] * model->inverse[k * PHI_DIM + j][lane];
             }
             memcpy(model->gain[i * PHI_DIM + j], sum, sizeof sum);
         }
+#endif
 }
 
 #endif

@@ -59,11 +59,11 @@ static void phi_read_ends(phi_model *model, phi_expansion *e, const phi_lanes wr
 static void phi_linearise_paths(phi_lanes coef[restrict], phi_model *model, phi_expansion *e,
     phi_lanes hessian[restrict PHI_DIM * PHI_DIM])
 {
-    phi_lanes jacobian[PHI_DIM * PHI_DIM], reciprocal[2 * PHI_DIM];
+    phi_lanes jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM], reciprocal[2 * PHI_DIM];
     phi_vary(coef, e, PHI_SLOPE_ACCURACY);
     phi_along_mean_lanes(e->v_even, e->v_odd, e->v_mean, hessian, model->alpha_y, model->increment_y, jacobian,
-        model->slope, reciprocal);
-    phi_invert_lanes(jacobian, model->slope, model->inverse, model->gain, reciprocal + PHI_DIM);
+        slope, reciprocal);
+    phi_invert_lanes(jacobian, slope, model->inverse, model->gain, reciprocal + PHI_DIM);
     for (int i = 0; i < 2 * PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane)

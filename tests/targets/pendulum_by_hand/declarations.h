@@ -73,6 +73,7 @@
 #define PHI_FAR 0
 #define PHI_SPARSE 0
 #define PHI_SWEPT 0
+#define PHI_CENTRED 0
 #define PHI_INVERSE_UNROLLED 0
 #define PHI_CALLS_EXP 0
 #define PHI_CALLS_EXPM1 0
