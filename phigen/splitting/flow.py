@@ -17,7 +17,7 @@ from phigen.splitting.closure import motion_of
 from phigen.splitting.exponential import NoClosedFormError
 from phigen.splitting.integrals import reduced
 from phigen.splitting.ring import TIME, Ring
-from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, topological, total
+from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, symbols_of, topological, total
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.tower import Poly, Tower
 
@@ -108,6 +108,9 @@ def joint_flow(ring: Ring, terms: Sequence[Term], *, linear: bool = False) -> Fl
     found = solved(ring, field, linear=linear)
     if isinstance(found, str):
         return found
+    moved = {c for c, e in zip(ring.coordinates, found.increments, strict=True) if not e.is_zero}
+    if any(e.op == "sign" and not moved.isdisjoint(symbols_of(e)) for e in topological(found.increments)):
+        return "it moves across a kink, as that of abs(q) at q = 0"
     return Flow(g, tuple(_as_written(ring, g, found)), found.manner)
 
 

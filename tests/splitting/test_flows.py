@@ -15,6 +15,7 @@ PLANE = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 #: A system, and how its coordinates move along the flows of the parts.
 SYSTEMS = {
     "kick and drift": (PLANE + "hamiltonian: p**2/2 + p**4 - cos(q)", ["p shifted", "q shifted"]),
+    "a kink between its kicks": (PLANE + "hamiltonian: p**2/2 + 2*abs(q)", ["q shifted", "p shifted"]),
     "one part": (PLANE + "hamiltonian: p**2/2", ["q shifted"]),
     "a sum whose parts do not commute": (
         PLANE + "parameters: {m: 2, k: 3}\nhamiltonian: p**2/(2*m) + k*q**2/2 + p*q/5",
