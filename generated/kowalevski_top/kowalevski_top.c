@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: cb5a834c22a4b8f206e7f39391949fd84c53d2fa869a83d48aa3b1d7bcd1383d
+ * body-sha256: 6fe8026951214dedd4e5ec745c5394ece6c98792e1b00465c34c7c68b7660778
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -1279,15 +1279,9 @@ static void kowalevski_top_make_room(kowalevski_top_history *history, int values
     history->count = kowalevski_top_REMEMBERED;
 }
 
-/* Add a value to the history. */
-static void kowalevski_top_record(kowalevski_top_history *history, const double value[kowalevski_top_DIM])
-{
-    kowalevski_top_make_room(history, 1);
-    memcpy(history->past[history->count++], value, kowalevski_top_DIM * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void kowalevski_top_fit(kowalevski_top_history *history)
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it
+   foresees. */
+static int kowalevski_top_fit(kowalevski_top_history *history)
 {
     int found = 1;
     history->recurrence_terms = 0;
@@ -1302,6 +1296,7 @@ static void kowalevski_top_fit(kowalevski_top_history *history)
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < kowalevski_top_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + kowalevski_top_REPAY : kowalevski_top_LONG_WAIT;
+    return found;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -1309,7 +1304,8 @@ static void kowalevski_top_remember(kowalevski_top_history *history, const doubl
     int iterations)
 {
     if (iterations > 1) kowalevski_top_judge(history, value);
-    kowalevski_top_record(history, value);
+    kowalevski_top_make_room(history, 1);
+    memcpy(history->past[history->count++], value, kowalevski_top_DIM * sizeof value[0]);
     history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
     if (history->slow_steps > history->slow_steps_allowed && history->count >= kowalevski_top_REMEMBERED)
         kowalevski_top_fit(history);
@@ -2905,7 +2901,7 @@ static void kowalevski_top_foresee(const kowalevski_top_history *history,
     }
 }
 
-/* kowalevski_top_record for the values of all lanes, one after the other. */
+/* Add the values of all lanes to the history, one after the other. */
 static void kowalevski_top_record_lanes(kowalevski_top_history *history,
     kowalevski_top_lanes y[restrict kowalevski_top_DIM])
 {
@@ -3033,13 +3029,6 @@ static void kowalevski_top_give_up(kowalevski_top_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Fit the recurrence of a stage. Whether it foresees. */
-static int kowalevski_top_fitted(kowalevski_top_history *history)
-{
-    kowalevski_top_fit(history);
-    return history->recurrence_terms > 0;
-}
-
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
@@ -3050,7 +3039,7 @@ static void kowalevski_top_choose_guess(kowalevski_top_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < kowalevski_top_REPAY_BLOCKS && s->steps < kowalevski_top_REPAY) return;
-    s->blocks.use_recurrences = kowalevski_top_fitted(&s->history);
+    s->blocks.use_recurrences = kowalevski_top_fit(&s->history);
     s->blocks.single_steps = kowalevski_top_LANES;
     if (!s->blocks.use_recurrences) kowalevski_top_give_up(s);
 }

@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 4fd014c15d4e64fe9c3c3ea9c2f0fae03164b826e388fc2d6f7a1b14ccf7f766
+ * body-sha256: b93bf0389c7dd2515ace08da12849272f6026d0d7f78452f2b7a84e400e2647b
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -386,15 +386,9 @@ static void lotka_volterra_make_room(lotka_volterra_history *history, int values
     history->count = lotka_volterra_REMEMBERED;
 }
 
-/* Add a value to the history. */
-static void lotka_volterra_record(lotka_volterra_history *history, const double value[lotka_volterra_DIM])
-{
-    lotka_volterra_make_room(history, 1);
-    memcpy(history->past[history->count++], value, lotka_volterra_DIM * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void lotka_volterra_fit(lotka_volterra_history *history)
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it
+   foresees. */
+static int lotka_volterra_fit(lotka_volterra_history *history)
 {
     int found = 1;
     history->recurrence_terms = 0;
@@ -409,6 +403,7 @@ static void lotka_volterra_fit(lotka_volterra_history *history)
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < lotka_volterra_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + lotka_volterra_REPAY : lotka_volterra_LONG_WAIT;
+    return found;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -416,7 +411,8 @@ static void lotka_volterra_remember(lotka_volterra_history *history, const doubl
     int iterations)
 {
     if (iterations > 1) lotka_volterra_judge(history, value);
-    lotka_volterra_record(history, value);
+    lotka_volterra_make_room(history, 1);
+    memcpy(history->past[history->count++], value, lotka_volterra_DIM * sizeof value[0]);
     history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
     if (history->slow_steps > history->slow_steps_allowed && history->count >= lotka_volterra_REMEMBERED)
         lotka_volterra_fit(history);
@@ -1019,7 +1015,7 @@ static void lotka_volterra_foresee(const lotka_volterra_history *history,
     }
 }
 
-/* lotka_volterra_record for the values of all lanes, one after the other. */
+/* Add the values of all lanes to the history, one after the other. */
 static void lotka_volterra_record_lanes(lotka_volterra_history *history,
     lotka_volterra_lanes y[restrict lotka_volterra_DIM])
 {
@@ -1147,13 +1143,6 @@ static void lotka_volterra_give_up(lotka_volterra_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Fit the recurrence of a stage. Whether it foresees. */
-static int lotka_volterra_fitted(lotka_volterra_history *history)
-{
-    lotka_volterra_fit(history);
-    return history->recurrence_terms > 0;
-}
-
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void lotka_volterra_choose_guess(lotka_volterra_solver *s, size_t steps)
@@ -1164,7 +1153,7 @@ static void lotka_volterra_choose_guess(lotka_volterra_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < lotka_volterra_REPAY_BLOCKS && s->steps < lotka_volterra_REPAY) return;
-    s->blocks.use_recurrences = lotka_volterra_fitted(&s->history);
+    s->blocks.use_recurrences = lotka_volterra_fit(&s->history);
     s->blocks.single_steps = lotka_volterra_LANES;
     if (!s->blocks.use_recurrences) lotka_volterra_give_up(s);
 }

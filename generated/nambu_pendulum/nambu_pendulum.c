@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 6869c3261b9878c7cc1106e3de73febb0000efb6fa11a24bd93905e49eab31a9
+ * body-sha256: f371338f9a60f6866de717c1eb854ed3df5e77115382c17c6429c8ef0eb6866a
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -375,15 +375,9 @@ static void nambu_pendulum_make_room(nambu_pendulum_history *history, int values
     history->count = nambu_pendulum_REMEMBERED;
 }
 
-/* Add a value to the history. */
-static void nambu_pendulum_record(nambu_pendulum_history *history, const double value[nambu_pendulum_DIM])
-{
-    nambu_pendulum_make_room(history, 1);
-    memcpy(history->past[history->count++], value, nambu_pendulum_DIM * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void nambu_pendulum_fit(nambu_pendulum_history *history)
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it
+   foresees. */
+static int nambu_pendulum_fit(nambu_pendulum_history *history)
 {
     int found = 1;
     history->recurrence_terms = 0;
@@ -398,6 +392,7 @@ static void nambu_pendulum_fit(nambu_pendulum_history *history)
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < nambu_pendulum_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + nambu_pendulum_REPAY : nambu_pendulum_LONG_WAIT;
+    return found;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -405,7 +400,8 @@ static void nambu_pendulum_remember(nambu_pendulum_history *history, const doubl
     int iterations)
 {
     if (iterations > 1) nambu_pendulum_judge(history, value);
-    nambu_pendulum_record(history, value);
+    nambu_pendulum_make_room(history, 1);
+    memcpy(history->past[history->count++], value, nambu_pendulum_DIM * sizeof value[0]);
     history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
     if (history->slow_steps > history->slow_steps_allowed && history->count >= nambu_pendulum_REMEMBERED)
         nambu_pendulum_fit(history);
@@ -1766,7 +1762,7 @@ static void nambu_pendulum_foresee(const nambu_pendulum_history *history,
     }
 }
 
-/* nambu_pendulum_record for the values of all lanes, one after the other. */
+/* Add the values of all lanes to the history, one after the other. */
 static void nambu_pendulum_record_lanes(nambu_pendulum_history *history,
     nambu_pendulum_lanes y[restrict nambu_pendulum_DIM])
 {
@@ -1894,13 +1890,6 @@ static void nambu_pendulum_give_up(nambu_pendulum_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Fit the recurrence of a stage. Whether it foresees. */
-static int nambu_pendulum_fitted(nambu_pendulum_history *history)
-{
-    nambu_pendulum_fit(history);
-    return history->recurrence_terms > 0;
-}
-
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void nambu_pendulum_choose_guess(nambu_pendulum_solver *s, size_t steps)
@@ -1911,7 +1900,7 @@ static void nambu_pendulum_choose_guess(nambu_pendulum_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < nambu_pendulum_REPAY_BLOCKS && s->steps < nambu_pendulum_REPAY) return;
-    s->blocks.use_recurrences = nambu_pendulum_fitted(&s->history);
+    s->blocks.use_recurrences = nambu_pendulum_fit(&s->history);
     s->blocks.single_steps = nambu_pendulum_LANES;
     if (!s->blocks.use_recurrences) nambu_pendulum_give_up(s);
 }

@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 6ac2cdb022e10eb90413e9c0c7635da2acb94bb840bd57d02dc5558fefc9dc28
+ * body-sha256: a42ea799aaa170fb8be7c7c34b116bc299cbffe02437dd3c46a54b0ee1740ea5
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -602,15 +602,9 @@ static void rigid_body_make_room(rigid_body_history *history, int values)
     history->count = rigid_body_REMEMBERED;
 }
 
-/* Add a value to the history. */
-static void rigid_body_record(rigid_body_history *history, const double value[rigid_body_DIM])
-{
-    rigid_body_make_room(history, 1);
-    memcpy(history->past[history->count++], value, rigid_body_DIM * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void rigid_body_fit(rigid_body_history *history)
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it
+   foresees. */
+static int rigid_body_fit(rigid_body_history *history)
 {
     int found = 1;
     history->recurrence_terms = 0;
@@ -625,6 +619,7 @@ static void rigid_body_fit(rigid_body_history *history)
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < rigid_body_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + rigid_body_REPAY : rigid_body_LONG_WAIT;
+    return found;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -632,7 +627,8 @@ static void rigid_body_remember(rigid_body_history *history, const double value[
     int iterations)
 {
     if (iterations > 1) rigid_body_judge(history, value);
-    rigid_body_record(history, value);
+    rigid_body_make_room(history, 1);
+    memcpy(history->past[history->count++], value, rigid_body_DIM * sizeof value[0]);
     history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
     if (history->slow_steps > history->slow_steps_allowed && history->count >= rigid_body_REMEMBERED)
         rigid_body_fit(history);
@@ -1403,7 +1399,7 @@ static void rigid_body_foresee(const rigid_body_history *history,
     }
 }
 
-/* rigid_body_record for the values of all lanes, one after the other. */
+/* Add the values of all lanes to the history, one after the other. */
 static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lanes y[restrict rigid_body_DIM])
 {
     rigid_body_make_room(history, rigid_body_LANES);
@@ -1525,13 +1521,6 @@ static void rigid_body_give_up(rigid_body_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Fit the recurrence of a stage. Whether it foresees. */
-static int rigid_body_fitted(rigid_body_history *history)
-{
-    rigid_body_fit(history);
-    return history->recurrence_terms > 0;
-}
-
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
@@ -1542,7 +1531,7 @@ static void rigid_body_choose_guess(rigid_body_solver *s, size_t steps)
     }
     if (s->blocks.use_recurrences || s->steps < s->blocks.recurrences_from_step) return;
     if (steps < rigid_body_REPAY_BLOCKS && s->steps < rigid_body_REPAY) return;
-    s->blocks.use_recurrences = rigid_body_fitted(&s->history);
+    s->blocks.use_recurrences = rigid_body_fit(&s->history);
     s->blocks.single_steps = rigid_body_LANES;
     if (!s->blocks.use_recurrences) rigid_body_give_up(s);
 }

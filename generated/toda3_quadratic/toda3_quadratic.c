@@ -12,7 +12,7 @@
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Members of an
  *   ensemble; Ensembles
- * body-sha256: 32671cdf299415b12aaeb8809d328fde32c14e545e32a65df0a4c7644c482ffb
+ * body-sha256: 920ca3d2db0d4ebeee0fdb12bb05ee0902056a336fe7c3ef32832b3b49ed605c
  */
 #include "toda3_quadratic.h"
 #include <float.h>
@@ -326,15 +326,9 @@ static void toda3_quadratic_make_room(toda3_quadratic_history *history, int valu
     history->count = toda3_quadratic_REMEMBERED;
 }
 
-/* Add a value to the history. */
-static void toda3_quadratic_record(toda3_quadratic_history *history, const double value[toda3_quadratic_DIM])
-{
-    toda3_quadratic_make_room(history, 1);
-    memcpy(history->past[history->count++], value, toda3_quadratic_DIM * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void toda3_quadratic_fit(toda3_quadratic_history *history)
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it
+   foresees. */
+static int toda3_quadratic_fit(toda3_quadratic_history *history)
 {
     int found = 1;
     history->recurrence_terms = 0;
@@ -349,6 +343,7 @@ static void toda3_quadratic_fit(toda3_quadratic_history *history)
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < toda3_quadratic_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + toda3_quadratic_REPAY : toda3_quadratic_LONG_WAIT;
+    return found;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
@@ -356,7 +351,8 @@ static void toda3_quadratic_remember(toda3_quadratic_history *history,
     const double value[toda3_quadratic_DIM], int iterations)
 {
     if (iterations > 1) toda3_quadratic_judge(history, value);
-    toda3_quadratic_record(history, value);
+    toda3_quadratic_make_room(history, 1);
+    memcpy(history->past[history->count++], value, toda3_quadratic_DIM * sizeof value[0]);
     history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
     if (history->slow_steps > history->slow_steps_allowed && history->count >= toda3_quadratic_REMEMBERED)
         toda3_quadratic_fit(history);

@@ -80,7 +80,7 @@ static void phi_foresee(const phi_history *history, phi_lanes weight[restrict][P
     }
 }
 
-/* phi_record for the values of all lanes, one after the other. */
+/* Add the values of all lanes to the history, one after the other. */
 static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM])
 {
     phi_make_room(history, PHI_LANES);
@@ -375,13 +375,6 @@ static void phi_give_up(phi_solver *s)
     s->blocks.recurrences_from_step = s->steps + s->blocks.steps_without_recurrences;
 }
 
-/* Fit the recurrence of a stage. Whether it foresees. */
-static int phi_fitted(phi_history *history)
-{
-    phi_fit(history);
-    return history->recurrence_terms > 0;
-}
-
 /* How the next block is guessed: by recurrences, fitted as soon as enough steps are to be made, or
    have been, to repay that. */
 static void phi_choose_guess(phi_solver *s, size_t steps)
@@ -396,9 +389,9 @@ static void phi_choose_guess(phi_solver *s, size_t steps)
 #if PHI_COMPOSED
     s->blocks.use_recurrences = 1;
     for (int stage = 0; stage < PHI_STAGES; ++stage)
-        s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fitted(&s->history[stage]);
+        s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fit(&s->history[stage]);
 #else
-    s->blocks.use_recurrences = phi_fitted(&s->history[0]);
+    s->blocks.use_recurrences = phi_fit(&s->history[0]);
 #endif
     s->blocks.single_steps = PHI_LANES;
     if (!s->blocks.use_recurrences) phi_give_up(s);

@@ -88,15 +88,8 @@ static void phi_make_room(phi_history *history, int values)
     history->count = PHI_REMEMBERED;
 }
 
-/* Add a value to the history. */
-static void phi_record(phi_history *history, const double value[PHI_DIM])
-{
-    phi_make_room(history, 1);
-    memcpy(history->past[history->count++], value, PHI_DIM * sizeof value[0]);
-}
-
-/* Fit the recurrence to the last values; with every time, wait longer before it is done again. */
-static void phi_fit(phi_history *history)
+/* Fit the recurrence to the last values; with every time, wait longer before it is done again. Whether it foresees. */
+static int phi_fit(phi_history *history)
 {
     int found = 1;
     history->recurrence_terms = 0;
@@ -111,13 +104,15 @@ static void phi_fit(phi_history *history)
     history->slow_steps = 0;
     history->slow_steps_allowed = history->slow_steps_allowed < PHI_LONG_WAIT / 2
         ? 2 * history->slow_steps_allowed + PHI_REPAY : PHI_LONG_WAIT;
+    return found;
 }
 
 /* Take in the solved value: what took one iteration needs no better guess. */
 static void phi_remember(phi_history *history, const double value[PHI_DIM], int iterations)
 {
     if (iterations > 1) phi_judge(history, value);
-    phi_record(history, value);
+    phi_make_room(history, 1);
+    memcpy(history->past[history->count++], value, PHI_DIM * sizeof value[0]);
     history->slow_steps = iterations > 1 ? history->slow_steps + 1 : 0;
     if (history->slow_steps > history->slow_steps_allowed && history->count >= PHI_REMEMBERED) phi_fit(history);
 }
