@@ -216,10 +216,13 @@ class CSolver:
         packed = np.empty((count, width), self._real)
         for k, value in enumerate(members.parameters.values()):
             packed[:, k] = value
-        h, t0 = (np.array(np.broadcast_to(value, count), self._real) for value in (members.h, members.t0))
-        gauge = None if self._gauge is None else np.array(np.broadcast_to(self._gauge, (count, self._gauge.shape[-1])))
-        own: list[Floats | None] = [t0] if self.interface.time else [gauge] if hasattr(self._c, "init_gauge") else []
-        return packed, own, h
+        own: list[Floats | None] = []
+        if self.interface.time:
+            own = [np.full(count, members.t0, self._real)]
+        elif hasattr(self._c, "init_gauge"):
+            gauge = self._gauge
+            own = [None if gauge is None else np.array(np.broadcast_to(gauge, (count, gauge.shape[-1])))]
+        return packed, own, np.full(count, members.h, self._real)
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
