@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a127157d5b42cf8ee4a0d8ab79e63c3a96be412b3e714721aa8261e00f12be05
+ * body-sha256: e21e176f45c285e8f2ad5e12fd53c0c9cd48b0d05e39e2501c836d39b3553b8a
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -480,11 +480,12 @@ int ablowitz_ladik_saved(const ablowitz_ladik_solver *s, double *x, size_t *far)
 ablowitz_ladik_status ablowitz_ladik_resume(ablowitz_ladik_solver *s, double h, const double *x, size_t far)
 {
     const ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
+    s->far = far;
+    if (status == ablowitz_ladik_OK && x == NULL) return ablowitz_ladik_OK;
     if (status != ablowitz_ladik_OK || !ablowitz_ladik_finite(x, ablowitz_ladik_DIM * s->sites))
         return ablowitz_ladik_BAD_ARGUMENT;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) ablowitz_ladik_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return ablowitz_ladik_OK;
 }
 

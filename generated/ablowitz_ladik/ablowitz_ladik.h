@@ -2,7 +2,7 @@
  * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a0def90d7b9fe16c8950568cf082d67f8ef6ab8d645c4240dbd569a49d8424b6
+ * body-sha256: 66fe7d4e2fb8c093eeec099e7b6df76c0cffb6f2194a11dea154412f6f2e303a
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
@@ -73,7 +73,8 @@ ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double 
 void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if ablowitz_ladik_saved is 1, x is what the next step begins with,
-   for ablowitz_ladik_resume after ablowitz_ladik_init at the state. */
+   for ablowitz_ladik_resume after ablowitz_ladik_init at the state. If it is 0, ablowitz_ladik_resume has
+   NULL for x. */
 int ablowitz_ladik_saved(const ablowitz_ladik_solver *s, double *x, size_t *far);
 ablowitz_ladik_status ablowitz_ladik_resume(ablowitz_ladik_solver *s, double h, const double *x, size_t far);
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 08a5969a05aa3f5e5d362f9e48c30e77cd1c961e096efb70b347db6140d0feed
+ * body-sha256: 86e001bca696e15bcc1bb3831b2fa53dc4419e3659f0d05b4c2ba7a4e1322224
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -770,11 +770,12 @@ int chiral_magnet_saved(const chiral_magnet_solver *s, double *x, size_t *far)
 chiral_magnet_status chiral_magnet_resume(chiral_magnet_solver *s, double h, const double *x, size_t far)
 {
     const chiral_magnet_status status = chiral_magnet_set_step(s, h);
+    s->far = far;
+    if (status == chiral_magnet_OK && x == NULL) return chiral_magnet_OK;
     if (status != chiral_magnet_OK || !chiral_magnet_finite(x, chiral_magnet_DIM * s->sites))
         return chiral_magnet_BAD_ARGUMENT;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return chiral_magnet_OK;
 }
 

@@ -2,7 +2,7 @@
  * chiral_magnet.h: the declarations; chiral_magnet.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3a4ec524c0929a0ea81474de12e07d3a791f2379672f0ad933be8ac94e0bc611
+ * body-sha256: 82e99c7ea5ccad0f5364780ea3b6bb3f1a0fec58e0cbbf066e857d4432d246ca
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -95,7 +95,8 @@ chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, 
 void chiral_magnet_state(const chiral_magnet_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if chiral_magnet_saved is 1, x is what the next step begins with,
-   for chiral_magnet_resume after chiral_magnet_init at the state. */
+   for chiral_magnet_resume after chiral_magnet_init at the state. If it is 0, chiral_magnet_resume has NULL
+   for x. */
 int chiral_magnet_saved(const chiral_magnet_solver *s, double *x, size_t *far);
 chiral_magnet_status chiral_magnet_resume(chiral_magnet_solver *s, double h, const double *x, size_t far);
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 449e276b2c8c786f60bb9a3175a28d13d819b349816ca91a4005b46bf43da65f
+ * body-sha256: 0b8d8bdd1f9b4927f350bcf47d312670d528836fa2cc3060494c1fbf24f13ae6
  */
 #include "dnls.h"
 #include <float.h>
@@ -451,10 +451,11 @@ int dnls_saved(const dnls_solver *s, double *x, size_t *far)
 dnls_status dnls_resume(dnls_solver *s, double h, const double *x, size_t far)
 {
     const dnls_status status = dnls_set_step(s, h);
+    s->far = far;
+    if (status == dnls_OK && x == NULL) return dnls_OK;
     if (status != dnls_OK || !dnls_finite(x, dnls_DIM * s->sites)) return dnls_BAD_ARGUMENT;
     for (size_t k = 0; k < dnls_DIM; ++k) dnls_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return dnls_OK;
 }
 

@@ -2,7 +2,7 @@
  * dnls.h: the declarations; dnls.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f31b24d3b58cb000df760cf9aadeb82f023322f8e2c2633128894518f118f4c4
+ * body-sha256: 9d04aca9fb4412002e1415749ae8c5acb4e9b54b4043f101e63dc2c8454fbd64
  */
 #ifndef DNLS_H
 #define DNLS_H
@@ -72,7 +72,7 @@ dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps);
 void dnls_state(const dnls_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if dnls_saved is 1, x is what the next step begins with, for
-   dnls_resume after dnls_init at the state. */
+   dnls_resume after dnls_init at the state. If it is 0, dnls_resume has NULL for x. */
 int dnls_saved(const dnls_solver *s, double *x, size_t *far);
 dnls_status dnls_resume(dnls_solver *s, double h, const double *x, size_t far);
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: d85f6df64b4b6c2d0ccdc251445a961cd16da141214cbc8afa0cebb46a2ffbf8
+ * body-sha256: 29ac438a35eb5b9bcad54b5fb14a9ccdce49bb4a0cd9ca8fd88f4a60a4fb1700
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -497,11 +497,12 @@ int dnls_disorder_saved(const dnls_disorder_solver *s, double *x, size_t *far)
 dnls_disorder_status dnls_disorder_resume(dnls_disorder_solver *s, double h, const double *x, size_t far)
 {
     const dnls_disorder_status status = dnls_disorder_set_step(s, h);
+    s->far = far;
+    if (status == dnls_disorder_OK && x == NULL) return dnls_disorder_OK;
     if (status != dnls_disorder_OK || !dnls_disorder_finite(x, dnls_disorder_DIM * s->sites))
         return dnls_disorder_BAD_ARGUMENT;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return dnls_disorder_OK;
 }
 

@@ -2,7 +2,7 @@
  * dnls_disorder.h: the declarations; dnls_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5f3ac6211757dc7f5d6e8c80128a36eb68268d38bbe5a8a62a8d094c043d87bb
+ * body-sha256: 9e58464b4ec098f8cc1733a943c7a5a90981a237ec5a735023da9a1ddb5a35b1
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
@@ -74,7 +74,8 @@ dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, 
 void dnls_disorder_state(const dnls_disorder_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if dnls_disorder_saved is 1, x is what the next step begins with,
-   for dnls_disorder_resume after dnls_disorder_init at the state. */
+   for dnls_disorder_resume after dnls_disorder_init at the state. If it is 0, dnls_disorder_resume has NULL
+   for x. */
 int dnls_disorder_saved(const dnls_disorder_solver *s, double *x, size_t *far);
 dnls_disorder_status dnls_disorder_resume(dnls_disorder_solver *s, double h, const double *x, size_t far);
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 5e0a6d166732894b186d25e4047552a98d361cd0a62bf3d2c095a1b704bce2d0
+ * body-sha256: 8572334631ad2fd58034de9098d86b6e4e37a1b1ce53e029365c0be3ed34f0aa
  */
 #include "food_web.h"
 #include <float.h>
@@ -584,10 +584,11 @@ int food_web_saved(const food_web_solver *s, double *x, size_t *far)
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far)
 {
     const food_web_status status = food_web_set_step(s, h);
+    s->far = far;
+    if (status == food_web_OK && x == NULL) return food_web_OK;
     if (status != food_web_OK || !food_web_finite(x, food_web_DIM * s->sites)) return food_web_BAD_ARGUMENT;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return food_web_OK;
 }
 

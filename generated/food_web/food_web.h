@@ -2,7 +2,7 @@
  * food_web.h: the declarations; food_web.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8d8f6064ccdbb71017ee6c2acaf238094fd24396762bac1ac4dd38c2bdadeb6b
+ * body-sha256: 9d0917a11a05aee7ddc09085421e2ea28fc0d62f158bc6d4d853ecf7596ff9d0
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -91,7 +91,7 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps);
 void food_web_state(const food_web_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if food_web_saved is 1, x is what the next step begins with, for
-   food_web_resume after food_web_init at the state. */
+   food_web_resume after food_web_init at the state. If it is 0, food_web_resume has NULL for x. */
 int food_web_saved(const food_web_solver *s, double *x, size_t *far);
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far);
 

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 4eb2f705e08750f19d550161c786516822cbf6e19ae3be45a0e9d02f5eb5bca7
+ * body-sha256: 27e947ba8865db7f81b9c0c41e547d6ddf7248c659b10d2a8aec00fcf3824152
  */
 #include "fput.h"
 #include <float.h>
@@ -558,10 +558,11 @@ int fput_saved(const fput_solver *s, double *x, size_t *far)
 fput_status fput_resume(fput_solver *s, double h, const double *x, size_t far)
 {
     const fput_status status = fput_set_step(s, h);
+    s->far = far;
+    if (status == fput_OK && x == NULL) return fput_OK;
     if (status != fput_OK || !fput_finite(x, fput_DIM * s->sites)) return fput_BAD_ARGUMENT;
     for (size_t k = 0; k < fput_DIM; ++k) fput_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return fput_OK;
 }
 

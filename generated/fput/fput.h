@@ -2,7 +2,7 @@
  * fput.h: the declarations; fput.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6f63c7ddaf989298f24a33e63591fcdb0055322c1a0e20df348449220e813fb1
+ * body-sha256: 288e99e51d3e928ccdbca98666e6a19f6de7ea55d27a0132d8b00dc1032f4041
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -79,7 +79,7 @@ fput_status fput_set_state(fput_solver *s, const double *x);
 fput_status fput_kick(fput_solver *s, const double *change);
 
 /* To go on elsewhere with the same bits: if fput_saved is 1, x is what the next step begins with, for
-   fput_resume after fput_init at the state. */
+   fput_resume after fput_init at the state. If it is 0, fput_resume has NULL for x. */
 int fput_saved(const fput_solver *s, double *x, size_t *far);
 fput_status fput_resume(fput_solver *s, double h, const double *x, size_t far);
 

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 36fb88bde1d76aa279ae411cfe483ecd653094cf06118551fb8f0f11c93cb930
+ * body-sha256: c5a5faeaf208cde747f806bfe4b98f135bccd430abe1596a7da356114e1e7c40
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -913,11 +913,12 @@ int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far)
 {
     const heisenberg_status status = heisenberg_set_step(s, h);
+    s->far = far;
+    if (status == heisenberg_OK && x == NULL) return heisenberg_OK;
     if (status != heisenberg_OK || !heisenberg_finite(x, heisenberg_DIM * s->sites))
         return heisenberg_BAD_ARGUMENT;
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return heisenberg_OK;
 }
 

@@ -2,7 +2,7 @@
  * heisenberg.h: the declarations; heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aed5061aaa4fd6a6968b7ca4b2ed636499db98f73f6dd2e81a217cac4ae28714
+ * body-sha256: 8cffee2deeb7f3100894c105e8704b4bbfc2d14547ac3e9ee3442288a82cc583
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -80,7 +80,7 @@ heisenberg_status heisenberg_set_state(heisenberg_solver *s, const double *x);
 heisenberg_status heisenberg_kick(heisenberg_solver *s, const double *change);
 
 /* To go on elsewhere with the same bits: if heisenberg_saved is 1, x is what the next step begins with, for
-   heisenberg_resume after heisenberg_init at the state. */
+   heisenberg_resume after heisenberg_init at the state. If it is 0, heisenberg_resume has NULL for x. */
 int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far);
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far);
 

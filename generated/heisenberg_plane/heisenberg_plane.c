@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8eb3a923e12c2dcf07b05d61f28f36c0cdfdacca44fdde4a4f76b7d7a2e7ea55
+ * body-sha256: e4e217880ccf5088bc50350a7ab62358190998dd381714bf9c87e1262019bae6
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -593,11 +593,12 @@ heisenberg_plane_status heisenberg_plane_resume(heisenberg_plane_solver *s, doub
     size_t far)
 {
     const heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
+    s->far = far;
+    if (status == heisenberg_plane_OK && x == NULL) return heisenberg_plane_OK;
     if (status != heisenberg_plane_OK || !heisenberg_plane_finite(x, heisenberg_plane_DIM * s->sites))
         return heisenberg_plane_BAD_ARGUMENT;
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k) heisenberg_plane_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return heisenberg_plane_OK;
 }
 

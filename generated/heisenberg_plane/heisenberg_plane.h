@@ -2,7 +2,7 @@
  * heisenberg_plane.h: the declarations; heisenberg_plane.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 49e76778f33002bb12168bbb6cd41ec35a7a155a13d3fac3e350982326e8577a
+ * body-sha256: 8396bbe6a1d00339c7a53af38d3e7de64b1afac6b6e4bfb0953defcc2421f25b
  */
 #ifndef HEISENBERG_PLANE_H
 #define HEISENBERG_PLANE_H
@@ -76,7 +76,8 @@ heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, d
 void heisenberg_plane_state(const heisenberg_plane_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if heisenberg_plane_saved is 1, x is what the next step begins with,
-   for heisenberg_plane_resume after heisenberg_plane_init at the state. */
+   for heisenberg_plane_resume after heisenberg_plane_init at the state. If it is 0, heisenberg_plane_resume
+   has NULL for x. */
 int heisenberg_plane_saved(const heisenberg_plane_solver *s, double *x, size_t *far);
 heisenberg_plane_status heisenberg_plane_resume(heisenberg_plane_solver *s, double h, const double *x,
     size_t far);

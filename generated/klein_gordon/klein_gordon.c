@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2bb3a6bd59c39c10893c610b727c43b0274b87c27e62e921cfbd02505df5cb77
+ * body-sha256: b08cd7041f0d0e3c1cb124b4a6db50ce3acb2add1d8b2e88333b1862739b9af0
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -413,11 +413,12 @@ int klein_gordon_saved(const klein_gordon_solver *s, double *x, size_t *far)
 klein_gordon_status klein_gordon_resume(klein_gordon_solver *s, double h, const double *x, size_t far)
 {
     const klein_gordon_status status = klein_gordon_set_step(s, h);
+    s->far = far;
+    if (status == klein_gordon_OK && x == NULL) return klein_gordon_OK;
     if (status != klein_gordon_OK || !klein_gordon_finite(x, klein_gordon_DIM * s->sites))
         return klein_gordon_BAD_ARGUMENT;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) klein_gordon_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return klein_gordon_OK;
 }
 

@@ -2,7 +2,7 @@
  * klein_gordon.h: the declarations; klein_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 74314006909806143db7d75d953050c1b5e51118e3e141a1a6a34feb75c3215c
+ * body-sha256: fe404b33b8901bf93dae8d66180ab127b2e319454a35b524a71dc92cb6c17345
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
@@ -73,7 +73,8 @@ klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, siz
 void klein_gordon_state(const klein_gordon_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if klein_gordon_saved is 1, x is what the next step begins with, for
-   klein_gordon_resume after klein_gordon_init at the state. */
+   klein_gordon_resume after klein_gordon_init at the state. If it is 0, klein_gordon_resume has NULL for
+   x. */
 int klein_gordon_saved(const klein_gordon_solver *s, double *x, size_t *far);
 klein_gordon_status klein_gordon_resume(klein_gordon_solver *s, double h, const double *x, size_t far);
 

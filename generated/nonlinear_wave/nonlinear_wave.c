@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 59ad70a2d05ad6dffc8a7059112ac6b9f6d04d477ecda1c77f512a28a56dad61
+ * body-sha256: 9159aea003131ff8775d6f159cfc02ffce3d856c6ba44db88785ba3c326bd08d
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -434,11 +434,12 @@ int nonlinear_wave_saved(const nonlinear_wave_solver *s, double *x, size_t *far)
 nonlinear_wave_status nonlinear_wave_resume(nonlinear_wave_solver *s, double h, const double *x, size_t far)
 {
     const nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
+    s->far = far;
+    if (status == nonlinear_wave_OK && x == NULL) return nonlinear_wave_OK;
     if (status != nonlinear_wave_OK || !nonlinear_wave_finite(x, nonlinear_wave_DIM * s->sites))
         return nonlinear_wave_BAD_ARGUMENT;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k) nonlinear_wave_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return nonlinear_wave_OK;
 }
 

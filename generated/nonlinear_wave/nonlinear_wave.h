@@ -2,7 +2,7 @@
  * nonlinear_wave.h: the declarations; nonlinear_wave.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e8dffc9fc74bde0520fe465980ef5315a3f17cc5f98bbdf303cfaaacacac9eb5
+ * body-sha256: 11baecb8f1671179427f9e29c8821a86c88938ea000d5f5110ed4eccbc76c5a4
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
@@ -74,7 +74,8 @@ nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double 
 void nonlinear_wave_state(const nonlinear_wave_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if nonlinear_wave_saved is 1, x is what the next step begins with,
-   for nonlinear_wave_resume after nonlinear_wave_init at the state. */
+   for nonlinear_wave_resume after nonlinear_wave_init at the state. If it is 0, nonlinear_wave_resume has
+   NULL for x. */
 int nonlinear_wave_saved(const nonlinear_wave_solver *s, double *x, size_t *far);
 nonlinear_wave_status nonlinear_wave_resume(nonlinear_wave_solver *s, double h, const double *x, size_t far);
 

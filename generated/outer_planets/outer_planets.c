@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c09cf7b820caa4aa7584f2568083fb355f31a5c8de83d982cd785844c847f700
+ * body-sha256: 0ab8e5253b1dc4f46a74f86b7dd5ca436dae115e0752bee7a029b18142d4ef18
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -512,11 +512,12 @@ int outer_planets_saved(const outer_planets_solver *s, double *x, size_t *far)
 outer_planets_status outer_planets_resume(outer_planets_solver *s, double h, const double *x, size_t far)
 {
     const outer_planets_status status = outer_planets_set_step(s, h);
+    s->far = far;
+    if (status == outer_planets_OK && x == NULL) return outer_planets_OK;
     if (status != outer_planets_OK || !outer_planets_finite(x, outer_planets_DIM * s->sites))
         return outer_planets_BAD_ARGUMENT;
     for (size_t k = 0; k < outer_planets_DIM; ++k) outer_planets_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return outer_planets_OK;
 }
 

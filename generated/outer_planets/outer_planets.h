@@ -2,7 +2,7 @@
  * outer_planets.h: the declarations; outer_planets.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fa2f783e53edee26370e7299c29ff7972693a165ad9d8b4be517ad3e8e36277d
+ * body-sha256: c38a1edfba709078e43cfe75aad6dcb29ca0f3c8e94fdfcb3275111ef3feb73d
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -76,7 +76,8 @@ outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, 
 void outer_planets_state(const outer_planets_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if outer_planets_saved is 1, x is what the next step begins with,
-   for outer_planets_resume after outer_planets_init at the state. */
+   for outer_planets_resume after outer_planets_init at the state. If it is 0, outer_planets_resume has NULL
+   for x. */
 int outer_planets_saved(const outer_planets_solver *s, double *x, size_t *far);
 outer_planets_status outer_planets_resume(outer_planets_solver *s, double h, const double *x, size_t far);
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 402c955a16f068f95a89e688f45a1aea4b4875f16629e99746d46bcdcc2a7ae8
+ * body-sha256: 51a1cdb104957c062dd45c47e9cf6af2aaa439b03018c48cc5181b67b52780d6
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -446,11 +446,12 @@ int sine_gordon_saved(const sine_gordon_solver *s, double *x, size_t *far)
 sine_gordon_status sine_gordon_resume(sine_gordon_solver *s, double h, const double *x, size_t far)
 {
     const sine_gordon_status status = sine_gordon_set_step(s, h);
+    s->far = far;
+    if (status == sine_gordon_OK && x == NULL) return sine_gordon_OK;
     if (status != sine_gordon_OK || !sine_gordon_finite(x, sine_gordon_DIM * s->sites))
         return sine_gordon_BAD_ARGUMENT;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) sine_gordon_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return sine_gordon_OK;
 }
 

@@ -2,7 +2,7 @@
  * sine_gordon.h: the declarations; sine_gordon.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 45250626619658a3f1752c4dde422bcedc0053525e35d751aa7b05e57da1c1b3
+ * body-sha256: 4cb25d045966d403bfa9de1e28604ee2df0c8213afb1bbd7fad93030da7bec1e
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
@@ -73,7 +73,7 @@ sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t
 void sine_gordon_state(const sine_gordon_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if sine_gordon_saved is 1, x is what the next step begins with, for
-   sine_gordon_resume after sine_gordon_init at the state. */
+   sine_gordon_resume after sine_gordon_init at the state. If it is 0, sine_gordon_resume has NULL for x. */
 int sine_gordon_saved(const sine_gordon_solver *s, double *x, size_t *far);
 sine_gordon_status sine_gordon_resume(sine_gordon_solver *s, double h, const double *x, size_t far);
 

@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: 40ff8f7b7b158405bf6146155743816f5df195c8e02eafa0ac75bdf8819eb525
+ * body-sha256: 8b68069b7f7c8106a3cc1d20274f7584d98a4616f02aac5866d26867c137fa83
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -756,12 +756,13 @@ thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s
     size_t far)
 {
     const thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);
+    s->far = far;
+    if (status == thermal_heisenberg_OK && x == NULL) return thermal_heisenberg_OK;
     if (status != thermal_heisenberg_OK || !thermal_heisenberg_finite(x, thermal_heisenberg_DIM * s->sites))
         return thermal_heisenberg_BAD_ARGUMENT;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
         thermal_heisenberg_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return thermal_heisenberg_OK;
 }
 

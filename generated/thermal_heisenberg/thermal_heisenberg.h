@@ -2,7 +2,7 @@
  * thermal_heisenberg.h: the declarations; thermal_heisenberg.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 209ae767eab9a655e227b6f27fe64a691b5730463bb6ba5a95fd5b276bca2db5
+ * body-sha256: ef04f8547c0c4140dff37dacd644893f5112cb58f044ad3d15a38f2dee3a1832
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -89,7 +89,8 @@ thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver
 void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if thermal_heisenberg_saved is 1, x is what the next step begins
-   with, for thermal_heisenberg_resume after thermal_heisenberg_init at the state. */
+   with, for thermal_heisenberg_resume after thermal_heisenberg_init at the state. If it is 0,
+   thermal_heisenberg_resume has NULL for x. */
 int thermal_heisenberg_saved(const thermal_heisenberg_solver *s, double *x, size_t *far);
 thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s, double h, const double *x,
     size_t far);

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3c8a56432e88399ec17a92fc67978c62b30f430a26d2df24ae2a05762e1c5b32
+ * body-sha256: 072c3bde565c18333e430ed2c573ff6a8a761e7f52c4ddc50942e7cbecc0a382
  */
 #include "toda.h"
 #include <float.h>
@@ -440,10 +440,11 @@ int toda_saved(const toda_solver *s, double *x, size_t *far)
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far)
 {
     const toda_status status = toda_set_step(s, h);
+    s->far = far;
+    if (status == toda_OK && x == NULL) return toda_OK;
     if (status != toda_OK || !toda_finite(x, toda_DIM * s->sites)) return toda_BAD_ARGUMENT;
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return toda_OK;
 }
 

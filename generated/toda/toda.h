@@ -2,7 +2,7 @@
  * toda.h: the declarations; toda.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e998ab09d9e04f908c620de24b45cca39172a9b82d40d745ffb2232a2ca00605
+ * body-sha256: b3da08611bf1be093051d4efce0edf5193d775db58a2db099d368d4f4ae47275
  */
 #ifndef TODA_H
 #define TODA_H
@@ -72,7 +72,7 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps);
 void toda_state(const toda_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if toda_saved is 1, x is what the next step begins with, for
-   toda_resume after toda_init at the state. */
+   toda_resume after toda_init at the state. If it is 0, toda_resume has NULL for x. */
 int toda_saved(const toda_solver *s, double *x, size_t *far);
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far);
 

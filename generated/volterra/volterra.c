@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 78d6291c8c4baa6c28ac9e5739c355c85bc32f0e8fdbbd3b72604d45aa492765
+ * body-sha256: f62b03ca40c42205991cfdfa0b5564b2ab26e080a38ba18510649c6e05f31647
  */
 #include "volterra.h"
 #include <float.h>
@@ -444,10 +444,11 @@ int volterra_saved(const volterra_solver *s, double *x, size_t *far)
 volterra_status volterra_resume(volterra_solver *s, double h, const double *x, size_t far)
 {
     const volterra_status status = volterra_set_step(s, h);
+    s->far = far;
+    if (status == volterra_OK && x == NULL) return volterra_OK;
     if (status != volterra_OK || !volterra_finite(x, volterra_DIM * s->sites)) return volterra_BAD_ARGUMENT;
     for (size_t k = 0; k < volterra_DIM; ++k) volterra_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return volterra_OK;
 }
 

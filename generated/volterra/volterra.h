@@ -2,7 +2,7 @@
  * volterra.h: the declarations; volterra.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ba01c3af7325d2981ddbd0616da84b31501a6c836f30c08530ee4f9c2f6934ff
+ * body-sha256: ba34a37b4b812fbdf4fe6a1bf69059cd14f8b49c73c42ce7928ec66965f886b5
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
@@ -72,7 +72,7 @@ volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps);
 void volterra_state(const volterra_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if volterra_saved is 1, x is what the next step begins with, for
-   volterra_resume after volterra_init at the state. */
+   volterra_resume after volterra_init at the state. If it is 0, volterra_resume has NULL for x. */
 int volterra_saved(const volterra_solver *s, double *x, size_t *far);
 volterra_status volterra_resume(volterra_solver *s, double h, const double *x, size_t far);
 

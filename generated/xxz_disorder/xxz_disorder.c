@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b9f687cc311f448c39ab781f27ca426c5b44135038fe930abfb4de93d6a1cd54
+ * body-sha256: e3454d7f0e4a17b90dcc83273f75496b4ecdee7d572b5fa4262dcb8dc550b437
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -502,11 +502,12 @@ int xxz_disorder_saved(const xxz_disorder_solver *s, double *x, size_t *far)
 xxz_disorder_status xxz_disorder_resume(xxz_disorder_solver *s, double h, const double *x, size_t far)
 {
     const xxz_disorder_status status = xxz_disorder_set_step(s, h);
+    s->far = far;
+    if (status == xxz_disorder_OK && x == NULL) return xxz_disorder_OK;
     if (status != xxz_disorder_OK || !xxz_disorder_finite(x, xxz_disorder_DIM * s->sites))
         return xxz_disorder_BAD_ARGUMENT;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) xxz_disorder_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
-    s->far = far;
     return xxz_disorder_OK;
 }
 

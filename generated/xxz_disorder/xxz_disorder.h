@@ -2,7 +2,7 @@
  * xxz_disorder.h: the declarations; xxz_disorder.c says how they were made.
  * DO NOT EDIT: edits are noticed by the checksum below.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 47b0ee3e599b8cd3a75a3cd873c00e66e8057af4e888bbff9f34649361532f59
+ * body-sha256: d09f202b49fae75fb3a75c44add1dda9b68f0b2a8c935754ab8dce52bf57d6cc
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
@@ -75,7 +75,8 @@ xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, siz
 void xxz_disorder_state(const xxz_disorder_solver *s, double *x);
 
 /* To go on elsewhere with the same bits: if xxz_disorder_saved is 1, x is what the next step begins with, for
-   xxz_disorder_resume after xxz_disorder_init at the state. */
+   xxz_disorder_resume after xxz_disorder_init at the state. If it is 0, xxz_disorder_resume has NULL for
+   x. */
 int xxz_disorder_saved(const xxz_disorder_solver *s, double *x, size_t *far);
 xxz_disorder_status xxz_disorder_resume(xxz_disorder_solver *s, double h, const double *x, size_t far);
 

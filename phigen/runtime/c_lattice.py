@@ -209,7 +209,7 @@ class CLatticeSession:
         x = np.empty((self._kept * self._shape[0], *self._shape[1:]), self._real)
         far = np.zeros(1, dtype=np.uintp)
         is_open = self._c.saved(self._address, x.ctypes.data, far.ctypes.data)
-        return {"before": x, "far": far} if is_open else {}
+        return {"before": x, "far": far} if is_open else {"far": far}
 
     def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
         """Go on from what was saved."""
@@ -217,9 +217,11 @@ class CLatticeSession:
             self.passed(h, steps)
         else:
             self._before = steps
-        if "before" in kept:
-            x = np.ascontiguousarray(kept["before"], dtype=self._real)
-            self._expect_done(self._c.resume(self._address, h, x.ctypes.data, int(kept["far"][0])))
+        if "far" in kept:
+            x = np.ascontiguousarray(kept["before"], dtype=self._real) if "before" in kept else None
+            self._expect_done(
+                self._c.resume(self._address, h, x.ctypes.data if x is not None else None, int(kept["far"][0]))
+            )
 
     def place(self, x: Floats) -> None:
         """Stand at ``x`` (coordinates, *sizes). Raises `BackendError` where that is not finite."""

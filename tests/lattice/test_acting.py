@@ -203,7 +203,7 @@ def test_increments_are_independent_and_of_variance_h() -> None:
     np.testing.assert_array_equal(module._draw(sites, 0), -second)
 
 
-@pytest.mark.parametrize("name", ["bath", "langevin", "damped"])
+@pytest.mark.parametrize("name", ["bath", "langevin", "damped", "cool", "hot"])
 def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tmp_path: Path) -> None:
     x, values = given(name)
     draws = {"seed": 3, "member": 1, "step0": 2} if compiled(name).program.noise else {}

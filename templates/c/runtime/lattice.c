@@ -489,13 +489,14 @@ int phi_saved(const phi_solver *s, double *x, size_t *far)
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
 {
     const phi_status status = phi_set_step(s, h);
+    s->far = far;
+    if (status == PHI_OK && x == NULL) return PHI_OK;
     if (status != PHI_OK || !phi_finite(x, PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->before[k], x + k * s->sites);
 #if PHI_COMPENSATED
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->carry[PHI_DIM + k], x + (PHI_DIM + k) * s->sites);
 #endif
     s->open = 1;
-    s->far = far;
     return PHI_OK;
 }
 

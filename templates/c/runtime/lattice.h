@@ -213,10 +213,10 @@ phi_status phi_kick(phi_solver *s, const double *change);
 
 #if PHI_COMPENSATED
 /* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after
-   phi_init at the state: all fields, then what rounding has left out of each. */
+   phi_init at the state: all fields, then what rounding has left out of each. If it is 0, phi_resume has NULL for x. */
 #else
 /* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after
-   phi_init at the state. */
+   phi_init at the state. If it is 0, phi_resume has NULL for x. */
 #endif
 int phi_saved(const phi_solver *s, double *x, size_t *far);
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far);
