@@ -21,6 +21,7 @@ from phigen.runtime.interface import (
     MissingExtraError,
     status_name,
 )
+from phigen.runtime.interrupts import interruptible
 from phigen.runtime.memory import expect_room
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
@@ -55,6 +56,7 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "integrate_tangent": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER)),
     "trail_size": (_SIZE, (_POINTER, _SIZE)),
     "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, *(_POINTER,) * 5, _SIZE)),
+    "ask": (None, (_POINTER, _POINTER)),
     "saved": (_INT, (_POINTER, _POINTER, _POINTER)),
     "resume": (_INT, (_POINTER, _DOUBLE, _POINTER, _SIZE)),
     "stages": (_SIZE, ()),
@@ -180,7 +182,8 @@ class CLatticeSession:
         room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, twice))
         trail = np.empty(min(most or least, room), dtype=np.uint8)
         pointers = (rows.ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found, trail.ctypes.data)
-        status = self._c.pullback(self._address, h, steps, stride, *pointers, max(len(trail), least))
+        with interruptible(lambda question: self._c.ask(self._address, question)):
+            status = self._c.pullback(self._address, h, steps, stride, *pointers, max(len(trail), least))
         if status:
             self.advance(h, steps)  # tells where
             raise BackendError(status_name(status), 0, self.state()[None])

@@ -1,5 +1,8 @@
 """Runs of lattices pulled back: against differences, many digits, and one another."""
 
+import os
+import signal
+import threading
 from functools import cache
 
 import mpmath
@@ -259,6 +262,17 @@ def test_c_has_the_same_bits_for_any_threads(name):
     for one in found:
         assert np.array_equal(one.x0_bar, found[0].x0_bar)
         assert same(one.parameters_bar, found[0].parameters_bar)
+
+
+@pytest.mark.parametrize("name", ["driven", pytest.param("driven composed", marks=pytest.mark.slow)])
+def test_long_pullbacks_in_c_are_interrupted(name):
+    solver, x = made(name, "c"), np.full((2, 4000), 0.1)  # worked at by one thread
+    handler = signal.getsignal(signal.SIGINT)
+    threading.Timer(0.1, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        solver.pullback(x, 1e-3, 1_000_000, x)
+    assert signal.getsignal(signal.SIGINT) is handler
+    assert np.isfinite(solver.pullback(x, 1e-3, 2, x).x0_bar).all()
 
 
 def test_what_cannot_be_pulled_back_is_told():

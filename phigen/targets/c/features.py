@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from phigen.lanes.lowering import Blocks, Lanes, Packs, Traces
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Implicit, Newton, Path, Splitting
+from phigen.scheme.steps import Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import features
 from phigen.targets.c.lanes import grouped
 from phigen.targets.features import Feature
@@ -17,6 +17,7 @@ FEATURES = (
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("RELATIVE", lambda p: isinstance(p.step, Implicit) and p.step.inner.relative),
     Feature("ADJOINT", lambda p: p.step.adjoint),
+    Feature("ASKED", lambda p: isinstance(p.step, Sweeps), ("ADJOINT",)),
     Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent or p.offers("kicks")),
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and p.profile == "fast" and p.step.eliminate),
     Feature("EACH", lambda p: not p.noise, ("ENSEMBLE",), "members"),

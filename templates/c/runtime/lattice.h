@@ -93,6 +93,7 @@ typedef struct {
 #endif
 #endif
 #if PHI_ADJOINT
+    int (*stop)(void);        /* see phi_ask */
 #if PHI_SERIES
     double *kept;             /* where a step keeps the y of its stages, while it does */
 #else
@@ -195,6 +196,9 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
 size_t phi_trail_size(const phi_solver *s, size_t steps);
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
     double *x0_bar, phi_params_bar *params_bar, void *trail, size_t size);
+
+/* Ask this now and then in phi_pullback, which ends with PHI_STOPPED where it is not 0, and nobody if it is NULL. */
+void phi_ask(phi_solver *s, int (*stop)(void));
 
 /* The same for one step, with phi_trail_size(s, 1) bytes; x0_bar may be x1_bar. */
 phi_status phi_step_adjoint(phi_solver *s, double h, const double *x1_bar, double *x0_bar, phi_params_bar *params_bar,

@@ -105,6 +105,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
 #else
         (void)coef_bar;
 #endif
+        if (status == PHI_OK && phi_is_stopped(s, g, 1)) status = PHI_STOPPED;
     }
     return status;
 }
@@ -134,7 +135,7 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
         }
         status = phi_segment_back(s, g, done, end, stride, steps, rows_bar, coef_bar);
         if (status == PHI_OK && !phi_all_hold(s, g->bar)) status = PHI_NOT_FINITE;
-        g->failed = status != PHI_OK && !g->far;
+        g->failed = status != PHI_OK && status != PHI_STOPPED && !g->far;
         if (g->count > 1 && done == g->marks[2 * (g->count - 1)]) --g->count;
     }
 #if !PHI_RENEWED
@@ -187,6 +188,8 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     if (params_bar != NULL) phi_add_parameters(s, &g, coef_bar, params_bar);
     return PHI_OK;
 }
+
+void phi_ask(phi_solver *s, int (*stop)(void)) { s->stop = stop; }
 
 phi_status phi_step_adjoint(phi_solver *s, double h, const double *x1_bar, double *x0_bar, phi_params_bar *params_bar,
     void *trail)

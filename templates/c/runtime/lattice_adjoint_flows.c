@@ -180,9 +180,11 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
     s->kept = keeping ? g->kept : NULL;
     while (done < until && status == PHI_OK) {
         const size_t row = done / stride + 1, left = until - done, ahead = row * stride - done;
-        const size_t now = rows == NULL || left < ahead ? left : ahead;
+        const size_t most = PHI_UNASKED / s->sites + 1, wanted = rows == NULL || left < ahead ? left : ahead;
+        const size_t now = wanted < most ? wanted : most;
         status = phi_march(s, now);
         done += now;
+        if (status == PHI_OK && phi_is_stopped(s, g, now)) status = PHI_STOPPED;
         if (status != PHI_OK || rows == NULL || (done != steps && done % stride != 0)) continue;
         double *const kept = s->kept;
         s->kept = NULL;

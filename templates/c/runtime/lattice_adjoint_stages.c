@@ -92,6 +92,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
         if (status != PHI_OK) break;
         phi_stand(s, s->steps + 1);
         ++done;
+        if (phi_is_stopped(s, g, 1)) status = PHI_STOPPED;
         if (rows != NULL && (done == steps || done % stride == 0))
             phi_take(s, s->x, rows + (done - 1) / stride * PHI_DIM * s->sites);
     }

@@ -34,6 +34,7 @@ typedef struct {
     size_t most, count;          /* how many there may be, and are */
     size_t longest;              /* most steps of a segment */
     size_t first_step;           /* steps that were made before */
+    size_t unasked;              /* updates of sites since it was asked whether to stop */
     int far;                     /* whether cotangents are found by functions for arguments of any size */
     int failed;                  /* whether others have led to what is not finite */
 } phi_transpose;
@@ -116,6 +117,17 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     g->sums = g->kept + g->longest * g->of_step;
     g->marks = (size_t *)(void *)(g->sums + phi_units(s) * PHI_SUMS);
     memset(g->sums, 0, phi_units(s) * PHI_SUMS * sizeof *next);
+}
+
+enum { PHI_UNASKED = 1 << 22 }; /* updates of sites before it is asked whether to stop */
+
+/* Whether to stop, after so many more steps. */
+static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
+{
+    g->unasked += steps * s->sites;
+    if (s->stop == NULL || g->unasked < PHI_UNASKED) return 0;
+    g->unasked = 0;
+    return s->stop();
 }
 
 /* The fields of the state that a segment begins with. */

@@ -10,6 +10,9 @@ const char *phi_status_string(phi_status status)
     case PHI_SINGULAR: return "singular Newton matrix: the step is too large";
     case PHI_NOT_FINITE: return "not finite: overflow, or outside the domain";
     case PHI_BAD_ARGUMENT: return "bad argument: a null pointer, or values that are not allowed";
+#if PHI_ASKED
+    case PHI_STOPPED: return "stopped, as was asked";
+#endif
     }
     return "unknown status";
 }
