@@ -33,6 +33,8 @@ MEANT = {
     "conserved": "invariants", "temperature": "noise", "thermal": "noise", "langevin": "noise", "diffusion": "noise",
     "stochastic": "noise", "noises": "noise", "sigma": "amplitude", "g": "hamiltonian", "random_seed": "seed",
     "realisations": "members", "paths": "members", "samples": "members",
+    "attitude": "reconstruct", "attitudes": "reconstruct", "orientation": "reconstruct", "pose": "reconstruct",
+    "quaternion": "reconstruct", "rotation": "reconstruct",
     "default": "value", "shape": "sizes",
     "precision": "order", "method": "scheme", "integrator": "scheme",
 }  # fmt: skip
