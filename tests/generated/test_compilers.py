@@ -160,7 +160,7 @@ FURTHER |= {
 }
 
 
-@pytest.mark.parametrize("case", slow_but(["kepler"], FURTHER))
+@pytest.mark.parametrize("case", slow_but(["kepler", "powers"], FURTHER))
 def test_further_code_is_clean_under_sanitizers(case, tmp_path):
     compilation = FURTHER[case]()
     write(tmp_path, files(compilation, "c"))
