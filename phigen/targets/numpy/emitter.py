@@ -266,6 +266,7 @@ def _attitude(program: Program, attitude: Attitude) -> list[str]:
         "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
         "turn_of_stage": _turn_of_stage(attitude, solved),
         "lengthened": attitude.lengthened,
+        "turn_of_flows": "_shorter(turn)" if attitude.lengthened else "turn",
         "shaped": _shaped(rows, bool(group.translation)),
         **_ordered(group.spatial),
         "shapes": shown + ", positions (rows, ..., 3)" * bool(group.translation),

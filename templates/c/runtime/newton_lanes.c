@@ -93,6 +93,7 @@ static void phi_apply(phi_lanes matrix[restrict PHI_DIM * PHI_DIM], phi_lanes ve
     }
 }
 
+#if PHI_SWEPT || PHI_GROUPS
 /* What a residual takes from the increment. */
 static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi_lanes gained[restrict PHI_DIM])
 {
@@ -107,6 +108,7 @@ static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi
 #endif
 }
 
+#endif
 #if !PHI_SWEPT || PHI_GROUPS
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
 static void phi_correct(phi_model *model, phi_lanes size)
