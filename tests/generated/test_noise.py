@@ -439,7 +439,7 @@ def test_the_code_says_what_noise_leaves_of_it():
     ("more", "message"),
     [
         ("damping: lam\norder: 4", "with forces and noise a step has order 2, not 4"),
-        ("scheme: splitting\ndamping: lam", "the force ζ_x = .* has no elementary flow"),
+        ("scheme: splitting\nforces: {covector: {z: exp(x*y*z)}}", "the force ζ_z = .* has no elementary flow"),
         ("adjoint: true", "adjoint: not with noise"),
     ],
 )
