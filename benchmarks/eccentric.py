@@ -118,12 +118,12 @@ def of_phigen(periods: int) -> Iterator[Row]:
 
 
 def of_series(periods: int) -> Iterator[Row]:
-    """The series with dt = r^(3/2) dτ, steps of order 2 composed to the orders 6 and 8."""
+    """The series with dt = r^(3/2) dτ, steps of order 2 composed to the orders 6, 8 and 10."""
     text = (Path(__file__).parents[1] / "specs" / "kepler_eccentric.yaml").read_text()
     changes = {"scheme: splitting": "scheme: series", "monitor: log": "monitor: r2**(3/4)", "profile: small": ""}
     for old, new in changes.items():
         text = text.replace(old, new)
-    for order, per in ((6, 60), (6, 100), (8, 40), (8, 60), (8, 80)):
+    for order, per in ((6, 60), (6, 100), (8, 40), (8, 60), (8, 80), (10, 24)):
         solver = solver_of(compile_spec(spec.loads(text), order=order), "c")
         h = PERIOD / per
         few = solver.integrate(START, h, 50 * per, 50 * per, oblateness=OBLATENESS).t[-1]
