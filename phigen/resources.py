@@ -38,7 +38,11 @@ def bundled_name(file: str) -> str | None:
 
 def file_of(given: str) -> str:
     """The path itself if there is such a file, or none of the bundled specs has that name; else that of the spec."""
-    return given if Path(given).is_file() else str(bundled().get(given, given))
+    try:
+        there = Path(given).is_file()
+    except OSError:  # too long for a name
+        there = False
+    return given if there else str(bundled().get(given, given))
 
 
 def _find(name: str) -> Path:

@@ -136,6 +136,13 @@ def test_error_of_load_shows_the_line(tmp_path):
         phigen.load(path)
 
 
+@pytest.mark.parametrize("lines", [2, 2000])
+def test_a_text_in_place_of_a_file_hears_what_reads_it(lines):
+    """A long one is no file name for the system either, which says so in an error of its own."""
+    with pytest.raises(phigen.SpecError, match=r"hint: phigen\.spec\.loads"):
+        phigen.compile("phigen: 1\n" * lines)
+
+
 def test_formulas_are_those_of_the_method():
     """The log-canonical chart and its S_3, as sympy objects that can be used as such."""
     found = phigen.formulas(from_sympy(), order=4)

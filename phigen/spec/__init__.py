@@ -33,6 +33,9 @@ def load(path: str | PathLike[str]) -> Spec:
         with Path(file).open("rb") as stream:
             data = stream.read(limits.FILE_BYTES + 1)
     except (OSError, ValueError) as error:
+        if "\n" in file:
+            message = "the name of a spec file was expected, and this is a text of several lines"
+            raise SpecError([Diagnostic(message, hint="phigen.spec.loads(text) reads it")]) from error
         reason = getattr(error, "strerror", None) or str(error)
         raise SpecError([Diagnostic(f"cannot read {file!r}: {reason}")]) from error
     return validate(data, file)
