@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 86e001bca696e15bcc1bb3831b2fa53dc4419e3659f0d05b4c2ba7a4e1322224
+ * body-sha256: 7dc5a1890a86219f0d1affe8b9d90377bfd151c28542087a7a27cc1ade4f790e
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -84,6 +84,7 @@ typedef struct {
     double *const *gathered; /* see chiral_magnet_solver */
     const int *bonds, *middle, *other;
     double *const *at_bonds;
+    double side; /* 1, or -1 where a loop is told of bonds as if they ran the other way */
     const int *colours;
     int chosen; /* the colour that a part of H belongs to */
 } chiral_magnet_row;
@@ -109,6 +110,7 @@ static inline void chiral_magnet_locate(const chiral_magnet_solver *s, chiral_ma
     row->middle = s->middle;
     row->other = s->other;
     row->at_bonds = s->at_bonds;
+    row->side = 1.0;
     row->colours = s->colours;
     row->chosen = 0;
 }
@@ -169,7 +171,9 @@ static inline double chiral_magnet_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double chiral_magnet_sin_lane(double u) { return chiral_magnet_turned_sin(u, 0.0); }
 
-/* what all other sites b add to the forces of H_1 at a site a */
+/* what all other sites b add to the forces of H_1 at a site a
+   what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, x, z, with
+      other parameters at bonds, the other way */
 static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
@@ -179,7 +183,7 @@ static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magn
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double side = k < row->middle[i] ? row->side : -row->side;
             const double y_b_ = y_row[j], Dx = side * row->at_bonds[0][k];
             sum0 += -(y_b_ * (Dx * c1));
         }
@@ -213,7 +217,8 @@ static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magn
     }
 }
 
-/* what all other sites b add to the forces of H_1 at a site a */
+/* what all other sites b add to the forces of H_1 at a site a what all other sites b add to the forces of H_5
+   at a site a, with other parameters at bonds, the other way */
 static inline void chiral_magnet_gather1_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
@@ -224,7 +229,7 @@ static inline void chiral_magnet_gather1_1(const double *coef, const chiral_magn
         for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             if (row->colours[row->other[k]] != row->chosen) continue;
             const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double side = k < row->middle[i] ? row->side : -row->side;
             const double z_b_ = z_row[j], Dx = side * row->at_bonds[0][k];
             sum0 += z_b_ * (Dx * c1);
         }
@@ -271,43 +276,6 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
     }
 }
 
-/* what all other sites b add to the forces of H_5 at a site a */
-static inline void chiral_magnet_gather5_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c1 = coef[1];
-    const double *restrict x_row = row->x[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
-            const double x_b_ = x_row[j], Dy = side * row->at_bonds[1][k];
-            sum0 += x_b_ * (Dy * c1);
-        }
-        row->gathered[0][i] = sum0;
-    }
-}
-
-/* what all other sites b add to the forces of H_5 at a site a */
-static inline void chiral_magnet_gather5_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c1 = coef[1];
-    const double *restrict z_row = row->x[2];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            if (row->colours[row->other[k]] != row->chosen) continue;
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
-            const double z_b_ = z_row[j], Dy = side * row->at_bonds[1][k];
-            sum0 += -(z_b_ * (Dy * c1));
-        }
-        row->gathered[0][i] = sum0;
-    }
-}
-
 /* A flow, for the pieces of rows from first on, before end. */
 static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, const double *coef, int far,
     size_t first, size_t end)
@@ -319,6 +287,7 @@ static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, co
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1] };
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
     double *const y_x_z[] = { s->x[1], s->x[0], s->x[2] };
+    double *const Dy_Dx[] = { s->at_bonds[1], s->at_bonds[0] };
     for (size_t unit = first; unit < end; ++unit) {
         chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
         switch (part) {
@@ -349,9 +318,13 @@ static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, co
             break;
         default: /* H_5 */
             at.row.chosen = colour;
-            chiral_magnet_gather5_0(coef, &at.row, at.from, at.to);
+            at.row.at_bonds = Dy_Dx;
+            at.row.side = -1.0;
+            at.row.x = y_x_z;
+            chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
+            at.row.x = s->x;
             chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            chiral_magnet_gather5_1(coef, &at.row, at.from, at.to);
+            chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
             at.row.x = y_z_x;
             chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
             break;
@@ -369,7 +342,7 @@ static inline void chiral_magnet_bond_forces(const chiral_magnet_params *params,
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double side = k < row->middle[i] ? row->side : -row->side;
             const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = side * row->at_bonds[0][k],
                 Dy = side * row->at_bonds[1][k];
             const double t1 = D * Dy;
@@ -395,7 +368,7 @@ static inline void chiral_magnet_bond_energy(const chiral_magnet_params *params,
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double side = k < row->middle[i] ? row->side : -row->side;
             const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = side * row->at_bonds[0][k],
                 Dy = side * row->at_bonds[1][k];
             const double t1 = D * (Dx * (y_a_ * z_b_ - y_b_ * z_a_) + Dy * (x_b_ * z_a_ - x_a_ * z_b_))

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8572334631ad2fd58034de9098d86b6e4e37a1b1ce53e029365c0be3ed34f0aa
+ * body-sha256: bca5fcb5deac647c5160ded3f05aa8508019aad7727a5a0a08df9084ae47af68
  */
 #include "food_web.h"
 #include <float.h>
@@ -86,6 +86,7 @@ typedef struct {
     double *const *gathered; /* see food_web_solver */
     const int *bonds, *middle, *other;
     double *const *at_bonds;
+    double side; /* 1, or -1 where a loop is told of bonds as if they ran the other way */
     const int *colours;
     int chosen; /* the colour that a part of H belongs to */
 } food_web_row;
@@ -111,6 +112,7 @@ static inline void food_web_locate(const food_web_solver *s, food_web_row *row)
     row->middle = s->middle;
     row->other = s->other;
     row->at_bonds = s->at_bonds;
+    row->side = 1.0;
     row->colours = s->colours;
     row->chosen = 0;
 }
@@ -184,7 +186,7 @@ static inline void food_web_gather1(const double *coef, const food_web_row *row,
         for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             if (row->colours[row->other[k]] != row->chosen) continue;
             const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double side = k < row->middle[i] ? row->side : -row->side;
             const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
             sum0 += A * x_b_ * (1.0 - k_b_ / x_b_);
         }
@@ -230,7 +232,7 @@ static inline void food_web_bond_forces(const food_web_params *params, const foo
         double sum0 = 0.0;
         for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
             const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? 1.0 : -1.0;
+            const double side = k < row->middle[i] ? row->side : -row->side;
             const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
             sum0 += x_b_ * (A * x_a_) * (1.0 - k_b_ / x_b_);
         }

@@ -51,7 +51,7 @@ OWN = {"driven": DRIVEN, "far_open": SPECS["far_open"], "spin_graph": SPECS["spi
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
 #: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
-IN_C["heisenberg_plane small"] = (4, 6)
+IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES}
 IN_C |= {"driven composed": SITES, "far_open series": (4, 3), "spin_graph series": SITES, "point_vortices": SITES}
 SLOW = ("volterra", "far_open series")
 
@@ -201,7 +201,7 @@ def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     solver, numpy, random = made(name, "c"), made(name), np.random.default_rng(5)
     x = beginning(solver, IN_C[name])
     at_sites = {p: 1 + random.random(x.shape[1:]) for p in solver.interface.at_sites}
-    bar, given = random.normal(size=(4, *x.shape)), LATTICES.get(name, at_sites)
+    bar, given = random.normal(size=(4, *x.shape)), LATTICES.get(name, LATTICES.get(name.partition(" ")[0], at_sites))
     frames, x0_bar, found = solver.pullback(x, H, STEPS + 1, bar, 2, **arguments(solver, given))
     assert np.array_equal(frames, solver.integrate(x, H, STEPS + 1, 2, **arguments(solver, given)).x)
     expected = numpy.pullback(x, H, STEPS + 1, bar, 2, **arguments(solver, given))

@@ -10,6 +10,7 @@ import pytest
 from lattice.lattices import LATTICES, on_grid
 
 from phigen import resources
+from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec, emit, examine
 from phigen.geometry.system import system_from_spec
 from phigen.lattice.building import cell_from_spec, least_sizes
@@ -24,7 +25,7 @@ from phigen.symbolic.verdict import PROVED
 
 FILES = sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))
 #: The most lines of C in profile small, with the header; more for some.
-MOST_LINES, LONGER = 800, {"chiral_magnet": 970, "point_vortices": 865, "thermal_heisenberg": 955}
+MOST_LINES, LONGER = 800, {"chiral_magnet": 950, "point_vortices": 870, "thermal_heisenberg": 960}
 PERIODIC = [f for f in FILES if "axes" in f.read_text(encoding="utf-8") and "open" not in f.read_text(encoding="utf-8")]
 
 
@@ -53,6 +54,16 @@ def test_short_code_is_short_for_any_number_of_sites() -> None:
     found = {path.stem: emit(compile_spec(load(path), profile="small").program, "c", "phigen") for path in FILES}
     lines = {name: sum(len(text.splitlines()) for text in files.values()) for name, files in found.items()}
     assert {name: n for name, n in lines.items() if n > LONGER.get(name, MOST_LINES)} == {}
+
+
+def test_bonds_that_differ_in_direction_and_parameters_are_added_up_by_one_loop() -> None:
+    compilation = compile_spec(load(resources.bundled_specs() / "lattices/chiral_magnet.yaml"), profile="small")
+    random = np.random.default_rng(2)
+    bonds = {"bonds": np.stack([np.arange(20), (np.arange(20) * 7 + 3) % 20], axis=1)[random.permutation(19)]}
+    bonds |= {"Dx": random.normal(size=19), "Dy": random.normal(size=19)}
+    x = random.normal(size=(3, 20))
+    mine, other = (lattice_solver_of(compilation, t).integrate(x, 0.1, 3, 3, **bonds).x[-1] for t in ("c", "numpy"))
+    np.testing.assert_allclose(mine, other, rtol=0, atol=3e-13)
 
 
 def test_sums_over_open_and_periodic_grids_are_those_of_expansions() -> None:

@@ -35,6 +35,9 @@ typedef struct {
     const int *bonds, *middle, *other;
 #if PHI_BOND_PARAMETERS
     double *const *at_bonds;
+#if PHI_SIDED
+    double side;                  /* 1, or -1 where a loop is told of bonds as if they ran the other way */
+#endif
 #endif
 #if PHI_BY_COLOUR
     const int *colours;
@@ -141,6 +144,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
     row->other = s->other;
 #if PHI_BOND_PARAMETERS
     row->at_bonds = s->at_bonds;
+#if PHI_SIDED
+    row->side = 1.0;
+#endif
 #endif
 #if PHI_BY_COLOUR
     row->colours = s->colours;

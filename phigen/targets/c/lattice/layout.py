@@ -134,6 +134,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "GRAPH": layout.graph,
         "BY_COLOUR": bool(step.by_colour),
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
+        "SIDED": program.profile == "small" and bool(step.parts),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
         "HANDS": any(hands(step)),
         "SHARES": shares(step),

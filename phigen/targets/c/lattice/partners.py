@@ -73,9 +73,10 @@ def _over_bonds(
     values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     added = [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
     out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
+    one = "row->side" if program.profile == "small" and layout.step.parts else "1.0"
     loop, passed = bonds_of(ends)
     reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
-    reads += ["const double side = k < row->middle[i] ? 1.0 : -1.0;"] * bool(opposite)
+    reads += [f"const double side = k < row->middle[i] ? {one} : -{one};"] * bool(opposite)
     inner = [*passed, *reads, *other, *values, *added]
     return "\n".join(
         [

@@ -26,7 +26,7 @@ from phigen.targets.c.lattice.loops import (
     sweep_loop,
 )
 from phigen.targets.c.lattice.partners import gathering, partners
-from phigen.targets.c.lattice.turned import orders, turned, turned_increments
+from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
 from phigen.targets.rendering import render
 
 
@@ -155,11 +155,14 @@ def _forms_of_part(
         found[form] = []
         for sweep in part:
             calls = [*_calls(program, layout, sweep, form, names)]
-            for order in tried:
+            for order in (
+                () if sweep.gather and layout.step.adjoint else tried
+            ):  # transposes gather by loops of their own
                 other = turned(layout.step.sites, fields, order, sweep)
                 again = [*_calls(program, layout, other, form, names)] if other else []
                 for k, call in enumerate(again):
-                    calls[k] = replace(calls[k], others=(*calls[k].others, replace(call, order=order)))
+                    more = (replace(c, order=order) for c in (call, *call.others))
+                    calls[k] = replace(calls[k], others=(*calls[k].others, *more))
             found[form] += calls
     return found
 
@@ -178,7 +181,9 @@ def _case(
     moved = sorted({f for sweep in part for f in sweep.moved})
     statements = [*either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
     setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
-    orders = [*_reordered(program, layout, [call.order for called in forms.values() for call in called])]
+    all_called = [call for called in forms.values() for call in called]
+    orders = [*_reordered(layout, [call.order for call in all_called])]
+    orders += _other_bonds(layout, [call.bonds for call in all_called])
     return Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]), orders)
 
 
@@ -196,17 +201,21 @@ class Case:
 @dataclass(frozen=True)
 class _Call:
     """A loop for some sites of a piece: the text of the last two arguments; the ``colour`` that it is told, if any; the
-    fields in the ``order`` that it takes for its own, if another one; ``others`` would do the same."""
+    fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
+    likewise, and the ``side`` that bonds are seen from; ``others`` would do the same."""
 
     loop: Loop
     sites: str = "at.from, at.to"
     colour: int | None = None
     order: tuple[str, ...] = ()
+    bonds: tuple[str, ...] | None = None
+    side: float | None = None
     others: tuple[_Call, ...] = ()
 
     def purpose(self, fields: Sequence[str]) -> str:
         """What the loop is for."""
         said = f", where {', '.join(fields)} stand for its {', '.join(self.order)}" if self.order else ""
+        said += ", with other parameters at bonds" * bool(self.bonds) + ", the other way" * (self.side == -1.0)
         return self.loop.purpose + said
 
 
@@ -214,7 +223,15 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
     """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
     order: tuple[str, ...] = ()
     colour: int | None = 0
+    bonds: tuple[str, ...] | None = ()
+    side: float | None = 1.0
     for call in called:
+        if call.bonds not in (bonds, None):
+            bonds = call.bonds
+            yield f"at.row.at_bonds = {'_'.join(bonds) or 's->at_bonds'};"
+        if call.side not in (side, None):
+            side = call.side
+            yield f"at.row.side = {side!r};"
         if call.colour not in (colour, None):
             colour = call.colour
             yield f"at.row.swept = {colour};"
@@ -224,7 +241,14 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
         yield f"{program.name}_{names[call.loop.code]}(coef, &at.row, {call.sites});"
 
 
-def _reordered(program: Program, layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
+def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...] | None]) -> Iterator[str]:
+    """The parameters at bonds, in other orders that are used."""
+    for order in dict.fromkeys(order for order in used if order):
+        places = ", ".join(f"s->at_bonds[{layout.step.sites.at_bonds.index(p)}]" for p in order)
+        yield f"double *const {'_'.join(order)}[] = {{ {places} }};"
+
+
+def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
     """The arrays over the sites, with the fields in other orders that are used."""
     for order in dict.fromkeys(order for order in used if order):
         turned = {
@@ -238,8 +262,13 @@ def _reordered(program: Program, layout: Layout, used: Sequence[tuple[str, ...]]
 
 def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[_Call]:
     """The loops of a sweep, in the order in which they are called for a piece of a row."""
-    for loop in gathering(program, layout, sweep.gather, "coef") if sweep.gather else ():
-        yield _Call(loop)
+    for k, loop in enumerate(gathering(program, layout, sweep.gather, "coef") if sweep.gather else ()):
+        others = []
+        alone = program.profile == "fast" or layout.step.adjoint
+        for gather, bonds, side in () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather):
+            again = [*gathering(program, layout, gather, "coef")]
+            others.append(_Call(again[k], bonds=bonds, side=side))
+        yield _Call(loop, bonds=(), side=1.0, others=tuple(others))
     loops = [
         sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
         for kernel, more in forms_of(program, sweep.kernel)

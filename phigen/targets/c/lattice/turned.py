@@ -7,9 +7,11 @@ from dataclasses import replace
 from itertools import permutations
 
 from phigen.scheme.kernel import Kernel, Output
-from phigen.scheme.steps import Sites, Sweep
+from phigen.scheme.steps import Gather, Sites, Sweep
 from phigen.symbolic.expression import natural_key, substitute, symbol
 from phigen.symbolic.symbols import GATHERED, Symbol
+from phigen.symbolic.verdict import PROVED, decide_zero
+from phigen.targets.c.lattice.ends import over_ends
 
 #: Most fields of a site whose orders are tried: there are 6 of 3.
 MOST_FIELDS = 3
@@ -27,6 +29,37 @@ def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str])
         return {}
     own = dict(zip(fields, sites.increments, strict=False))
     return {own[f]: own[g] for f, g in zip(fields, order, strict=False)}
+
+
+def other_ways(sites: Sites, gather: Gather) -> Iterator[tuple[Gather, tuple[str, ...], float]]:
+    """The same sums as functions of the parameters at bonds in another order, and of bonds that run the other way.
+
+    These where all that they add has the sign of their direction. Also the order, none if it is their own, and 1 or -1.
+    """
+    loops = over_ends(gather)
+    if len(loops) != 1 or not loops[0][1]:
+        return
+    ends, opposite = loops[0]
+    own = tuple(sites.at_bonds)
+    reversed_ = [
+        ("", e + r)
+        for e, r in zip(
+            ends.kernel.roots, substitute(ends.kernel.roots, {p: -symbol(p) for p in opposite}), strict=True
+        )
+    ]
+    sides = (1.0, -1.0) if decide_zero("", reversed_).verdict == PROVED else (1.0,)
+    for order in permutations(own) if len(own) <= MOST_FIELDS else (own,):
+        names = dict(zip(order, own, strict=True))
+        for side in sides:
+            if (order, side) != (own, 1.0):
+                changed = tuple(replace(e, kernel=_signed(_renamed(e.kernel, names), side)) for e in gather.ends)
+                yield replace(gather, ends=changed), () if order == own else order, side
+
+
+def _signed(kernel: Kernel, sign: float) -> Kernel:
+    """The kernel, or what has the opposite values."""
+    values = tuple(-e if sign < 0 else e for e in kernel.roots)
+    return replace(kernel, outputs=(Output(kernel.outputs[0].name, values),))
 
 
 def turned(sites: Sites, fields: Sequence[str], order: Sequence[str], sweep: Sweep) -> Sweep | None:
@@ -64,7 +97,7 @@ def _renamed(kernel: Kernel, names: Mapping[str, str], places: Sequence[int] = (
     values = substitute(kernel.roots, {old: symbol(new) for old, new in names.items()})
     inputs = {
         key: tuple(sorted((names.get(s, s) for s in symbols), key=natural_key))
-        if key in ("site", "gathered")
+        if key in ("site", "gathered", "bonds")
         else symbols
         for key, symbols in kernel.inputs.items()
     }
