@@ -146,8 +146,13 @@ def test_stages_whose_paths_are_long_are_gone_back_through_one_after_the_other()
     product = np.eye(3)
     for _, tangent in made.tangents(x, h, steps):
         product = tangent @ product
-    x0_bar = made.pullback(x, h, steps, bar).x0_bar
+    _, x0_bar, found = made.pullback(x, h, steps, bar)
     assert np.max(np.abs(x0_bar - bar @ product)) <= 1e-8 * np.max(np.abs(x0_bar))
+    for name, value in made.interface.parameters.items():
+        slope = difference(
+            lambda e, n=name, v=value: bar @ made.integrate(x, h, steps, steps, **{n: v + e}).x[-1], 1e-4
+        )
+        assert found[name] == pytest.approx(slope, rel=1e-5), name
 
 
 @precisely

@@ -17,6 +17,7 @@ static double phi_largest(const phi_lanes size)
     memcpy(&largest, &most, sizeof largest);
     return isfinite(largest) ? largest : HUGE_VAL;
 }
+#if PHI_BLOCKS
 
 /* Each lane of most becomes the larger one, in the same order. */
 static void phi_keep_largest(phi_lanes most, const phi_lanes size)
@@ -28,4 +29,5 @@ static void phi_keep_largest(phi_lanes most, const phi_lanes size)
         bits_of_most[lane] = bits[lane] > bits_of_most[lane] ? bits[lane] : bits_of_most[lane];
     memcpy(most, bits_of_most, sizeof bits);
 }
+#endif
 #endif
