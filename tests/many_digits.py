@@ -107,6 +107,7 @@ _RULES: dict[str, Callable[..., Any]] = {
     "pi": lambda: +mpmath.pi,
     "E": lambda: +mpmath.e,
     "versin": lambda s: 1 - mpmath.cos(s),
+    "tanhalf": lambda s, v: s / (2 - v),
     "inv": lambda s: 1 / s if s > 0 else mpmath.nan,
     "inv0": lambda s: 1 / s if s > 0 else mpmath.mpf(0),
     **{f"phi{order}": partial(_phi, order) for order in range(3)},

@@ -213,7 +213,7 @@ def test_the_multiple_of_the_gradient_has_its_letter_in_formulas_and_files():
     assert r"H_{1} &= G_{1} + \kappa" in document(found)
     assert dict(formulas(found, None))["H_1"] == "G1 + κ*(G2**2 + 1/2*G3**2)"
     assert (
-        "the flow of H_1 = G1 + κ*(G2**2 + 1/2*G3**2)"
+        "The flow of H_1 = G1 + κ*(G2**2 + 1/2*G3**2)"
         in emit(found.program, "c", "", single_file=True)["kowalevski_top.c"]
     )
 

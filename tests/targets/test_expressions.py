@@ -34,7 +34,7 @@ ARGUMENTS |= {
     "abs": (y - z,),
     "sign": (x - y,),
 }
-ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x)}
+ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x), "tanhalf": (call("sin", y), call("versin", y))}
 
 #: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.
 SPECIAL_ARGUMENTS = {"near": x / 5, "near-": -x / 5, "far": 9 * z - 20 * y, "far-": 17 * x - 20 * z}
