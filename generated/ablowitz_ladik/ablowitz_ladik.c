@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e21e176f45c285e8f2ad5e12fd53c0c9cd48b0d05e39e2501c836d39b3553b8a
+ * body-sha256: 778f181a5e127ecf92b55d60b0abf8bc5d16bff4d9d836864d317af3f383ab93
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -219,10 +219,9 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void ablowitz_ladik_sweep_rows(const ablowitz_ladik_solver *s, int part, const double *coef, int far,
+static void ablowitz_ladik_sweep_rows(const ablowitz_ladik_solver *s, int part, const double *coef,
     size_t first, size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
         switch (part) {
@@ -388,13 +387,13 @@ static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *co
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef, int far)
+static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef)
 {
     const size_t units = ablowitz_ladik_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) ablowitz_ladik_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) ablowitz_ladik_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -404,7 +403,7 @@ static void ablowitz_ladik_make_flow(const ablowitz_ladik_solver *s, size_t step
         : ablowitz_ladik_flow_rows[number];
     const double *coef = s->coef + row * ablowitz_ladik_ROW;
     (void)steps;
-    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7dc5a1890a86219f0d1affe8b9d90377bfd151c28542087a7a27cc1ade4f790e
+ * body-sha256: cc30fef6f209f92d833cefe856741b2c1bad7a52d63ed574c05c5b10369d5884
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -277,10 +277,9 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
 }
 
 /* A flow, for the pieces of rows from first on, before end. */
-static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, const double *coef, int far,
+static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, const double *coef,
     size_t first, size_t end)
 {
-    (void)far;
     int part = 1, colour = flow;
     for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
         colour -= own;
@@ -640,24 +639,24 @@ static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *cons
 
 /* ---- The flows ---- */
 /* One part of H, of one colour. */
-static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, const double *coef, int far)
+static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, const double *coef)
 {
     const size_t units = chiral_magnet_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) chiral_magnet_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) chiral_magnet_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
-static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, const double *coef, int far)
+static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) chiral_magnet_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 0 || kind == 2) chiral_magnet_sweep_colour(s, kind == 0 ? 0 : last, coef);
     if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) chiral_magnet_sweep_colour(s, flow, coef, far);
+        for (int flow = 1; flow < last; ++flow) chiral_magnet_sweep_colour(s, flow, coef);
     if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_colour(s, flow, coef, far);
+        for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_colour(s, flow, coef);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -667,7 +666,7 @@ static void chiral_magnet_make_flow(const chiral_magnet_solver *s, size_t steps,
         : chiral_magnet_flow_rows[number];
     const double *coef = s->coef + row * chiral_magnet_ROW;
     (void)steps;
-    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0b8d8bdd1f9b4927f350bcf47d312670d528836fa2cc3060494c1fbf24f13ae6
+ * body-sha256: ea02f905efbeca676335402efec2c349822509dfb585a3dde12753268dcae7d6
  */
 #include "dnls.h"
 #include <float.h>
@@ -203,10 +203,8 @@ static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void dnls_sweep_rows(const dnls_solver *s, int part, const double *coef, int far, size_t first,
-    size_t end)
+static void dnls_sweep_rows(const dnls_solver *s, int part, const double *coef, size_t first, size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const dnls_piece at = dnls_piece_of(s, unit);
         switch (part) {
@@ -365,13 +363,13 @@ static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef, int far)
+static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef)
 {
     const size_t units = dnls_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) dnls_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) dnls_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -380,7 +378,7 @@ static void dnls_make_flow(const dnls_solver *s, size_t steps, int number)
     const int joined = number == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[number];
     const double *coef = s->coef + row * dnls_ROW;
     (void)steps;
-    dnls_sweep_part(s, dnls_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    dnls_sweep_part(s, dnls_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

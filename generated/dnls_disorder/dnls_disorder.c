@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 29ac438a35eb5b9bcad54b5fb14a9ccdce49bb4a0cd9ca8fd88f4a60a4fb1700
+ * body-sha256: 0eca5ebe41a6ae4db704b36a486e4ac6c5a84aef1975d2f7243dd1cb6838e3f1
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -215,10 +215,9 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void dnls_disorder_sweep_rows(const dnls_disorder_solver *s, int part, const double *coef, int far,
+static void dnls_disorder_sweep_rows(const dnls_disorder_solver *s, int part, const double *coef,
     size_t first, size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
         switch (part) {
@@ -405,13 +404,13 @@ static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *cons
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef, int far)
+static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef)
 {
     const size_t units = dnls_disorder_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) dnls_disorder_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) dnls_disorder_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -421,7 +420,7 @@ static void dnls_disorder_make_flow(const dnls_disorder_solver *s, size_t steps,
         : dnls_disorder_flow_rows[number];
     const double *coef = s->coef + row * dnls_disorder_ROW;
     (void)steps;
-    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

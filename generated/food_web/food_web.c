@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: bca5fcb5deac647c5160ded3f05aa8508019aad7727a5a0a08df9084ae47af68
+ * body-sha256: f820cef74e12324337582e68ae7836d513f0deac5f07cc4df2a8644c19db8870
  */
 #include "food_web.h"
 #include <float.h>
@@ -207,10 +207,9 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row, 
 }
 
 /* A flow, for the pieces of rows from first on, before end. */
-static void food_web_sweep_rows(const food_web_solver *s, int flow, const double *coef, int far, size_t first,
+static void food_web_sweep_rows(const food_web_solver *s, int flow, const double *coef, size_t first,
     size_t end)
 {
-    (void)far;
     int part = 1, colour = flow;
     for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
     for (size_t unit = first; unit < end; ++unit) {
@@ -489,24 +488,24 @@ static void food_web_copy(double *const to[food_web_DIM], double *const from[foo
 
 /* ---- The flows ---- */
 /* One part of H, of one colour. */
-static void food_web_sweep_colour(const food_web_solver *s, int part, const double *coef, int far)
+static void food_web_sweep_colour(const food_web_solver *s, int part, const double *coef)
 {
     const size_t units = food_web_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) food_web_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) food_web_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
-static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef, int far)
+static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) food_web_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 0 || kind == 2) food_web_sweep_colour(s, kind == 0 ? 0 : last, coef);
     if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) food_web_sweep_colour(s, flow, coef, far);
+        for (int flow = 1; flow < last; ++flow) food_web_sweep_colour(s, flow, coef);
     if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) food_web_sweep_colour(s, flow, coef, far);
+        for (int flow = last - 1; flow > 0; --flow) food_web_sweep_colour(s, flow, coef);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -515,7 +514,7 @@ static void food_web_make_flow(const food_web_solver *s, size_t steps, int numbe
     const int joined = number == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[number];
     const double *coef = s->coef + row * food_web_ROW;
     (void)steps;
-    food_web_sweep_part(s, food_web_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    food_web_sweep_part(s, food_web_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

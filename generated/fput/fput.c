@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 27e947ba8865db7f81b9c0c41e547d6ddf7248c659b10d2a8aec00fcf3824152
+ * body-sha256: bf79cd40ebff725aebecadb0e146b443043d295f125c2a440797fc1fdbcd7dbd
  */
 #include "fput.h"
 #include <float.h>
@@ -165,10 +165,8 @@ static inline void fput_sweep2(const double *coef, const fput_row *row, ptrdiff_
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, int far, size_t first,
-    size_t end)
+static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, size_t first, size_t end)
 {
-    (void)far;
     switch (part) {
     case 1: /* H_1 */
         for (size_t unit = first; unit < end; ++unit) {
@@ -370,10 +368,10 @@ static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void fput_sweep_part(const fput_solver *s, int part, const double *coef, int far)
+static void fput_sweep_part(const fput_solver *s, int part, const double *coef)
 {
     size_t first, end = fput_share(fput_units(s), &first);
-    fput_sweep_rows(s, part, coef, far, first, end);
+    fput_sweep_rows(s, part, coef, first, end);
     fput_wait();
 }
 
@@ -396,7 +394,7 @@ static void fput_make_flow(const fput_solver *s, size_t steps, int number)
 {
     fput_flow flow;
     fput_find_flow(s, steps, number, &flow);
-    fput_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    fput_sweep_part(s, flow.part, flow.coef);
 }
 
 /* ---- Several flows at once ---- */
@@ -429,7 +427,7 @@ static void fput_make_slices(const fput_solver *s, const fput_flow *flow, size_t
 {
     size_t units;
     (void)fput_slices(s, &units);
-    fput_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+    fput_sweep_rows(s, flow->part, flow->coef, from * units, to * units);
 }
 
 /* So many flows, one after the other. */
@@ -461,7 +459,7 @@ static void fput_make_waves(const fput_solver *s, size_t steps)
             fput_find_flow(s, s->steps + done / each, joined ? fput_FLOWS : number, flows + count);
         }
         if (count > 1) fput_make_wave(s, flows, count);
-        else fput_sweep_part(s, flows->part, flows->coef, s->far > 0);
+        else fput_sweep_part(s, flows->part, flows->coef);
     }
 }
 
@@ -618,6 +616,7 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
 {
     if (s == NULL || !s->prepared || number > fput_FLOWS || from > to || to > s->sizes[0])
         return fput_BAD_ARGUMENT;
+    (void)far;
     const int joined = number == fput_FLOWS, part = fput_flow_parts[joined ? 0 : number];
     const int row = joined ? fput_JOINED : fput_flow_rows[number];
     const double *coef = s->coef + row * fput_ROW;
@@ -625,7 +624,7 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
     s->open = 0;
     s->from = (ptrdiff_t)from;
     s->to = (ptrdiff_t)to;
-    fput_sweep_rows(s, part, coef, far, 0, units);
+    fput_sweep_rows(s, part, coef, 0, units);
     s->from = 0;
     s->to = s->length;
     for (size_t k = 0; k < fput_DIM; ++k) fput_ends(s->x[k], s->length, 0, s->length);

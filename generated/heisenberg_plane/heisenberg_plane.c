@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e4e217880ccf5088bc50350a7ab62358190998dd381714bf9c87e1262019bae6
+ * body-sha256: 62c786965527ecfd0dd7721e22a0ce2abef86036ef7dd88b2aa215ac9b46b8c7
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -249,9 +249,8 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
 static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int part, const double *coef,
-    int far, size_t first, size_t end)
+    size_t first, size_t end)
 {
-    (void)far;
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
     for (size_t unit = first; unit < end; ++unit) {
         heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
@@ -492,15 +491,13 @@ static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef,
-    int far)
+static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef)
 {
     const size_t units = heisenberg_plane_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit)
-        heisenberg_plane_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) heisenberg_plane_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -510,7 +507,7 @@ static void heisenberg_plane_make_flow(const heisenberg_plane_solver *s, size_t 
         : heisenberg_plane_flow_rows[number];
     const double *coef = s->coef + row * heisenberg_plane_ROW;
     (void)steps;
-    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

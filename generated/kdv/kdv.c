@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: c4e702ccfbc98c7b51b647fb6de72d1f71e2516de5a283ae8994c2981c37cc58
+ * body-sha256: 92c9608d3137a4cbb3bf71ae79814222bab52e150f277a2c33f6063fea4f1637
  */
 #include "kdv.h"
 #include <float.h>
@@ -178,19 +178,16 @@ static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t f
     }
 }
 
-/* A sweep, for the pieces of rows from first on, before end. */
-static void kdv_relax_rows(const kdv_solver *s, const double *coef, int far, double *const *y,
-    double *const *to, size_t first, size_t end)
+/* A sweep, for a piece of a row. */
+static void kdv_relax_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
+    size_t unit)
 {
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        kdv_piece at = kdv_piece_of(s, unit);
-        at.row.x = y;
-        at.row.start = s->x;
-        at.row.out = to;
-        kdv_relax(coef, &at.row, at.from, at.to);
-        kdv_ends(to[0], s->length, at.from, at.to);
-    }
+    kdv_piece at = kdv_piece_of(s, unit);
+    at.row.x = y;
+    at.row.start = s->x;
+    at.row.out = to;
+    kdv_relax(coef, &at.row, at.from, at.to);
+    kdv_ends(to[0], s->length, at.from, at.to);
 }
 
 /* what a stage adds to x at a site, from y around it */
@@ -210,18 +207,15 @@ static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff
     }
 }
 
-/* The end of a stage, for the pieces of rows from first on, before end. */
-static void kdv_increment_rows(const kdv_solver *s, const double *coef, int far, double *const *y,
-    double *const *to, size_t first, size_t end)
+/* The end of a stage, for a piece of a row. */
+static void kdv_increment_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
+    size_t unit)
 {
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        kdv_piece at = kdv_piece_of(s, unit);
-        at.row.x = y;
-        at.row.out = to;
-        kdv_increment(coef, &at.row, at.from, at.to);
-        kdv_ends(to[0], s->length, at.from, at.to);
-    }
+    kdv_piece at = kdv_piece_of(s, unit);
+    at.row.x = y;
+    at.row.out = to;
+    kdv_increment(coef, &at.row, at.from, at.to);
+    kdv_ends(to[0], s->length, at.from, at.to);
 }
 
 /* how y at a site follows y around it */
@@ -240,18 +234,15 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
     }
 }
 
-/* How a sweep follows y along v, for the pieces of rows from first on, before end. */
-static void kdv_slope_rows(const kdv_solver *s, const double *coef, int far, double *const *y,
-    double *const *v, double *const *to, size_t first, size_t end)
+/* How a sweep follows y along v, for a piece of a row. */
+static void kdv_slope_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *v,
+    double *const *to, size_t unit)
 {
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        kdv_piece at = kdv_piece_of(s, unit);
-        at.row.x = y;
-        at.row.varied = v;
-        at.row.out = to;
-        kdv_slope(coef, &at.row, at.from, at.to);
-    }
+    kdv_piece at = kdv_piece_of(s, unit);
+    at.row.x = y;
+    at.row.varied = v;
+    at.row.out = to;
+    kdv_slope(coef, &at.row, at.from, at.to);
 }
 
 /* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
@@ -476,13 +467,13 @@ static void kdv_measure(const kdv_solver *s, int now, size_t unit, double *chang
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
    is not. */
-static double kdv_relaxed(kdv_solver *s, const double *coef, int far, int now)
+static double kdv_relaxed(kdv_solver *s, const double *coef, int now)
 {
     const size_t units = kdv_units(s);
     double change[kdv_DIM] = { 0.0 }, size[kdv_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
     kdv_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) kdv_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        if (coef != NULL) kdv_relax_piece(s, coef, s->y[now], s->y[1 - now], unit);
         kdv_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < kdv_DIM; ++k) kdv_raise(&largest, size[k]);
@@ -639,7 +630,8 @@ static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, in
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         kdv_ends(s->v[k], sites, 0, sites);
     }
-    kdv_slope_rows(s, coef, 1, s->y[now], s->v, s->y[1 - now], 0, kdv_units(s));
+    double *const *y = s->y[now];
+    for (size_t unit = 0; unit < kdv_units(s); ++unit) kdv_slope_piece(s, coef, y, s->v, s->y[1 - now], unit);
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;
@@ -723,16 +715,16 @@ static double kdv_corrected(kdv_solver *s, const double *coef, int now)
 {
     if (s->factored != coef && !kdv_factorise(s, coef, now)) return HUGE_VAL;
     s->factored = coef;
-    if (!isfinite(kdv_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    if (!isfinite(kdv_relaxed(s, coef, now))) return HUGE_VAL;
     kdv_eliminate(s, now);
-    return kdv_relaxed(s, NULL, 1, now);
+    return kdv_relaxed(s, NULL, now);
 }
 
 /* How far from x a solution is one of the motion. */
 static double kdv_range(kdv_solver *s, const double *coef)
 {
     kdv_copy(s->y[0], s->x, s);
-    kdv_relaxed(s, coef, 1, 0);
+    kdv_relaxed(s, coef, 0);
     return kdv_PLAUSIBLE * kdv_distance(s, 1, 1.0);
 }
 
@@ -743,11 +735,11 @@ enum { kdv_PATIENCE = 10 };  /* ... after so many sweeps */
 
 /* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where
    these have failed, by corrections, and then no farther from x than in that range. It is in s->y[*now]. */
-static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, double range, int *now)
+static kdv_status kdv_middle(kdv_solver *s, const double *coef, double range, int *now)
 {
     double before = 0.0;
     for (int count = 0; count < kdv_MOST_SWEEPS; ++count) {
-        const double change = s->stiff ? kdv_corrected(s, coef, *now) : kdv_relaxed(s, coef, far, *now);
+        const double change = s->stiff ? kdv_corrected(s, coef, *now) : kdv_relaxed(s, coef, *now);
         const double shrunk = before - change;
         const kdv_status failed = count == 0 && !s->stiff ? kdv_NOT_FINITE : kdv_NO_CONVERGENCE;
         ++s->sweeps;
@@ -765,25 +757,24 @@ static kdv_status kdv_middle(kdv_solver *s, const double *coef, int far, double 
 }
 
 /* The stages of a step. */
-static kdv_status kdv_stages(kdv_solver *s, int far)
+static kdv_status kdv_stages(kdv_solver *s)
 {
     const size_t units = kdv_units(s);
     const double *coef = s->coef;
     int now = 0;
     kdv_predict(s, s->x);
-    kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, far, 0.0, &now);
-    if (status != kdv_OK && (far || status != kdv_NOT_FINITE)) {
+    kdv_status status = s->stiff ? kdv_NO_CONVERGENCE : kdv_middle(s, coef, 0.0, &now);
+    if (status != kdv_OK) {
         s->stiff = 1;
         now = 0;
         const double range = kdv_range(s, coef);
         kdv_predict(s, s->x);
-        status = kdv_middle(s, coef, far, range, &now);
+        status = kdv_middle(s, coef, range, &now);
     }
     if (status != kdv_OK) return status;
     kdv_remember(s, s->x, now);
     kdv_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit)
-        kdv_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) kdv_increment_piece(s, coef, s->y[now], s->x, unit);
     return kdv_all_hold(s, s->x) ? kdv_OK : kdv_NOT_FINITE;
 }
 
@@ -791,7 +782,7 @@ static kdv_status kdv_stages(kdv_solver *s, int far)
 static kdv_status kdv_try(kdv_solver *s)
 {
     kdv_copy(s->before, s->x, s);
-    const kdv_status status = kdv_stages(s, 1);
+    const kdv_status status = kdv_stages(s);
     if (status == kdv_OK) return status;
     kdv_copy(s->x, s->before, s);
     kdv_forget(s);

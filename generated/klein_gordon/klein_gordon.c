@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b08cd7041f0d0e3c1cb124b4a6db50ce3acb2add1d8b2e88333b1862739b9af0
+ * body-sha256: 5ff84702f80122163a4fd6f2078ed2258eec36c28076269c738b41026fe8d7b5
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -155,10 +155,9 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void klein_gordon_sweep_rows(const klein_gordon_solver *s, int part, const double *coef, int far,
-    size_t first, size_t end)
+static void klein_gordon_sweep_rows(const klein_gordon_solver *s, int part, const double *coef, size_t first,
+    size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
         switch (part) {
@@ -322,13 +321,13 @@ static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef, int far)
+static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef)
 {
     const size_t units = klein_gordon_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) klein_gordon_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) klein_gordon_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -338,7 +337,7 @@ static void klein_gordon_make_flow(const klein_gordon_solver *s, size_t steps, i
         : klein_gordon_flow_rows[number];
     const double *coef = s->coef + row * klein_gordon_ROW;
     (void)steps;
-    klein_gordon_sweep_part(s, klein_gordon_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    klein_gordon_sweep_part(s, klein_gordon_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9159aea003131ff8775d6f159cfc02ffce3d856c6ba44db88785ba3c326bd08d
+ * body-sha256: 3eb44324540879164ee0c53b5acefe69ea1cf8c16e0ad93a263ef29c8f64bf16
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -160,10 +160,9 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void nonlinear_wave_sweep_rows(const nonlinear_wave_solver *s, int part, const double *coef, int far,
+static void nonlinear_wave_sweep_rows(const nonlinear_wave_solver *s, int part, const double *coef,
     size_t first, size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
         switch (part) {
@@ -342,13 +341,13 @@ static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *co
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef, int far)
+static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef)
 {
     const size_t units = nonlinear_wave_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) nonlinear_wave_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) nonlinear_wave_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -358,7 +357,7 @@ static void nonlinear_wave_make_flow(const nonlinear_wave_solver *s, size_t step
         : nonlinear_wave_flow_rows[number];
     const double *coef = s->coef + row * nonlinear_wave_ROW;
     (void)steps;
-    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0ab8e5253b1dc4f46a74f86b7dd5ca436dae115e0752bee7a029b18142d4ef18
+ * body-sha256: 0f69286f3eeee5c1cfa2d335156992c17f3c598dd02feedcfc5eacff5418710a
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -186,10 +186,9 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void outer_planets_sweep_rows(const outer_planets_solver *s, int part, const double *coef, int far,
+static void outer_planets_sweep_rows(const outer_planets_solver *s, int part, const double *coef,
     size_t first, size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const outer_planets_piece at = outer_planets_piece_of(s, unit);
         switch (part) {
@@ -420,13 +419,13 @@ static void outer_planets_copy(double *const to[outer_planets_DIM], double *cons
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef, int far)
+static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef)
 {
     const size_t units = outer_planets_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 512)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) outer_planets_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) outer_planets_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -436,7 +435,7 @@ static void outer_planets_make_flow(const outer_planets_solver *s, size_t steps,
         : outer_planets_flow_rows[number];
     const double *coef = s->coef + row * outer_planets_ROW;
     (void)steps;
-    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

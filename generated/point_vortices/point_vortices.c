@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: a7b1769e797292d91ec12976b4a01c3c2f61ecedc59eebb3f070b1043fa93fa1
+ * body-sha256: 3e94ae5cdf5ecbc76832e60a4e3e1f4752d8dfc0f15f275b1cdb6600219437ad
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -243,19 +243,16 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
     }
 }
 
-/* A sweep, for the pieces of rows from first on, before end. */
-static void point_vortices_relax_rows(const point_vortices_solver *s, const double *coef, int far,
-    double *const *y, double *const *to, size_t first, size_t end)
+/* A sweep, for a piece of a row. */
+static void point_vortices_relax_piece(const point_vortices_solver *s, const double *coef, double *const *y,
+    double *const *to, size_t unit)
 {
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        point_vortices_piece at = point_vortices_piece_of(s, unit);
-        at.row.x = y;
-        at.row.start = s->x;
-        at.row.out = to;
-        point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
-        point_vortices_relax(coef, &at.row, at.from, at.to);
-    }
+    point_vortices_piece at = point_vortices_piece_of(s, unit);
+    at.row.x = y;
+    at.row.start = s->x;
+    at.row.out = to;
+    point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
+    point_vortices_relax(coef, &at.row, at.from, at.to);
 }
 
 /* what a stage adds to x at a site, from y around it */
@@ -274,18 +271,15 @@ static inline void point_vortices_increment(const double *coef, const point_vort
     }
 }
 
-/* The end of a stage, for the pieces of rows from first on, before end. */
-static void point_vortices_increment_rows(const point_vortices_solver *s, const double *coef, int far,
-    double *const *y, double *const *to, size_t first, size_t end)
+/* The end of a stage, for a piece of a row. */
+static void point_vortices_increment_piece(const point_vortices_solver *s, const double *coef,
+    double *const *y, double *const *to, size_t unit)
 {
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        point_vortices_piece at = point_vortices_piece_of(s, unit);
-        at.row.x = y;
-        at.row.out = to;
-        point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
-        point_vortices_increment(coef, &at.row, at.from, at.to);
-    }
+    point_vortices_piece at = point_vortices_piece_of(s, unit);
+    at.row.x = y;
+    at.row.out = to;
+    point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
+    point_vortices_increment(coef, &at.row, at.from, at.to);
 }
 
 /* how y at a site follows y around it */
@@ -304,19 +298,16 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
     }
 }
 
-/* How a sweep follows y along v, for the pieces of rows from first on, before end. */
-static void point_vortices_slope_rows(const point_vortices_solver *s, const double *coef, int far,
-    double *const *y, double *const *v, double *const *to, size_t first, size_t end)
+/* How a sweep follows y along v, for a piece of a row. */
+static void point_vortices_slope_piece(const point_vortices_solver *s, const double *coef, double *const *y,
+    double *const *v, double *const *to, size_t unit)
 {
-    (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        point_vortices_piece at = point_vortices_piece_of(s, unit);
-        at.row.x = y;
-        at.row.varied = v;
-        at.row.out = to;
-        point_vortices_pair_slopes(&s->params, &at.row, at.from, at.to);
-        point_vortices_slope(coef, &at.row, at.from, at.to);
-    }
+    point_vortices_piece at = point_vortices_piece_of(s, unit);
+    at.row.x = y;
+    at.row.varied = v;
+    at.row.out = to;
+    point_vortices_pair_slopes(&s->params, &at.row, at.from, at.to);
+    point_vortices_slope(coef, &at.row, at.from, at.to);
 }
 
 /* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
@@ -549,14 +540,14 @@ static void point_vortices_measure(const point_vortices_solver *s, int now, size
 
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y
    is not. */
-static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int far, int now)
+static double point_vortices_relaxed(point_vortices_solver *s, const double *coef, int now)
 {
     const size_t units = point_vortices_units(s);
     double change[point_vortices_DIM] = { 0.0 }, size[point_vortices_DIM] = { 0.0 }, largest = 0.0,
         moved = 0.0;
     point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) point_vortices_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        if (coef != NULL) point_vortices_relax_piece(s, coef, s->y[now], s->y[1 - now], unit);
         point_vortices_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < point_vortices_DIM; ++k) point_vortices_raise(&largest, size[k]);
@@ -681,8 +672,7 @@ static void point_vortices_multiply(const point_vortices_solver *s, const double
 {
     const size_t units = point_vortices_units(s);
     point_vortices_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit)
-        point_vortices_slope_rows(s, coef, 1, s->y[now], v, to, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) point_vortices_slope_piece(s, coef, s->y[now], v, to, unit);
     point_vortices_combine(s, to, 1.0, v, -1.0, to);
 }
 
@@ -749,17 +739,17 @@ static double point_vortices_distance(const point_vortices_solver *s, int side, 
    allows, to the other: how far y moves, in sizes of each field. Not a number if it cannot be made. */
 static double point_vortices_corrected(point_vortices_solver *s, const double *coef, int now)
 {
-    if (!isfinite(point_vortices_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    if (!isfinite(point_vortices_relaxed(s, coef, now))) return HUGE_VAL;
     point_vortices_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
     if (!isfinite(point_vortices_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
-    return point_vortices_relaxed(s, NULL, 1, now);
+    return point_vortices_relaxed(s, NULL, now);
 }
 
 /* How far from x a solution is one of the motion. */
 static double point_vortices_range(point_vortices_solver *s, const double *coef)
 {
     point_vortices_copy(s->y[0], s->x, s);
-    point_vortices_relaxed(s, coef, 1, 0);
+    point_vortices_relaxed(s, coef, 0);
     return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
 }
 
@@ -770,13 +760,13 @@ enum { point_vortices_PATIENCE = 10 };  /* ... after so many sweeps */
 
 /* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where
    these have failed, by corrections, and then no farther from x than in that range. It is in s->y[*now]. */
-static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, int far,
-    double range, int *now)
+static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
+    int *now)
 {
     double before = 0.0;
     for (int count = 0; count < point_vortices_MOST_SWEEPS; ++count) {
         const double change = s->stiff ? point_vortices_corrected(s, coef, *now) : point_vortices_relaxed(s,
-            coef, far, *now);
+            coef, *now);
         const double shrunk = before - change;
         const point_vortices_status failed = count == 0 && !s->stiff ? point_vortices_NOT_FINITE
             : point_vortices_NO_CONVERGENCE;
@@ -796,7 +786,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
 }
 
 /* The stages of a step. */
-static point_vortices_status point_vortices_stages(point_vortices_solver *s, int far)
+static point_vortices_status point_vortices_stages(point_vortices_solver *s)
 {
     const size_t units = point_vortices_units(s);
     for (int stage = 0; stage < point_vortices_STAGES; ++stage) {
@@ -804,19 +794,19 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
         int now = 0;
         point_vortices_predict(s, s->x, stage);
         point_vortices_status status = s->stiff ? point_vortices_NO_CONVERGENCE : point_vortices_middle(s,
-            coef, far, 0.0, &now);
-        if (status != point_vortices_OK && (far || status != point_vortices_NOT_FINITE)) {
+            coef, 0.0, &now);
+        if (status != point_vortices_OK) {
             s->stiff = 1;
             now = 0;
             const double range = point_vortices_range(s, coef);
             point_vortices_predict(s, s->x, stage);
-            status = point_vortices_middle(s, coef, far, range, &now);
+            status = point_vortices_middle(s, coef, range, &now);
         }
         if (status != point_vortices_OK) return status;
         point_vortices_remember(s, s->x, stage, now);
         point_vortices_EACH_PIECE
         for (size_t unit = 0; unit < units; ++unit)
-            point_vortices_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
+            point_vortices_increment_piece(s, coef, s->y[now], s->x, unit);
     }
     return point_vortices_all_hold(s, s->x) ? point_vortices_OK : point_vortices_NOT_FINITE;
 }
@@ -825,7 +815,7 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s, int
 static point_vortices_status point_vortices_try(point_vortices_solver *s)
 {
     point_vortices_copy(s->before, s->x, s);
-    const point_vortices_status status = point_vortices_stages(s, 1);
+    const point_vortices_status status = point_vortices_stages(s);
     if (status == point_vortices_OK) return status;
     point_vortices_copy(s->x, s->before, s);
     point_vortices_forget(s);

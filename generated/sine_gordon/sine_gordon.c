@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 51a1cdb104957c062dd45c47e9cf6af2aaa439b03018c48cc5181b67b52780d6
+ * body-sha256: 9dce0258e7bc1f8ce46a6ee5767141f47e5d220b9d3bad337704c07a1dc6dab6
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -189,10 +189,9 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void sine_gordon_sweep_rows(const sine_gordon_solver *s, int part, const double *coef, int far,
-    size_t first, size_t end)
+static void sine_gordon_sweep_rows(const sine_gordon_solver *s, int part, const double *coef, size_t first,
+    size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
         switch (part) {
@@ -355,13 +354,13 @@ static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const fr
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef, int far)
+static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef)
 {
     const size_t units = sine_gordon_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) sine_gordon_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) sine_gordon_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -371,7 +370,7 @@ static void sine_gordon_make_flow(const sine_gordon_solver *s, size_t steps, int
         : sine_gordon_flow_rows[number];
     const double *coef = s->coef + row * sine_gordon_ROW;
     (void)steps;
-    sine_gordon_sweep_part(s, sine_gordon_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    sine_gordon_sweep_part(s, sine_gordon_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

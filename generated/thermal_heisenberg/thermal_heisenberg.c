@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: 8b68069b7f7c8106a3cc1d20274f7584d98a4616f02aac5866d26867c137fa83
+ * body-sha256: e27e2f3fee4cd88dee38e402dbfc2998afcc4af7b39c4795740226a42f92c22e
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -307,9 +307,8 @@ static inline void thermal_heisenberg_sweep_x_y(const double *coef, const therma
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
 static void thermal_heisenberg_sweep_rows(const thermal_heisenberg_solver *s, int part, const double *coef,
-    int far, size_t first, size_t end)
+    size_t first, size_t end)
 {
-    (void)far;
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0], s->x[3], s->x[5], s->x[6], s->x[4] };
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3], s->x[6], s->x[4], s->x[5] };
     for (size_t unit = first; unit < end; ++unit) {
@@ -647,15 +646,13 @@ static void thermal_heisenberg_copy(double *const to[thermal_heisenberg_DIM],
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void thermal_heisenberg_sweep_part(const thermal_heisenberg_solver *s, int part, const double *coef,
-    int far)
+static void thermal_heisenberg_sweep_part(const thermal_heisenberg_solver *s, int part, const double *coef)
 {
     const size_t units = thermal_heisenberg_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit)
-        thermal_heisenberg_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -665,7 +662,7 @@ static void thermal_heisenberg_make_flow(const thermal_heisenberg_solver *s, siz
         : thermal_heisenberg_flow_rows[number];
     const double *coef = s->coef + row * thermal_heisenberg_ROW;
     (void)steps;
-    thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[joined ? 0 : number], coef);
 }
 
 /* The increments of a part of a step after so many, at all sites. */

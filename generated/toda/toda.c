@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 072c3bde565c18333e430ed2c573ff6a8a761e7f52c4ddc50942e7cbecc0a382
+ * body-sha256: 1f44a486ae2ef2e92a203c06a1c49fc473d611d01cfa4db6d255df4a4345b3a4
  */
 #include "toda.h"
 #include <float.h>
@@ -186,10 +186,8 @@ static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void toda_sweep_rows(const toda_solver *s, int part, const double *coef, int far, size_t first,
-    size_t end)
+static void toda_sweep_rows(const toda_solver *s, int part, const double *coef, size_t first, size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         const toda_piece at = toda_piece_of(s, unit);
         switch (part) {
@@ -354,13 +352,13 @@ static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void toda_sweep_part(const toda_solver *s, int part, const double *coef, int far)
+static void toda_sweep_part(const toda_solver *s, int part, const double *coef)
 {
     const size_t units = toda_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) toda_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) toda_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -369,7 +367,7 @@ static void toda_make_flow(const toda_solver *s, size_t steps, int number)
     const int joined = number == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[number];
     const double *coef = s->coef + row * toda_ROW;
     (void)steps;
-    toda_sweep_part(s, toda_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    toda_sweep_part(s, toda_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

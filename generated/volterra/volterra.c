@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f62b03ca40c42205991cfdfa0b5564b2ab26e080a38ba18510649c6e05f31647
+ * body-sha256: 6b8e990070e3085932c968abef37caf989e5e6d26923d164277a5b4901901193
  */
 #include "volterra.h"
 #include <float.h>
@@ -187,10 +187,9 @@ static inline void volterra_sweep_a(const double *coef, const volterra_row *row,
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void volterra_sweep_rows(const volterra_solver *s, int part, const double *coef, int far, size_t first,
+static void volterra_sweep_rows(const volterra_solver *s, int part, const double *coef, size_t first,
     size_t end)
 {
-    (void)far;
     for (size_t unit = first; unit < end; ++unit) {
         volterra_piece at = volterra_piece_of(s, unit);
         switch (part) {
@@ -358,13 +357,13 @@ static void volterra_copy(double *const to[volterra_DIM], double *const from[vol
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef, int far)
+static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef)
 {
     const size_t units = volterra_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) volterra_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) volterra_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -373,7 +372,7 @@ static void volterra_make_flow(const volterra_solver *s, size_t steps, int numbe
     const int joined = number == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[number];
     const double *coef = s->coef + row * volterra_ROW;
     (void)steps;
-    volterra_sweep_part(s, volterra_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    volterra_sweep_part(s, volterra_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

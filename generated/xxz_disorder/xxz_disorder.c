@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e3454d7f0e4a17b90dcc83273f75496b4ecdee7d572b5fa4262dcb8dc550b437
+ * body-sha256: bb7476a7b154164e50f95f7f51a66ccf765df501b83e50c577bffb902758353b
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -205,10 +205,9 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
 }
 
 /* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void xxz_disorder_sweep_rows(const xxz_disorder_solver *s, int part, const double *coef, int far,
-    size_t first, size_t end)
+static void xxz_disorder_sweep_rows(const xxz_disorder_solver *s, int part, const double *coef, size_t first,
+    size_t end)
 {
-    (void)far;
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3] };
     for (size_t unit = first; unit < end; ++unit) {
         xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
@@ -411,13 +410,13 @@ static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const 
 
 /* ---- The flows ---- */
 /* One part of H. */
-static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef, int far)
+static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef)
 {
     const size_t units = xxz_disorder_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) xxz_disorder_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) xxz_disorder_sweep_rows(s, part, coef, unit, unit + 1);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -427,7 +426,7 @@ static void xxz_disorder_make_flow(const xxz_disorder_solver *s, size_t steps, i
         : xxz_disorder_flow_rows[number];
     const double *coef = s->coef + row * xxz_disorder_ROW;
     (void)steps;
-    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[joined ? 0 : number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

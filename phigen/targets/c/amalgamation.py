@@ -38,6 +38,13 @@ _ONE_ROW = (
     (re.compile(r"phi_locate\(s, (?:r|0), "), "phi_locate(s, "),
 )
 
+#: Arguments that say whether those of functions may be large: what a lattice has whose functions are the same for all.
+_NEVER_FAR = (
+    (re.compile(r"(?<!number), int far(?=[,)])| && \(far \|\| status != PHI_NOT_FINITE\)"), ""),
+    (re.compile(r", (?:far|s->far > 0|g->far|s->wide)(?=[,)])|(?<=coef), 1(?=[,)])|(?<=phi_stages\(s), 1"), ""),
+    (re.compile(r"phi_relaxed\(s, NULL, 1, "), "phi_relaxed(s, NULL, "),
+)
+
 
 @dataclass
 class Amalgam:
@@ -112,6 +119,8 @@ class Amalgam:
         """Lines of the runtime with the prefix of the solver."""
         kept = lines if self.switches["COMPOSED"] else one_stage(lines)
         kept = _without_loops(kept, _OVER_ROWS, _ONE_ROW) if self.switches.get("ONE_ROW") else kept
+        for pattern, text in () if self.switches.get("NEAR", True) else _NEVER_FAR:
+            kept = [pattern.sub(text, line) for line in kept]
         return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
 
 

@@ -89,10 +89,11 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
         phi_ends(s->v[k], sites, 0, sites);
     }
 #if PHI_ADJOINT
-    phi_slope_rows(s, coef, 1, s->y[s->side != NULL ? 2 : now], s->v, s->y[1 - now], 0, phi_units(s));
+    double *const *y = s->y[s->side != NULL ? 2 : now];
 #else
-    phi_slope_rows(s, coef, 1, s->y[now], s->v, s->y[1 - now], 0, phi_units(s));
+    double *const *y = s->y[now];
 #endif
+    for (size_t unit = 0; unit < phi_units(s); ++unit) phi_slope_piece(s, coef, y, s->v, s->y[1 - now], unit);
     for (ptrdiff_t column = 0; column < count; ++column)
         for (ptrdiff_t o = -reach; o <= reach; ++o) {
             const ptrdiff_t j = first + column * apart;

@@ -23,6 +23,9 @@ static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / (PHI_AXE
 phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)
 {
     if (s == NULL || !s->prepared || number > PHI_FLOWS || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+#if !PHI_NEAR
+    (void)far;
+#endif
     const int joined = number == PHI_FLOWS, part = phi_flow_parts[joined ? 0 : number];
     const int row = joined ? PHI_JOINED : phi_flow_rows[number];
 #if PHI_RENEWED

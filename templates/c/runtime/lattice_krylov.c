@@ -68,7 +68,7 @@ static void phi_multiply(const phi_solver *s, const double *coef, int now, doubl
     }
 #endif
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_slope_rows(s, coef, 1, s->y[now], v, to, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) phi_slope_piece(s, coef, s->y[now], v, to, unit);
     phi_combine(s, to, 1.0, v, -1.0, to);
 }
 #else
@@ -79,7 +79,7 @@ static void phi_multiply(const phi_solver *s, const double *coef, int now, doubl
     const double by = 0x1p-26 * sqrt((double)(PHI_DIM * s->sites));
     phi_combine(s, s->y[2], 1.0, s->y[now], by, v);
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_relax_rows(s, coef, 1, s->y[2], to, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) phi_relax_piece(s, coef, 1, s->y[2], to, unit);
     phi_combine(s, to, 1.0 / by, s->y[1 - now], -1.0 / by, to);
     phi_combine(s, to, 1.0, v, 1.0, to);
 }
@@ -114,9 +114,9 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
     for (size_t unit = 0; unit < units; ++unit) {
         const phi_piece at = phi_piece_of(s, unit);
 #if PHI_ADJOINT
-        phi_own_slope_rows(s, coef, 1, s->y[s->side != NULL ? 2 : now], s->block, unit, unit + 1);
+        phi_own_slope_piece(s, coef, s->y[s->side != NULL ? 2 : now], s->block, unit);
 #else
-        phi_own_slope_rows(s, coef, 1, s->y[now], s->block, unit, unit + 1);
+        phi_own_slope_piece(s, coef, s->y[now], s->block, unit);
 #endif
         for (ptrdiff_t i = at.from; i < at.to; ++i) {
             double b[PHI_DIM][PHI_DIM];

@@ -98,7 +98,7 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
     phi_vector(s, s->vectors, side);
     phi_vector(s, s->vectors + 1, dy);
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_side_rows(s, coef, 1, s->y[now], v, side, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) phi_side_piece(s, coef, s->y[now], v, side, unit);
 #if PHI_SITE_BLOCKS
     phi_invert_blocks(s, coef, now);
 #endif
@@ -111,7 +111,7 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
         if (!isfinite(left)) return PHI_NO_CONVERGENCE;
         if (left <= 0x1p-54 * size || (left > 0.5 * before && left <= PHI_CARRIED * size)) {
             PHI_EACH_PIECE
-            for (size_t unit = 0; unit < units; ++unit) phi_follow_rows(s, coef, 1, s->y[now], dy, v, unit, unit + 1);
+            for (size_t unit = 0; unit < units; ++unit) phi_follow_piece(s, coef, s->y[now], dy, v, unit);
             return PHI_OK;
         }
         before = left;

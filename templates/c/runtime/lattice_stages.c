@@ -72,7 +72,7 @@ static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 #endif
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) phi_relax_rows(s, coef, far, s->y[now], s->y[1 - now], unit, unit + 1);
+        if (coef != NULL) phi_relax_piece(s, coef, far, s->y[now], s->y[1 - now], unit);
         phi_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
@@ -213,7 +213,7 @@ static phi_status phi_stages(phi_solver *s, int far)
         phi_remember(s, s->x, stage, now);
 #endif
         PHI_EACH_PIECE
-        for (size_t unit = 0; unit < units; ++unit) phi_increment_rows(s, coef, far, s->y[now], s->x, unit, unit + 1);
+        for (size_t unit = 0; unit < units; ++unit) phi_increment_piece(s, coef, far, s->y[now], s->x, unit);
     }
     return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }

@@ -66,7 +66,7 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     found += [loop.text(program) for part in parts for loop in part.loops]
     back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
-    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1))))
+    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=bool(rows.near)))
     where = _givers(program) if givers(step) else []
     hand = {
         k: Case(p.second, [*(line for line in setup if line != _VARIED), *where], beside=False)
@@ -162,7 +162,9 @@ def _gathered(program: Program, layout: Layout, sweep: Sweep) -> Iterator[str]:
         yield f"{program.name}_{names[loop.code]}(coef, &at.row, at.from, at.to);"
 
 
-def _over(program: Program, layout: Layout, title: str, head: str, cases: Mapping[int, Case]) -> str:
+def _over(
+    program: Program, layout: Layout, title: str, head: str, cases: Mapping[int, Case], *, far: bool = False
+) -> str:
     """A function that does what is called for pieces of rows, of some parts."""
     coloured, whole = bool(layout.step.by_colour), head == "back_rows" or layout.step.partners is not None
     arguments = "double *const *x, double *const *bar, double *const *handed"
@@ -170,17 +172,25 @@ def _over(program: Program, layout: Layout, title: str, head: str, cases: Mappin
         numbers = ["double *numbers"] * bool(layout.step.partners)
         arguments = ", ".join(["double *const *bar", *numbers])
         if head == "back_rows":
-            arguments = "const double *coef, int far, double *const *v, double *const *bar, double *sums"
+            arguments = f"const double *coef, {'int far, ' * far}double *const *v, double *const *bar, double *sums"
     elif whole:
-        far = "int far, " * (head == "back_rows")
-        arguments = f"const double *coef, {far}{arguments}, double *sums"
-    more = {"title": title, "head": head, "coloured": coloured}
-    more["arguments"] = f"int {'flow' if coloured else 'part'}, {arguments}"
+        arguments = f"const double *coef, {'int far, ' * far}{arguments}, double *sums"
+    arguments = f"int {'flow' if coloured else 'part'}, {arguments}"
     unused = ["part"] * (len(cases) == 1 and not coloured)
     calls = [call for case in cases.values() for call in case.calls]
     unused += ["numbers"] * ("*numbers" in arguments and not any("numbers" in call for call in calls))
     unused += ["far"] * ("int far" in arguments and not any("(far)" in call for call in calls))
-    return over_rows(program, layout, list(cases.values()), list(cases), unused=unused, **more)
+    return over_rows(
+        program,
+        layout,
+        list(cases.values()),
+        list(cases),
+        title=title,
+        head=head,
+        arguments=arguments,
+        coloured=coloured,
+        unused=unused,
+    )
 
 
 def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iterable[Kernel]) -> str:

@@ -45,7 +45,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     seen = program.observables
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
-        found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]))
+        found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]), far=bool(rows.near))
     if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
         found += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
@@ -95,7 +95,8 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         names[code] = shared or same[0].loop.name
         purposes = [call.purpose(program.coordinates) for call in same]
         yield replace(same[0].loop, name=names[code]).text(program, purposes)
-    unused, varied = ["far"] * all(len(forms) == 1 for forms in made), rows is None
+    near = rows is not None and bool(rows.near)
+    unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in made)), rows is None
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
     cases: list[Case | str] = []
     for k, forms in enumerate(made):
@@ -116,7 +117,7 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         cases,
         title=f"How {what[0].lower()}{what[1:]} carries a tangent vector" if varied else what,
         head="tangent_rows" if varied else "sweep_rows",
-        arguments=f"int {flow}, const double *coef, {'double *const *v' if varied else 'int far'}",
+        arguments=f"int {flow}, const double *coef{', double *const *v' * varied}{', int far' * near}",
         coloured=bool(step.by_colour),
         unused=["part"] * (len(cases) == 1 and not step.by_colour) + ([] if varied else unused),
     )
@@ -307,9 +308,10 @@ def _copied_ends(program: Program, layout: Layout, fields: Sequence[int], where:
 
 
 def _of_equation(
-    program: Program, layout: Layout, kernel: Kernel, forms: Mapping[str, Mapping[str, str]]
+    program: Program, layout: Layout, kernel: Kernel, forms: Mapping[str, Mapping[str, str]], *, far: bool = False
 ) -> Iterator[str]:
-    """The loops of a kernel of the equation of a stage over rows and their sites, in each form."""
+    """The loops of a kernel of the equation of a stage over rows and their sites, in each form; whether it is told of
+    arguments that are far."""
     name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
     varied = kernel.name in VARIED
     gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
@@ -339,16 +341,25 @@ def _of_equation(
         layout,
         [Case([*gathered, *either(lines), *ends], setup, has_ends(program, [kernel]))],
         title=titles[kernel.name],
-        head=f"{kernel.name}_rows",
-        arguments=f"const double *coef, int far, double *const *y, {'double *const *v, ' * varied}double *const *to",
-        unused=["far"] * (len(forms) == 1),
+        head=f"{kernel.name}_piece",
+        arguments=f"const double *coef, {'int far, ' * far}double *const *y, {'double *const *v, ' * varied}"
+        "double *const *to",
+        unused=["far"] * (far and len(forms) == 1),
+        alone=True,
     )
 
 
 def over_rows(
-    program: Program, layout: Layout, cases: Sequence[Case | str], labels: Sequence[int] = (), **more: object
+    program: Program,
+    layout: Layout,
+    cases: Sequence[Case | str],
+    labels: Sequence[int] = (),
+    *,
+    alone: bool = False,
+    **more: object,
 ) -> str:
-    """A function that goes over pieces of rows; what it does to each is one of some ``cases``, or what these call.
+    """A function that goes over pieces of rows, or ``alone`` over one; what it does is one of some ``cases``, or what
+    these call.
 
     They have the numbers 1, 2, …, or those of ``labels``.
     """
@@ -359,6 +370,7 @@ def over_rows(
         "low": low if one_row else f"at.row.whole ? {low} : s->length",
         "high": max([0, *(high for _, high in last)]),
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
+        "alone": alone,
     }
     body = [line for case in cases if not isinstance(case, str) for line in case.orders]
     body = [*dict.fromkeys(body), *_over_pieces(program, values, cases, labels or range(1, 1 + len(cases)))]
@@ -380,7 +392,9 @@ def _over_pieces(
 
 
 def _piece(values: Mapping[str, object], case: Case, changed: Sequence[str]) -> list[str]:
-    return render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
+    lines = render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
+    each = "for (size_t unit = first; unit < end; ++unit) {"
+    return lines if values["alone"] else [each, *(f"    {line}" for line in lines), "}"]
 
 
 def _cases(loops: Sequence[Sequence[str]], labels: Sequence[int]) -> Iterator[str]:
