@@ -11,19 +11,19 @@
 #if PHI_GATHER
 enum { PHI_ADDED = 2 * PHI_PIECE }; /* sites whose shares in a sum are kept apart before they are added */
 #else
-enum { PHI_ADDED = 256 }; /* sites whose shares in a sum are kept apart before they are added */
+enum { PHI_ADDED = 64 }; /* sites whose shares in a sum are kept apart before they are added */
 #endif
 
 /* The sum of some values, in an order that lets loops vectorise. */
 static inline double phi_added(const double *values, ptrdiff_t count)
 {
-    double lanes[8] = { 0.0 }, sum = 0.0;
+    double lanes[8] = { 0.0 }, rest = 0.0;
     const ptrdiff_t whole = count - count % 8;
     for (ptrdiff_t i = 0; i < whole; i += 8)
         for (int l = 0; l < 8; ++l) lanes[l] += values[i + l];
-    for (ptrdiff_t i = whole; i < count; ++i) sum += values[i];
-    for (int l = 0; l < 8; ++l) sum += lanes[l];
-    return sum;
+    for (ptrdiff_t i = whole; i < count; ++i) rest += values[i];
+    for (int l = 0; l < 4; ++l) lanes[l] += lanes[l + 4];
+    return lanes[0] + lanes[2] + (lanes[1] + lanes[3]) + rest;
 }
 
 #endif

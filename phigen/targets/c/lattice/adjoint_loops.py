@@ -96,7 +96,7 @@ def first_loop(
             head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    body += [*stores, *(f"share{k}[i - begin] = {value};" for k, (_, value) in enumerate(shares))]
+    body += [*stores, *(f"share{k}[i - begin] += {value};" for k, (_, value) in enumerate(shares))]
     text = _looped(name, layout, seeds.colour, [*head, *(f"    {line}" for line in names.pointers())], body, shares)
     arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
     return Loop(kernel.name + form, kernel.purpose, arguments, text)
@@ -121,11 +121,13 @@ def _looped(
         return "\n".join([*head, "    (void)sums;", *(f"    {line}" for line in loop)]) + "\n"
     kept = ", ".join(f"share{k}[{name}_ADDED]" for k in range(len(shares)))
     inner = [f"const ptrdiff_t end = to - begin < {name}_ADDED ? to : begin + {name}_ADDED;"]
-    if coloured:
-        inner += [f"memset(share{k}, 0, sizeof share{k});" for k in range(len(shares))]
-    inner += [*loop, *(f"sums[{c}] += {name}_added(share{k}, end - begin);" for k, (c, _) in enumerate(shares))]
-    lines = [f"double {kept};", f"for (ptrdiff_t begin = from; begin < to; begin += {name}_ADDED) {{"]
-    return "\n".join([*head, *(f"    {line}" for line in [*lines, *(f"    {line}" for line in inner), "}"])]) + "\n"
+    inner += loop
+    lines = [f"const ptrdiff_t apart = to - from < {name}_ADDED ? to - from : {name}_ADDED;", f"double {kept};"]
+    lines += [f"memset(share{k}, 0, (size_t)apart * sizeof *share{k});" for k in range(len(shares))]
+    lines.append(f"for (ptrdiff_t begin = from; begin < to; begin += {name}_ADDED) {{")
+    lines += [*(f"    {line}" for line in inner), "}"]
+    lines += [f"sums[{c}] += {name}_added(share{k}, apart);" for k, (c, _) in enumerate(shares)]
+    return "\n".join([*head, *(f"    {line}" for line in lines)]) + "\n"
 
 
 def _place(layout: Layout, kernel: Kernel, store: Store) -> tuple[str, tuple[int, ...]]:
