@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 3e94ae5cdf5ecbc76832e60a4e3e1f4752d8dfc0f15f275b1cdb6600219437ad
+ * body-sha256: a6fd90c5172cf99d9d0cca890a57d3929930563338d3265987786c261c4e015d
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -116,35 +116,6 @@ static inline point_vortices_piece point_vortices_piece_of(const point_vortices_
     return piece;
 }
 
-/* log u for the loops over lanes: u = 2^k m with m between sqrt 1/2 and sqrt 2, no branches. No number where
-   u is not positive, or not normal. */
-static inline double point_vortices_log_lane(double u)
-{
-    uint64_t bits, exponent, digits;
-    double m, k, sum = 0.043478260869565216, other = 0.047619047619047616;
-    memcpy(&bits, &u, sizeof bits);
-    exponent = (bits - 0x3fe6a09e667f3bcdU + 0x3ff0000000000000U) >> 52; /* k + 1023 */
-    digits = bits - ((exponent - 1023) << 52);
-    memcpy(&m, &digits, sizeof m);
-    exponent |= 0x4330000000000000U; /* 2^52 + k + 1023, as a double */
-    memcpy(&k, &exponent, sizeof k);
-    k -= 4503599627371519.0;
-    const double f = (m - 1.0) / (m + 1.0), q = f * f, qq = q * q;
-    sum = sum * qq + 0.05263157894736842;
-    other = other * qq + 0.058823529411764705;
-    sum = sum * qq + 0.06666666666666667;
-    other = other * qq + 0.07692307692307693;
-    sum = sum * qq + 0.09090909090909091;
-    other = other * qq + 0.1111111111111111;
-    sum = sum * qq + 0.14285714285714285;
-    other = other * qq + 0.2;
-    sum = (sum * q + other) * q + 0.3333333333333333;
-    /* m - 1 is exact: f (m - 1) and what follows it are small beside it */
-    const double small = q * sum * 2.0 * f + k * 1.9082149292705877e-10;
-    const double rest = (m - 1.0) - f * (m - 1.0) + small + k * 0.6931471803691238;
-    return rest + (u >= DBL_MIN && u <= DBL_MAX ? 0.0 : (double)NAN);
-}
-
 /* what a site b adds to the forces at a site a */
 static inline void point_vortices_pair_forces(const point_vortices_params *params,
     const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
@@ -182,8 +153,7 @@ static inline void point_vortices_pair_energy(const point_vortices_params *param
             const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = y_a_ - y_b_;
-            g0[i] += i == j ? 0.0 : (-0.25) * (G_a_ * G_b_ * point_vortices_log_lane(t1 * t1 + t2 * t2)
-                / 3.141592653589793);
+            g0[i] += i == j ? 0.0 : (-0.25) * (G_a_ * G_b_ * log(t1 * t1 + t2 * t2) / 3.141592653589793);
         }
     }
 }

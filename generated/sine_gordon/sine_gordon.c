@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9dce0258e7bc1f8ce46a6ee5767141f47e5d220b9d3bad337704c07a1dc6dab6
+ * body-sha256: 87031b3667ddec3e36c7c3562e10b412ec59ff5b7a368661e3b6f592eeeb01b2
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -235,8 +235,7 @@ static void sine_gordon_vector_field_row(const sine_gordon_params *params, const
         const double t1 = 1.0 / d;
         const double t2 = t1 * t1;
         out[i - from] = p;
-        out[(ptrdiff_t)apart + i - from] =
-            -(sine_gordon_sin_lane(q) + ((q - q_row[i - 1]) * t2 - (q_row[i + 1] - q) * t2));
+        out[(ptrdiff_t)apart + i - from] = -(sin(q) + ((q - q_row[i - 1]) * t2 - (q_row[i + 1] - q) * t2));
     }
 }
 

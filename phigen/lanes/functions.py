@@ -17,6 +17,9 @@ LANE_FORMULAS = {f.name: f.lanes for f in FUNCTIONS.values() if f.lanes not in (
 #: Those that are polynomials where their arguments are small, as in flows: phigen's own, then those of libraries.
 NEAR_FUNCTIONS = tuple(f.name for f in sorted(FUNCTIONS.values(), key=lambda f: (f.written and f.name) or "") if f.near)
 
+#: Those whose versions for lanes have values wherever there is use for them. exp has not, beyond 700, nor has log of 0.
+REACHING = (*NEAR_FUNCTIONS, "cos")
+
 #: Powers that are left after lowering and call no function.
 _ARITHMETIC = (Fraction(2), Fraction(-1), Fraction(1, 2))
 

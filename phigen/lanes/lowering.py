@@ -11,7 +11,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from phigen.lanes import paths
-from phigen.lanes.functions import NEAR_FUNCTIONS, library_calls, library_powers, operations, with_formulas
+from phigen.lanes.functions import (
+    LANE_FORMULAS,
+    LANE_FUNCTIONS,
+    NEAR_FUNCTIONS,
+    REACHING,
+    library_calls,
+    library_powers,
+    operations,
+    with_formulas,
+)
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
@@ -83,14 +92,16 @@ class Packs:
 
 @dataclass(frozen=True)
 class Rows:
-    """Sites of a lattice, side by side in rows; ``near`` as in packs."""
+    """Sites of a lattice, side by side in rows; ``near`` as in packs. ``limited`` are functions of flows and stages
+    that have no value where arguments are very large: those of ``near``, and those with versions in lanes."""
 
     calls: frozenset[str]
     near: tuple[str, ...]
+    limited: frozenset[str]
 
-    def calls_near(self, kernel: Kernel) -> bool:
+    def calls_limited(self, kernel: Kernel) -> bool:
         """Whether a kernel calls one of those."""
-        return not operations([kernel]).isdisjoint(self.near)
+        return not operations([kernel]).isdisjoint(self.limited)
 
 
 @dataclass(frozen=True)
@@ -139,19 +150,20 @@ def _of_steps(program: Program) -> Blocks | Packs | None:
 
 
 def _rows(program: Program, step: Sweeps) -> Rows:
-    """Sites are in rows in any case; the short way near 0 is for speed."""
+    """Sites are in rows in any case; most versions in lanes, and the short way near 0, are for speed.
+
+    What is looked at now and then calls libm, whose functions take any argument.
+    """
     swept = [sweep.kernel for part in step.parts for sweep in part]
     swept += step.equation.kernels if step.equation else ()
-    seen = program.observables
-    energies = {seen.energy.name, *(k.name for k in (step.partners.energy.kernels if step.partners else ()))}
-    looped = [
-        kernel
-        for kernel in (*step.kernels, seen.energy, seen.casimirs, seen.vector_field)
-        if kernel is not step.prepare and not (kernel.name in energies and program.profile == "small")
-    ]
-    ops = operations(looped)
-    used = operations(swept) if program.lanes and program.profile == "fast" else set()
-    return Rows(with_formulas(ops), tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in used))
+    energies = [k.name for k in (step.partners.energy.kernels if step.partners else ())]
+    looped = [kernel for kernel in step.kernels if kernel is not step.prepare and kernel.name not in energies]
+    if program.profile == "small":
+        return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
+    used = operations(swept)
+    near = tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in used) if program.lanes else ()
+    limited = frozenset({*near, *LANE_FUNCTIONS, *LANE_FORMULAS} & used)
+    return Rows(with_formulas(operations(looped)), near, limited)
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

@@ -77,7 +77,9 @@ def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
 
     assert isinstance(lanes, Rows)
     step = program.step
-    has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {"NEAR": bool(lanes.near)}
+    has |= lattice_layout.switches(program, step, lattice_layout.layout_of(program, step)) | {
+        "NEAR": bool(lanes.limited)
+    }
     texts = {
         "declarations.h": lattice_model.declarations(program, step),
         "model.h": lattice_model.model(program, step),

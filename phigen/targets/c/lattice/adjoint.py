@@ -66,7 +66,7 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     found += [loop.text(program) for part in parts for loop in part.loops]
     back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
-    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=bool(rows.near)))
+    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=bool(rows.limited)))
     where = _givers(program) if givers(step) else []
     hand = {
         k: Case(p.second, [*(line for line in setup if line != _VARIED), *where], beside=False)

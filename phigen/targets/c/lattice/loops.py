@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from phigen.lanes.functions import REACHING
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep
@@ -68,13 +69,24 @@ def weights_of(kernel: Kernel) -> list[str]:
     return [s for s in kernel.inputs["present"] if kind_of(s) == PRESENT]
 
 
-def in_loops(program: Program, *, energy: bool = False) -> dict[str, str]:
-    """What the loops call for any argument: versions for lanes where there are such, else phigen's own or libm's.
+def in_loops(program: Program) -> dict[str, str]:
+    """What flows and stages call: versions for lanes, in short code only those that always have a value."""
+    return far_calls(program) if program.profile == "small" else _called(program, lane_calls(program))
 
-    In short code an ``energy``, which is looked at now and then, calls libm's.
-    """
+
+def far_calls(program: Program) -> dict[str, str]:
+    """What flows and stages call where arguments may be very large: libm where versions for lanes have no value."""
+    lanes = lane_calls(program)
+    return _called(program, {**FUNCTIONS, **{f: lanes[f] for f in REACHING if f in lanes}})
+
+
+def seen_calls(program: Program) -> dict[str, str]:
+    """What is called by that which is looked at now and then: libm, or functions of phigen's own."""
+    return _called(program, FUNCTIONS)
+
+
+def _called(program: Program, calls: Mapping[str, str]) -> dict[str, str]:
     own = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS}
-    calls = FUNCTIONS if energy and program.profile == "small" else lane_calls(program)
     return own | dict(calls) | {f: own[f] for f in SPECIAL}
 
 
@@ -177,7 +189,7 @@ def _added(name: str, read: bool, value: str) -> str:
 def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
     """A kernel as a loop that fills arrays over the sites."""
     name, code, partners = program.name, lower(kernel), layout.partners
-    calls = in_loops(program, energy=kernel.name == "energy")
+    calls = seen_calls(program)
     names = SiteNames(program, layout, kernel, code, set(), calls, partners.field.names)
     head = [*comment(f"/* {plain(kernel.purpose)}, of the sites of a row: out[k * apart + i - from] */", "")]
     head.append(

@@ -9,7 +9,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.loops import Loop, in_loops
+from phigen.targets.c.lattice.loops import Loop, in_loops, seen_calls
 from phigen.targets.c.lattice.names import SiteNames, pointers
 from phigen.targets.code import lower
 
@@ -22,7 +22,8 @@ def partners(program: Program, layout: Layout) -> Iterator[str]:
 
 def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> Iterator[Loop]:
     """What all bonds, or pairs with other sites, add up at some sites, from ``coef`` or ``params``."""
-    calls = in_loops(program, energy=gather is layout.partners.energy)
+    seen = source == "params" and gather in (layout.partners.energy, layout.partners.field)
+    calls = seen_calls(program) if seen else in_loops(program)
     kind = "double" if source == "coef" else f"{program.name}_params"
     arguments = f"const {kind} *{source}, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
     for number, (ends, opposite) in enumerate(over_ends(gather)):

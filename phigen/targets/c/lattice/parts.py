@@ -17,6 +17,7 @@ from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches
 from phigen.targets.c.lattice.loops import (
     BLOCK,
     Loop,
+    far_calls,
     forms_of,
     has_ends,
     in_loops,
@@ -45,7 +46,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     seen = program.observables
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
-        found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]), far=bool(rows.near))
+        found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]), far=bool(rows.limited))
     if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
         found += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
@@ -75,10 +76,10 @@ def parameters(program: Program, step: Sweeps) -> str:
 def call_forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -> dict[str, Mapping[str, str]]:
     """The forms in which kernels are needed, each with what its functions are called; without rows one for all."""
     calls = in_loops(program)
-    if rows is None or not any(rows.calls_near(kernel) for kernel in kernels):
+    if rows is None or not any(rows.calls_limited(kernel) for kernel in kernels):
         return {"": calls}
     lanes = {f: f"{program.name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.near}
-    return {"_near": {**calls, **lanes}, "_far": calls}
+    return {"_near": {**calls, **lanes}, "_far": far_calls(program)}
 
 
 def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[Sequence[Sweep]]) -> Iterator[str]:
@@ -95,7 +96,7 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         names[code] = shared or same[0].loop.name
         purposes = [call.purpose(program.coordinates) for call in same]
         yield replace(same[0].loop, name=names[code]).text(program, purposes)
-    near = rows is not None and bool(rows.near)
+    near = rows is not None and bool(rows.limited)
     unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in made)), rows is None
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
     cases: list[Case | str] = []
