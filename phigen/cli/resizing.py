@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.experiment import run_of
+from phigen.spec.problems import counted
 
 if TYPE_CHECKING:
     from phigen.spec.model import Spec
@@ -42,7 +43,8 @@ def resized(spec: Spec, name: str | None, given: str | None) -> Spec:
     axes = spec.lattice.axes
     if len(sizes) != len(axes or ("sites",)):
         wanted = f"the axes {', '.join(axes)}" if len(axes) > 1 else "one axis" if axes else "sites alone"
-        raise click.BadParameter(f"{given} has {len(sizes)} sizes; {spec.name} has {wanted}", param_hint=OPTION)
+        many = counted(len(sizes), "size")
+        raise click.BadParameter(f"{given} has {many}; {spec.name} has {wanted}", param_hint=OPTION)
     _expect_room(spec, sizes, given)
     other = replace(run, lattice=replace(run.lattice, sizes=sizes))
     # what is said of these sizes points at no line of the spec, which has others

@@ -54,6 +54,7 @@ def test_a_run_that_cannot_fit_ends_with_what_to_do(chain):
 
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_solvers_and_frames_are_refused_where_they_do_not_fit_and_only_there(chain, target, monkeypatch, tmp_path):
+    monkeypatch.setattr(memory, "UNASKED", 0)
     solver, x = compile(chain, target=target), np.zeros((2, 12))
     monkeypatch.setattr(memory, "available", lambda: 101 * STATE)
     assert len(solver.integrate(x, 0.05, 100)) == 101
