@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 6fe8026951214dedd4e5ec745c5394ece6c98792e1b00465c34c7c68b7660778
+ * body-sha256: 2328ac8041f43bf1fea539f6215c96fd9a938268d3d1dcf3c3c970df2ea3fb92
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -2911,6 +2911,13 @@ static void kowalevski_top_record_lanes(kowalevski_top_history *history,
     history->count += kowalevski_top_LANES;
 }
 
+/* The slope of the motion at x. */
+static void kowalevski_top_slope(const kowalevski_top_solver *s, const double x[kowalevski_top_DIM],
+    double slope[kowalevski_top_DIM])
+{
+    kowalevski_top_vector_field(&s->params, x, slope);
+}
+
 /* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
 static void kowalevski_top_runge_kutta(const kowalevski_top_solver *s, double h, double x[kowalevski_top_DIM],
     double mean[kowalevski_top_DIM])
@@ -2921,7 +2928,7 @@ static void kowalevski_top_runge_kutta(const kowalevski_top_solver *s, double h,
     memcpy(point, x, sizeof point);
     memset(mean, 0, kowalevski_top_DIM * sizeof mean[0]);
     for (int part = 0; part < 4; ++part) {
-        kowalevski_top_vector_field(&s->params, point, slope);
+        kowalevski_top_slope(s, point, slope);
         for (int i = 0; i < kowalevski_top_DIM; ++i) {
             mean[i] += weight[part] * slope[i];
             point[i] = x[i] + h * reach[part] * slope[i];
@@ -2943,7 +2950,7 @@ static void kowalevski_top_from_means(kowalevski_top_lanes coef[restrict], kowal
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void kowalevski_top_guess_by_runge_kutta(const kowalevski_top_solver *s, kowalevski_top_table *table,
+static void kowalevski_top_guess_by_march(const kowalevski_top_solver *s, kowalevski_top_table *table,
     kowalevski_top_model *model)
 {
     double x[kowalevski_top_DIM], mean[kowalevski_top_DIM];
@@ -2957,13 +2964,13 @@ static void kowalevski_top_guess_by_runge_kutta(const kowalevski_top_solver *s, 
     kowalevski_top_from_means(table->coef, model);
 }
 
-/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
-   near the state. */
+/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the
+   state. */
 static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *table,
     kowalevski_top_model *model)
 {
     if (s->blocks.use_recurrences) kowalevski_top_foresee(&s->history, table->weight, model->y);
-    else kowalevski_top_guess_by_runge_kutta(s, table, model);
+    else kowalevski_top_guess_by_march(s, table, model);
     return kowalevski_top_near_lanes(model, s->x);
 }
 

@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: b93bf0389c7dd2515ace08da12849272f6026d0d7f78452f2b7a84e400e2647b
+ * body-sha256: 6db97a161550765412167d1fb00b537b18523a02cafd2ce1de0b0d4f385eb5e7
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -1025,6 +1025,13 @@ static void lotka_volterra_record_lanes(lotka_volterra_history *history,
     history->count += lotka_volterra_LANES;
 }
 
+/* The slope of the motion at x. */
+static void lotka_volterra_slope(const lotka_volterra_solver *s, const double x[lotka_volterra_DIM],
+    double slope[lotka_volterra_DIM])
+{
+    lotka_volterra_vector_field(&s->params, x, slope);
+}
+
 /* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
 static void lotka_volterra_runge_kutta(const lotka_volterra_solver *s, double h, double x[lotka_volterra_DIM],
     double mean[lotka_volterra_DIM])
@@ -1035,7 +1042,7 @@ static void lotka_volterra_runge_kutta(const lotka_volterra_solver *s, double h,
     memcpy(point, x, sizeof point);
     memset(mean, 0, lotka_volterra_DIM * sizeof mean[0]);
     for (int part = 0; part < 4; ++part) {
-        lotka_volterra_vector_field(&s->params, point, slope);
+        lotka_volterra_slope(s, point, slope);
         for (int i = 0; i < lotka_volterra_DIM; ++i) {
             mean[i] += weight[part] * slope[i];
             point[i] = x[i] + h * reach[part] * slope[i];
@@ -1057,7 +1064,7 @@ static void lotka_volterra_from_means(lotka_volterra_lanes coef[restrict], lotka
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void lotka_volterra_guess_by_runge_kutta(const lotka_volterra_solver *s, lotka_volterra_table *table,
+static void lotka_volterra_guess_by_march(const lotka_volterra_solver *s, lotka_volterra_table *table,
     lotka_volterra_model *model)
 {
     double x[lotka_volterra_DIM], mean[lotka_volterra_DIM];
@@ -1071,13 +1078,13 @@ static void lotka_volterra_guess_by_runge_kutta(const lotka_volterra_solver *s, 
     lotka_volterra_from_means(table->coef, model);
 }
 
-/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
-   near the state. */
+/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the
+   state. */
 static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *table,
     lotka_volterra_model *model)
 {
     if (s->blocks.use_recurrences) lotka_volterra_foresee(&s->history, table->weight, model->y);
-    else lotka_volterra_guess_by_runge_kutta(s, table, model);
+    else lotka_volterra_guess_by_march(s, table, model);
     return lotka_volterra_near_lanes(model, s->x);
 }
 

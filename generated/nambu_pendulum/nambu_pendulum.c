@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: f371338f9a60f6866de717c1eb854ed3df5e77115382c17c6429c8ef0eb6866a
+ * body-sha256: bb0d7f4239369c5fd1103c5be68bea61045d8436e8572889a1209a0732d444d8
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1772,6 +1772,13 @@ static void nambu_pendulum_record_lanes(nambu_pendulum_history *history,
     history->count += nambu_pendulum_LANES;
 }
 
+/* The slope of the motion at x. */
+static void nambu_pendulum_slope(const nambu_pendulum_solver *s, const double x[nambu_pendulum_DIM],
+    double slope[nambu_pendulum_DIM])
+{
+    nambu_pendulum_vector_field(&s->params, x, slope);
+}
+
 /* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
 static void nambu_pendulum_runge_kutta(const nambu_pendulum_solver *s, double h, double x[nambu_pendulum_DIM],
     double mean[nambu_pendulum_DIM])
@@ -1782,7 +1789,7 @@ static void nambu_pendulum_runge_kutta(const nambu_pendulum_solver *s, double h,
     memcpy(point, x, sizeof point);
     memset(mean, 0, nambu_pendulum_DIM * sizeof mean[0]);
     for (int part = 0; part < 4; ++part) {
-        nambu_pendulum_vector_field(&s->params, point, slope);
+        nambu_pendulum_slope(s, point, slope);
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             mean[i] += weight[part] * slope[i];
             point[i] = x[i] + h * reach[part] * slope[i];
@@ -1804,7 +1811,7 @@ static void nambu_pendulum_from_means(nambu_pendulum_lanes coef[restrict], nambu
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void nambu_pendulum_guess_by_runge_kutta(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
+static void nambu_pendulum_guess_by_march(const nambu_pendulum_solver *s, nambu_pendulum_table *table,
     nambu_pendulum_model *model)
 {
     double x[nambu_pendulum_DIM], mean[nambu_pendulum_DIM];
@@ -1818,13 +1825,13 @@ static void nambu_pendulum_guess_by_runge_kutta(const nambu_pendulum_solver *s, 
     nambu_pendulum_from_means(table->coef, model);
 }
 
-/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
-   near the state. */
+/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the
+   state. */
 static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *table,
     nambu_pendulum_model *model)
 {
     if (s->blocks.use_recurrences) nambu_pendulum_foresee(&s->history, table->weight, model->y);
-    else nambu_pendulum_guess_by_runge_kutta(s, table, model);
+    else nambu_pendulum_guess_by_march(s, table, model);
     return nambu_pendulum_near_lanes(model, s->x);
 }
 

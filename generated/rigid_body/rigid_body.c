@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: a42ea799aaa170fb8be7c7c34b116bc299cbffe02437dd3c46a54b0ee1740ea5
+ * body-sha256: b6300df4ae08b2e361e01d690e60f9a5703a71d9af4d2fb2cd626a50f6de3ce2
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1408,6 +1408,13 @@ static void rigid_body_record_lanes(rigid_body_history *history, rigid_body_lane
     history->count += rigid_body_LANES;
 }
 
+/* The slope of the motion at x. */
+static void rigid_body_slope(const rigid_body_solver *s, const double x[rigid_body_DIM],
+    double slope[rigid_body_DIM])
+{
+    rigid_body_vector_field(&s->params, x, slope);
+}
+
 /* A step of size h by the classical Runge-Kutta method. x becomes its end, mean the mean slope. */
 static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double x[rigid_body_DIM],
     double mean[rigid_body_DIM])
@@ -1418,7 +1425,7 @@ static void rigid_body_runge_kutta(const rigid_body_solver *s, double h, double 
     memcpy(point, x, sizeof point);
     memset(mean, 0, rigid_body_DIM * sizeof mean[0]);
     for (int part = 0; part < 4; ++part) {
-        rigid_body_vector_field(&s->params, point, slope);
+        rigid_body_slope(s, point, slope);
         for (int i = 0; i < rigid_body_DIM; ++i) {
             mean[i] += weight[part] * slope[i];
             point[i] = x[i] + h * reach[part] * slope[i];
@@ -1440,7 +1447,7 @@ static void rigid_body_from_means(rigid_body_lanes coef[restrict], rigid_body_mo
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical
    Runge-Kutta method, to leading order. */
-static void rigid_body_guess_by_runge_kutta(const rigid_body_solver *s, rigid_body_table *table,
+static void rigid_body_guess_by_march(const rigid_body_solver *s, rigid_body_table *table,
     rigid_body_model *model)
 {
     double x[rigid_body_DIM], mean[rigid_body_DIM];
@@ -1454,12 +1461,12 @@ static void rigid_body_guess_by_runge_kutta(const rigid_body_solver *s, rigid_bo
     rigid_body_from_means(table->coef, model);
 }
 
-/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not
-   near the state. */
+/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the
+   state. */
 static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid_body_model *model)
 {
     if (s->blocks.use_recurrences) rigid_body_foresee(&s->history, table->weight, model->y);
-    else rigid_body_guess_by_runge_kutta(s, table, model);
+    else rigid_body_guess_by_march(s, table, model);
     return rigid_body_near_lanes(model, s->x);
 }
 

@@ -1,6 +1,6 @@
 /* Blocks of steps and groups of members against single steps, from inside the generated file.
    Compile with -DNAME=… -DSOURCE="…" -DSTEP=…, -DULPS=…, -DFORESEEN=0 or 1 (whether recurrences foresee the motion),
-   -DSTAGES=…, -DGROUPS=0 or 1 (whether there are groups), -DTIMED and -DGAUGED (whether
+   -DSTAGES=…, -DGROUPS=0 or 1 (whether there are groups), -DMARCHES (whether by Adams' method), -DTIMED and -DGAUGED (whether
    there is a time, and a gauge), -DSTATE="…" (initial values separated by commas). */
 #include <stdio.h>
 #include <stdlib.h>
@@ -59,6 +59,14 @@ static void begin(F(solver) *s, int steps)
     singly(s, steps);
 }
 
+/* What blocks share, before the first. */
+static void prepare(const F(solver) *s, F(table) *table)
+{
+    memset(table, 0, sizeof *table);
+    for (int stage = 0; stage < STAGES; ++stage) OF(table->fits, stage) = -1;
+    for (int stage = 0; stage < STAGES; ++stage) F(refresh)(s STAGE(stage), table);
+}
+
 /* A block after some single steps, guessed in either way, moves the state as eight single steps do. */
 static void block_equals_steps(int steps, int foreseeing)
 {
@@ -71,8 +79,7 @@ static void block_equals_steps(int steps, int foreseeing)
         if (!FORESEEN) return;
     }
     together.blocks.use_recurrences = foreseeing;
-    for (int stage = 0; stage < STAGES; ++stage) OF(table.fits, stage) = -1;
-    for (int stage = 0; stage < STAGES; ++stage) F(refresh)(&together STAGE(stage), &table);
+    prepare(&together, &table);
     singles = before = together;
     if (F(block)(&together, &table, 1) == 0) { /* as a rule one pass is too few for a march by Runge-Kutta */
         EXPECT(memcmp(together.x, before.x, sizeof before.x) == 0);
@@ -80,6 +87,7 @@ static void block_equals_steps(int steps, int foreseeing)
         EXPECT(together.steps == before.steps);
     }
     together = before;
+    prepare(&together, &table);
     const int passes = F(block)(&together, &table, 8);
     singly(&singles, F(LANES));
     EXPECT(passes > 0);
@@ -92,6 +100,38 @@ static void block_equals_steps(int steps, int foreseeing)
         for (int k = 1; k <= F(LANES); ++k) EXPECT(close_to(a->past[a->count - k], b->past[b->count - k], 1e-9));
     }
 }
+
+#if MARCHES && !TIMED
+/* The motion over many steps, each by fine ones. */
+static void flow(const F(solver) *s, int steps, double x[DIM])
+{
+    enum { FINE = 8 };
+    double mean[DIM];
+    for (int k = 0; k < FINE * steps; ++k) F(runge_kutta)(s, s->h / FINE, x, mean);
+}
+
+/* From the slopes of a block the beginnings of the next are those of the motion, and so is what follows. */
+static void march_goes_on(void)
+{
+    static F(solver) s;
+    static F(table) table;
+    F(lanes) starts[DIM];
+    double x[DIM], exact[DIM];
+    begin(&s, 30);
+    prepare(&s, &table);
+    s.h = STEP / 8.0; /* so short that Adams' method is exact to nine digits */
+    F(march)(&s, &table, starts);
+    flow(&s, F(LANES), s.x);
+    F(march)(&s, &table, starts);
+    memcpy(exact, s.x, sizeof exact);
+    flow(&s, F(LANES) - 1, exact);
+    for (int i = 0; i < DIM; ++i) x[i] = starts[i][F(LANES) - 1];
+    EXPECT(close_to(x, exact, 1e-9));
+    EXPECT(F(adams)(&s, table.slope + F(PAST) + F(LANES) - 1, x));
+    flow(&s, 1, exact);
+    EXPECT(close_to(x, exact, 1e-9));
+}
+#endif
 
 /* The state and what rounding took from it, together: that is below the last place, unless the sum is not compensated. */
 static void integrate_equals_steps(int steps)
@@ -296,6 +336,9 @@ int main(void)
     block_equals_steps(1, 0);
     block_equals_steps(30, 0);
     block_equals_steps(200, 1);
+#if MARCHES && !TIMED
+    march_goes_on();
+#endif
     integrate_equals_steps(1);
     integrate_equals_steps(7);
     integrate_equals_steps(301);

@@ -108,6 +108,7 @@ def exercise(compilation, optimisation, folder, *, foreseen=True, units=2):
     definitions.append(f"-DULPS={GROWING.get(name, units * len(compilation.program.fractions))}")
     definitions.append(f"-DSTAGES={len(compilation.program.fractions)}")
     definitions.append(f"-DGROUPS={int(f'{name}_group;' in code[f'{name}.c'])}")
+    definitions.append(f"-DMARCHES={int(f'{name}_march(' in code[f'{name}.c'])}")
     definitions += [f"-DTIMED={int(bool(compilation.program.time))}", f"-DGAUGED={int(bool(compilation.program.held))}"]
     definitions.append(f"-DFORESEEN={int(foreseen and name not in UNFORESEEN)}")
     definitions.append("-DSTATE=" + ", ".join(map(repr, at.x)))

@@ -10,10 +10,18 @@
 #include "solver.c"
 
 /* ---- Blocks of steps ---- */
+#if PHI_COMPOSED && !PHI_PATH
+enum { PHI_PAST = 8 }; /* slopes that a step by Adams' method goes on from */
+
+#endif
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
     int fits[PHI_STAGES]; /* the fit that weight is of; -1 for none */
     phi_lanes coef[PHI_STAGES][PHI_COEFFICIENTS], weight[PHI_STAGES][PHI_WINDOW][PHI_DIM];
+#if PHI_COMPOSED && !PHI_PATH
+    int marching; /* whether the last steps were a block, with these slopes */
+    double slope[PHI_PAST + PHI_LANES][PHI_DIM]; /* where steps begin, the last one last */
+#endif
 } phi_table;
 
 /* phi_near for the points of all stages and lanes, seen from one value. */
@@ -90,6 +98,26 @@ static void phi_record_lanes(phi_history *history, phi_lanes y[restrict PHI_DIM]
 }
 
 #if PHI_TIMED
+/* The slope of the motion at x and the time t. */
+static void phi_slope(const phi_solver *s, double t, const double x[PHI_DIM], double slope[PHI_DIM])
+{
+    phi_vector_field(&s->params, t, x, slope);
+#elif PHI_MONITOR
+/* The slope of the motion at x, in tau. */
+static void phi_slope(const phi_solver *s, const double x[PHI_DIM], double slope[PHI_DIM])
+{
+    const double rate = phi_monitor(&s->params, x);
+    phi_vector_field(&s->params, x, slope);
+    for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
+#else
+/* The slope of the motion at x. */
+static void phi_slope(const phi_solver *s, const double x[PHI_DIM], double slope[PHI_DIM])
+{
+    phi_vector_field(&s->params, x, slope);
+#endif
+}
+
+#if PHI_TIMED
 /* A step of size h by the classical Runge-Kutta method, from the time t. x becomes its end, mean the mean slope. */
 static void phi_runge_kutta(const phi_solver *s, double t, double h, double x[PHI_DIM], double mean[PHI_DIM])
 #else
@@ -106,13 +134,9 @@ static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], do
     memset(mean, 0, PHI_DIM * sizeof mean[0]);
     for (int part = 0; part < 4; ++part) {
 #if PHI_TIMED
-        phi_vector_field(&s->params, t + after[part] * h, point, slope);
+        phi_slope(s, t + after[part] * h, point, slope);
 #else
-        phi_vector_field(&s->params, point, slope);
-#endif
-#if PHI_MONITOR
-        const double rate = phi_monitor(&s->params, point);
-        for (int i = 0; i < PHI_DIM; ++i) slope[i] *= rate;
+        phi_slope(s, point, slope);
 #endif
         for (int i = 0; i < PHI_DIM; ++i) {
             mean[i] += weight[part] * slope[i];
@@ -128,6 +152,74 @@ enum {
     PHI_MEETINGS = 3 /* evaluations of a stage until its point is nearly where alpha(y) = x */
 };
 
+#define PHI_FAR 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
+
+/* Make a step by Adams' method of order 9, predicted by that of order 8, from x with the slope given, before which are those
+   of earlier steps. 0, and x as before, where the two differ much: the steps are too long for them then. */
+#if PHI_TIMED
+static int phi_adams(const phi_solver *s, double t, double (*slope)[PHI_DIM], double x[PHI_DIM])
+#else
+static int phi_adams(const phi_solver *s, double (*slope)[PHI_DIM], double x[PHI_DIM])
+#endif
+{
+    static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
+        2102243.0 / 120960.0, -2664477.0 / 120960.0, 2183877.0 / 120960.0, -1152169.0 / 120960.0, 434241.0 / 120960.0 };
+    static const double correct[PHI_PAST] = { -33953.0 / 3628800.0, 312874.0 / 3628800.0, -1291214.0 / 3628800.0,
+        3146338.0 / 3628800.0, -5033120.0 / 3628800.0, 5595358.0 / 3628800.0, -4604594.0 / 3628800.0, 4467094.0 / 3628800.0 };
+    static const double next = 1070017.0 / 3628800.0;
+    double predicted[PHI_DIM], corrected[PHI_DIM], ahead[PHI_DIM];
+    int far = 0;
+    for (int i = 0; i < PHI_DIM; ++i) {
+        double open = 0.0, closed = 0.0;
+        for (int k = 0; k < PHI_PAST; ++k) {
+            open += predict[k] * slope[k + 1 - PHI_PAST][i];
+            closed += correct[k] * slope[k + 1 - PHI_PAST][i];
+        }
+        predicted[i] = x[i] + s->h * open;
+        corrected[i] = x[i] + s->h * closed;
+    }
+#if PHI_TIMED
+    phi_slope(s, t + s->h, predicted, ahead);
+#else
+    phi_slope(s, predicted, ahead);
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) {
+        corrected[i] += s->h * next * ahead[i];
+        far += !(fabs(corrected[i] - predicted[i]) <= PHI_FAR * (fabs(x[i]) + fabs(s->h * ahead[i])));
+    }
+    if (far > 0) return 0;
+    memcpy(x, corrected, sizeof corrected);
+    return 1;
+}
+
+/* Where all steps begin, one after the other: by Adams' method, as long as that will do, where the slopes of the last block
+   are known, or else by that of Runge and Kutta. */
+static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI_DIM])
+{
+    double x[PHI_DIM], mean[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    memmove(table->slope, table->slope + PHI_LANES, PHI_PAST * sizeof table->slope[0]);
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        double (*slope)[PHI_DIM] = table->slope + PHI_PAST + lane;
+        for (int i = 0; i < PHI_DIM; ++i) begin[i][lane] = x[i];
+#if PHI_TIMED
+        const double t = s->t + lane * s->h;
+        phi_slope(s, t, x, *slope);
+        if (lane == PHI_LANES - 1) break;
+        table->marching = table->marching && phi_adams(s, t, slope, x);
+        for (int part = 0; part < PHI_STRIDES && !table->marching; ++part)
+            phi_runge_kutta(s, t + part * s->h / PHI_STRIDES, s->h / PHI_STRIDES, x, mean);
+#else
+        phi_slope(s, x, *slope);
+        if (lane == PHI_LANES - 1) break;
+        table->marching = table->marching && phi_adams(s, slope, x);
+        for (int part = 0; part < PHI_STRIDES && !table->marching; ++part)
+            phi_runge_kutta(s, s->h / PHI_STRIDES, x, mean);
+#endif
+    }
+    table->marching = 1;
+}
+
 /* Move the points of a stage by a part of what the stage before moves by. */
 static void phi_go_on(phi_model *model, phi_model *before, double part)
 {
@@ -137,22 +229,12 @@ static void phi_go_on(phi_model *model, phi_model *before, double part)
     }
 }
 
-/* Guesses where no recurrence is known. The beginnings of all steps are those of Runge-Kutta steps, made one after the
-   other; from there on each lane makes the stages of its own step, by iteration. */
-static void phi_guess_by_runge_kutta(const phi_solver *s, phi_table *table, phi_models *models)
+/* Guesses where no recurrence is known. From the beginnings of all steps on each lane makes the stages of its own step, by
+   iteration. */
+static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_models *models)
 {
-    double x[PHI_DIM], mean[PHI_DIM];
     phi_lanes begin[PHI_DIM];
-    memcpy(x, s->x, sizeof x);
-    for (int lane = 0; lane < PHI_LANES; ++lane) {
-        for (int i = 0; i < PHI_DIM; ++i) begin[i][lane] = x[i];
-        for (int part = 0; part < PHI_STRIDES && lane < PHI_LANES - 1; ++part)
-#if PHI_TIMED
-            phi_runge_kutta(s, s->t + (lane + (double)part / PHI_STRIDES) * s->h, s->h / PHI_STRIDES, x, mean);
-#else
-            phi_runge_kutta(s, s->h / PHI_STRIDES, x, mean);
-#endif
-    }
+    phi_march(s, table, begin);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = &models->stage[stage];
         memcpy(this_stage->y, begin, sizeof begin);
@@ -185,7 +267,7 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void phi_guess_by_runge_kutta(const phi_solver *s, phi_table *table, phi_models *models)
+static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_models *models)
 {
     double x[PHI_DIM], mean[PHI_DIM];
 #if PHI_TIMED
@@ -215,16 +297,19 @@ static void phi_guess_by_runge_kutta(const phi_solver *s, phi_table *table, phi_
 }
 
 #endif
-/* Guess the points of all stages and steps, by recurrences or else by Runge-Kutta steps. 0 if they are not near the state. */
+/* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the state. */
 static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
 {
 #if PHI_COMPOSED
-    if (!s->blocks.use_recurrences) phi_guess_by_runge_kutta(s, table, models);
+    if (!s->blocks.use_recurrences) phi_guess_by_march(s, table, models);
+#if !PHI_PATH
+    else table->marching = 0;
+#endif
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], models->stage[stage].y);
 #else
     if (s->blocks.use_recurrences) phi_foresee(&s->history[0], table->weight[0], models->stage[0].y);
-    else phi_guess_by_runge_kutta(s, table, models);
+    else phi_guess_by_march(s, table, models);
 #endif
     return phi_near_lanes(models, s->x);
 }
@@ -440,6 +525,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     phi_table table;
     phi_status status = phi_set_step(s, h);
     for (int stage = 0; stage < PHI_STAGES; ++stage) table.fits[stage] = -1;
+#if PHI_COMPOSED && !PHI_PATH
+    table.marching = 0;
+#endif
     while (status == PHI_OK && steps > 0) {
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
@@ -453,6 +541,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         } else {
             if (s->blocks.single_steps > 0) --s->blocks.single_steps;
             status = phi_single(s);
+#if PHI_COMPOSED && !PHI_PATH
+            table.marching = 0;
+#endif
             if (status == PHI_OK) --steps;
         }
     }
