@@ -161,9 +161,21 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     if program.profile == "small":
         return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
     used = operations(swept)
-    near = tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in used) if program.lanes else ()
+    called = used & _called_in_forms(step)
+    near = tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
     limited = frozenset({*near, *LANE_FUNCTIONS, *LANE_FORMULAS} & used)
     return Rows(with_formulas(operations(looped)), near, limited)
+
+
+def _called_in_forms(step: Sweeps) -> set[str]:
+    """What those kernels call whose loops have a form for small arguments beside that for any.
+
+    Derivatives of a stage along variations, and the transposes of what is gathered, have one form for all.
+    """
+    found = [sweep.kernel for part in step.parts for sweep in part]
+    found += [step.equation.relax, step.equation.advance] if step.equation else []
+    back = step.adjoint.steps if step.adjoint else ()
+    return operations([*found, *(kernel for kernel in back if "sums_bar" not in kernel.inputs)])
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from lattice.lattices import with_threads
+from lattice.lattices import LATTICES, with_threads
 from tools import run, write
 
 from phigen import spec as specs
@@ -161,6 +162,16 @@ def test_one_correction_solves_a_linear_stage(profile: str, axes: str, h: float,
     assert first > 0.1
     assert second < left * first
     assert back <= forth
+
+
+@pytest.mark.parametrize("adjoint", ["false", "true"])
+def test_functions_of_lanes_are_there_if_loops_over_sites_call_them(adjoint: str) -> None:
+    """The derivative of a stage along y, which alone needs that of φ unless there is a transpose, calls no such one."""
+    spec = specs.loads(f"{LATTICES['spin_graph']}scheme: series\nadjoint: {adjoint}\n")
+    text = emit(compile_spec(spec).program, "c", "phigen")["spin_graph.c"]
+    names = re.findall(r"^static inline double (\w+_(?:lane|near))\(", text, re.M)
+    called = ["spin_graph_phi0_lane"] + ["spin_graph_phi1_lane"] * (adjoint == "true")
+    assert [name for name in names if text.count(f"{name}(") > 1] == names == called
 
 
 @pytest.mark.parametrize("name", ["ring", "net"])
