@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 778f181a5e127ecf92b55d60b0abf8bc5d16bff4d9d836864d317af3f383ab93
+ * body-sha256: a0d6284080e92a914e08e2e094d7d39903033199132685c6630164d05877c04b
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -218,27 +218,25 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void ablowitz_ladik_sweep_rows(const ablowitz_ladik_solver *s, int part, const double *coef,
-    size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void ablowitz_ladik_sweep_piece(const ablowitz_ladik_solver *s, int part, const double *coef,
+    size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
-            ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
-            ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
-            ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_3 */
-            ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
-            ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        }
+    const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
+        ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
+        ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
+        ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    default: /* H_3 */
+        ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
+        ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -279,16 +277,12 @@ enum { ablowitz_ladik_BUFFER = 256 }; /* densities that are added in one go */
 static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < ablowitz_ladik_AXES; ++a)
-        if (sizes[a] < ablowitz_ladik_least[a] || sizes[a] % ablowitz_ladik_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = ablowitz_ladik_LEAD + ((sizes[ablowitz_ladik_AXES - 1] + 7) / 8 * 8 + ablowitz_ladik_HALO
-        + 7) / 8 * 8;
+    if (sizes[0] < ablowitz_ladik_least[0] || sizes[0] % ablowitz_ladik_periods[0] != 0
+        || sizes[0] > most / 2) return 0;
+    size_t wide = ablowitz_ladik_LEAD + ((sizes[0] + 7) / 8 * 8 + ablowitz_ladik_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -332,8 +326,7 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return ablowitz_ladik_BAD_ARGUMENT;
     const ablowitz_ladik_params own = params != NULL ? *params : ablowitz_ladik_default_params;
-    const size_t rows = ablowitz_ladik_shape(sizes, &width), length = sizes[ablowitz_ladik_AXES - 1],
-        sites = rows * length;
+    const size_t rows = ablowitz_ladik_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !ablowitz_ladik_finite(x0, ablowitz_ladik_DIM * sites) || !ablowitz_ladik_allowed(&own,
         sites)) return ablowitz_ladik_BAD_ARGUMENT;
     double coef[ablowitz_ladik_COEFFICIENTS];
@@ -370,15 +363,14 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
     return ablowitz_ladik_OK;
 }
 
-static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s, double *const x[ablowitz_ladik_DIM])
+static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s, double *const *x)
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
         if (!ablowitz_ladik_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void ablowitz_ladik_copy(double *const to[ablowitz_ladik_DIM], double *const from[ablowitz_ladik_DIM],
-    const ablowitz_ladik_solver *s)
+static void ablowitz_ladik_copy(double *const *to, double *const *from, const ablowitz_ladik_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
@@ -393,7 +385,7 @@ static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, 
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) ablowitz_ladik_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) ablowitz_ladik_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -459,12 +451,10 @@ ablowitz_ladik_status ablowitz_ladik_step(ablowitz_ladik_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void ablowitz_ladik_take(const ablowitz_ladik_solver *s, double *const fields[ablowitz_ladik_DIM],
-    double *x)
+static void ablowitz_ladik_take(const ablowitz_ladik_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void ablowitz_ladik_state(const ablowitz_ladik_solver *s, double *x) { ablowitz_ladik_take(s, s->x, x); }

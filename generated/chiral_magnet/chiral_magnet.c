@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: cc30fef6f209f92d833cefe856741b2c1bad7a52d63ed574c05c5b10369d5884
+ * body-sha256: c1988f21fc937a0d1fcc426c4b2ab915579850a1c6b9aa4e4b848f52b8bb6f7e
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -28,8 +28,6 @@
 /* ---- The model ---- */
 const chiral_magnet_params chiral_magnet_default_params = { 1.0, 0.5, NULL, NULL, 0.1, 0.15 };
 
-enum { chiral_magnet_HALO = 0 }; /* sites that are copied beside a row */
-enum { chiral_magnet_LEAD = 0 }; /* doubles before the first site of a row */
 enum { chiral_magnet_RESERVED = 9 }; /* arrays over the sites in the memory of a solver */
 enum { chiral_magnet_ROW = 5 }; /* coefficients of one flow */
 enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
@@ -276,9 +274,9 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
     }
 }
 
-/* A flow, for the pieces of rows from first on, before end. */
-static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, const double *coef,
-    size_t first, size_t end)
+/* A flow, for a piece of a row. */
+static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, const double *coef,
+    size_t unit)
 {
     int part = 1, colour = flow;
     for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
@@ -287,47 +285,45 @@ static void chiral_magnet_sweep_rows(const chiral_magnet_solver *s, int flow, co
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
     double *const y_x_z[] = { s->x[1], s->x[0], s->x[2] };
     double *const Dy_Dx[] = { s->at_bonds[1], s->at_bonds[0] };
-    for (size_t unit = first; unit < end; ++unit) {
-        chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            at.row.chosen = colour;
-            chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
-            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
-            at.row.x = z_x_y;
-            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-            at.row.x = y_z_x;
-            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            break;
-        case 3: /* H_3 */
-            at.row.x = y_x_z;
-            chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-            at.row.x = z_x_y;
-            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            break;
-        case 4: /* H_4 */
-            at.row.x = z_x_y;
-            chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-            at.row.x = s->x;
-            chiral_magnet_sweep4(coef, &at.row, at.from, at.to);
-            break;
-        default: /* H_5 */
-            at.row.chosen = colour;
-            at.row.at_bonds = Dy_Dx;
-            at.row.side = -1.0;
-            at.row.x = y_x_z;
-            chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
-            at.row.x = s->x;
-            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
-            at.row.x = y_z_x;
-            chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-            break;
-        }
+    chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        at.row.chosen = colour;
+        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
+        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
+        at.row.x = z_x_y;
+        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
+        at.row.x = y_z_x;
+        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
+    case 3: /* H_3 */
+        at.row.x = y_x_z;
+        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
+        at.row.x = z_x_y;
+        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
+    case 4: /* H_4 */
+        at.row.x = z_x_y;
+        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
+        at.row.x = s->x;
+        chiral_magnet_sweep4(coef, &at.row, at.from, at.to);
+        break;
+    default: /* H_5 */
+        at.row.chosen = colour;
+        at.row.at_bonds = Dy_Dx;
+        at.row.side = -1.0;
+        at.row.x = y_x_z;
+        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
+        at.row.x = s->x;
+        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
+        at.row.x = y_z_x;
+        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
     }
 }
 
@@ -517,16 +513,12 @@ enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
 static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < chiral_magnet_AXES; ++a)
-        if (sizes[a] < chiral_magnet_least[a] || sizes[a] % chiral_magnet_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = chiral_magnet_LEAD + ((sizes[chiral_magnet_AXES - 1] + 7) / 8 * 8 + chiral_magnet_HALO + 7)
-        / 8 * 8;
+    if (sizes[0] < chiral_magnet_least[0] || sizes[0] % chiral_magnet_periods[0] != 0 || sizes[0] > most / 2)
+        return 0;
+    size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -545,7 +537,7 @@ size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bo
 static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const double *values)
 {
     double *row = rows;
-    memset(row - chiral_magnet_LEAD, 0, (size_t)s->width * sizeof *row);
+    memset(row, 0, (size_t)s->width * sizeof *row);
     memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
@@ -578,8 +570,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return chiral_magnet_BAD_ARGUMENT;
     const chiral_magnet_params own = params != NULL ? *params : chiral_magnet_default_params;
-    const size_t rows = chiral_magnet_shape(sizes, &width), length = sizes[chiral_magnet_AXES - 1],
-        sites = rows * length;
+    const size_t rows = chiral_magnet_shape(sizes, &width), length = sizes[0], sites = rows * length;
     const size_t count = bonds != NULL ? bonds->count : 0;
     if (!chiral_magnet_few(sites, count) || !chiral_magnet_connected(bonds, sites)
         || !chiral_magnet_finite(x0, chiral_magnet_DIM * sites) || !chiral_magnet_allowed(&own, sites, count))
@@ -594,8 +585,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
-        + chiral_magnet_LEAD;
+    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = chiral_magnet_block(rows, width);
     for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
@@ -603,7 +593,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     for (size_t k = 0; k < chiral_magnet_GATHERED; ++k)
         s->gathered[k] = aligned + (chiral_magnet_ARRAYS + chiral_magnet_DIM + k) * block;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->x[k], x0 + k * sites);
-    chiral_magnet_connect(s, bonds, aligned - chiral_magnet_LEAD + chiral_magnet_RESERVED * block);
+    chiral_magnet_connect(s, bonds, aligned + chiral_magnet_RESERVED * block);
     chiral_magnet_put_at_bonds(s, &own);
     return chiral_magnet_OK;
 }
@@ -622,19 +612,17 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
     return chiral_magnet_OK;
 }
 
-static int chiral_magnet_all_hold(const chiral_magnet_solver *s, double *const x[chiral_magnet_DIM])
+static int chiral_magnet_all_hold(const chiral_magnet_solver *s, double *const *x)
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
         if (!chiral_magnet_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void chiral_magnet_copy(double *const to[chiral_magnet_DIM], double *const from[chiral_magnet_DIM],
-    const chiral_magnet_solver *s)
+static void chiral_magnet_copy(double *const *to, double *const *from, const chiral_magnet_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        memcpy(to[k] - chiral_magnet_LEAD, from[k] - chiral_magnet_LEAD, block);
+    for (size_t k = 0; k < chiral_magnet_DIM; ++k) memcpy(to[k], from[k], block);
 }
 
 /* ---- The flows ---- */
@@ -645,7 +633,7 @@ static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, 
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) chiral_magnet_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) chiral_magnet_sweep_piece(s, part, coef, unit);
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
@@ -722,12 +710,10 @@ chiral_magnet_status chiral_magnet_step(chiral_magnet_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void chiral_magnet_take(const chiral_magnet_solver *s, double *const fields[chiral_magnet_DIM],
-    double *x)
+static void chiral_magnet_take(const chiral_magnet_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void chiral_magnet_state(const chiral_magnet_solver *s, double *x) { chiral_magnet_take(s, s->x, x); }

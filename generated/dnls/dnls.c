@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: ea02f905efbeca676335402efec2c349822509dfb585a3dde12753268dcae7d6
+ * body-sha256: 2da96c03fcccd2827d4f743da9d98f4c4fb3b3ea1a799230d66372b682a711fd
  */
 #include "dnls.h"
 #include <float.h>
@@ -202,26 +202,24 @@ static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void dnls_sweep_rows(const dnls_solver *s, int part, const double *coef, size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void dnls_sweep_piece(const dnls_solver *s, int part, const double *coef, size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_piece at = dnls_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            dnls_sweep1(coef, &at.row, at.from, at.to);
-            dnls_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            dnls_sweep2(coef, &at.row, at.from, at.to);
-            dnls_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_3 */
-            dnls_sweep3(coef, &at.row, at.from, at.to);
-            dnls_ends(s->x[0], s->length, at.from, at.to);
-            dnls_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        }
+    const dnls_piece at = dnls_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        dnls_sweep1(coef, &at.row, at.from, at.to);
+        dnls_ends(s->x[0], s->length, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        dnls_sweep2(coef, &at.row, at.from, at.to);
+        dnls_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    default: /* H_3 */
+        dnls_sweep3(coef, &at.row, at.from, at.to);
+        dnls_ends(s->x[0], s->length, at.from, at.to);
+        dnls_ends(s->x[1], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -263,14 +261,11 @@ enum { dnls_BUFFER = 256 }; /* densities that are added in one go */
 static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < dnls_AXES; ++a)
-        if (sizes[a] < dnls_least[a] || sizes[a] % dnls_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    size_t wide = dnls_LEAD + ((sizes[dnls_AXES - 1] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
+    if (sizes[0] < dnls_least[0] || sizes[0] % dnls_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    size_t wide = dnls_LEAD + ((sizes[0] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -313,7 +308,7 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return dnls_BAD_ARGUMENT;
     const dnls_params own = params != NULL ? *params : dnls_default_params;
-    const size_t rows = dnls_shape(sizes, &width), length = sizes[dnls_AXES - 1], sites = rows * length;
+    const size_t rows = dnls_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !dnls_finite(x0, dnls_DIM * sites) || !dnls_allowed(&own, sites))
         return dnls_BAD_ARGUMENT;
     double coef[dnls_COEFFICIENTS];
@@ -348,14 +343,14 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
     return dnls_OK;
 }
 
-static int dnls_all_hold(const dnls_solver *s, double *const x[dnls_DIM])
+static int dnls_all_hold(const dnls_solver *s, double *const *x)
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
         if (!dnls_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void dnls_copy(double *const to[dnls_DIM], double *const from[dnls_DIM], const dnls_solver *s)
+static void dnls_copy(double *const *to, double *const *from, const dnls_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < dnls_DIM; ++k) memcpy(to[k] - dnls_LEAD, from[k] - dnls_LEAD, block);
@@ -369,7 +364,7 @@ static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef)
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) dnls_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) dnls_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -430,11 +425,10 @@ dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
 dnls_status dnls_step(dnls_solver *s, double h) { return dnls_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void dnls_take(const dnls_solver *s, double *const fields[dnls_DIM], double *x)
+static void dnls_take(const dnls_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void dnls_state(const dnls_solver *s, double *x) { dnls_take(s, s->x, x); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0eca5ebe41a6ae4db704b36a486e4ac6c5a84aef1975d2f7243dd1cb6838e3f1
+ * body-sha256: 4de0ade53d61221b1c1a64e6752f12639015dce07b8aa325966ebf1be049ea7a
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -214,28 +214,23 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void dnls_disorder_sweep_rows(const dnls_disorder_solver *s, int part, const double *coef,
-    size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void dnls_disorder_sweep_piece(const dnls_disorder_solver *s, int part, const double *coef,
+    size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
-            dnls_disorder_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
-            dnls_disorder_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_3 */
-            dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
-            dnls_disorder_ends(s->x[0], s->length, at.from, at.to);
-            dnls_disorder_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        }
+    const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
+        break;
+    default: /* H_3 */
+        dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
+        break;
     }
+    for (int k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_ends(s->x[k], s->length, at.from, at.to);
 }
 
 /* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
@@ -280,16 +275,12 @@ enum { dnls_disorder_BUFFER = 256 }; /* densities that are added in one go */
 static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < dnls_disorder_AXES; ++a)
-        if (sizes[a] < dnls_disorder_least[a] || sizes[a] % dnls_disorder_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = dnls_disorder_LEAD + ((sizes[dnls_disorder_AXES - 1] + 7) / 8 * 8 + dnls_disorder_HALO + 7)
-        / 8 * 8;
+    if (sizes[0] < dnls_disorder_least[0] || sizes[0] % dnls_disorder_periods[0] != 0 || sizes[0] > most / 2)
+        return 0;
+    size_t wide = dnls_disorder_LEAD + ((sizes[0] + 7) / 8 * 8 + dnls_disorder_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -348,8 +339,7 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return dnls_disorder_BAD_ARGUMENT;
     const dnls_disorder_params own = params != NULL ? *params : dnls_disorder_default_params;
-    const size_t rows = dnls_disorder_shape(sizes, &width), length = sizes[dnls_disorder_AXES - 1],
-        sites = rows * length;
+    const size_t rows = dnls_disorder_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !dnls_disorder_finite(x0, dnls_disorder_DIM * sites) || !dnls_disorder_allowed(&own,
         sites)) return dnls_disorder_BAD_ARGUMENT;
     double coef[dnls_disorder_COEFFICIENTS];
@@ -387,15 +377,14 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
     return dnls_disorder_OK;
 }
 
-static int dnls_disorder_all_hold(const dnls_disorder_solver *s, double *const x[dnls_disorder_DIM])
+static int dnls_disorder_all_hold(const dnls_disorder_solver *s, double *const *x)
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
         if (!dnls_disorder_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void dnls_disorder_copy(double *const to[dnls_disorder_DIM], double *const from[dnls_disorder_DIM],
-    const dnls_disorder_solver *s)
+static void dnls_disorder_copy(double *const *to, double *const *from, const dnls_disorder_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
@@ -410,7 +399,7 @@ static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, co
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) dnls_disorder_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) dnls_disorder_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -476,12 +465,10 @@ dnls_disorder_status dnls_disorder_step(dnls_disorder_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void dnls_disorder_take(const dnls_disorder_solver *s, double *const fields[dnls_disorder_DIM],
-    double *x)
+static void dnls_disorder_take(const dnls_disorder_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void dnls_disorder_state(const dnls_disorder_solver *s, double *x) { dnls_disorder_take(s, s->x, x); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f820cef74e12324337582e68ae7836d513f0deac5f07cc4df2a8644c19db8870
+ * body-sha256: 95ad8b1cc64245084dad95765d73194a877afe9536ad5412427a7c6ab0d3a407
  */
 #include "food_web.h"
 #include <float.h>
@@ -28,8 +28,6 @@
 /* ---- The model ---- */
 const food_web_params food_web_default_params = { NULL, NULL };
 
-enum { food_web_HALO = 0 }; /* sites that are copied beside a row */
-enum { food_web_LEAD = 0 }; /* doubles before the first site of a row */
 enum { food_web_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
 enum { food_web_ROW = 1 }; /* coefficients of one flow */
 enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
@@ -206,18 +204,15 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row, 
     }
 }
 
-/* A flow, for the pieces of rows from first on, before end. */
-static void food_web_sweep_rows(const food_web_solver *s, int flow, const double *coef, size_t first,
-    size_t end)
+/* A flow, for a piece of a row. */
+static void food_web_sweep_piece(const food_web_solver *s, int flow, const double *coef, size_t unit)
 {
     int part = 1, colour = flow;
     for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
-    for (size_t unit = first; unit < end; ++unit) {
-        food_web_piece at = food_web_piece_of(s, unit);
-        at.row.chosen = colour;
-        food_web_gather1(coef, &at.row, at.from, at.to);
-        food_web_sweep1(coef, &at.row, at.from, at.to);
-    }
+    food_web_piece at = food_web_piece_of(s, unit);
+    at.row.chosen = colour;
+    food_web_gather1(coef, &at.row, at.from, at.to);
+    food_web_sweep1(coef, &at.row, at.from, at.to);
 }
 
 /* what a site b adds to the forces at a site a */
@@ -357,15 +352,11 @@ enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < food_web_AXES; ++a)
-        if (sizes[a] < food_web_least[a] || sizes[a] % food_web_periods[a] != 0 || sizes[a] > most / 2)
-            return 0;
-    size_t wide = food_web_LEAD + ((sizes[food_web_AXES - 1] + 7) / 8 * 8 + food_web_HALO + 7) / 8 * 8;
+    if (sizes[0] < food_web_least[0] || sizes[0] % food_web_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -384,14 +375,14 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 static void food_web_put(const food_web_solver *s, double *rows, const double *values)
 {
     double *row = rows;
-    memset(row - food_web_LEAD, 0, (size_t)s->width * sizeof *row);
+    memset(row, 0, (size_t)s->width * sizeof *row);
     memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
 /* The values of a parameter at sites, or one value for all. */
 static void food_web_put_parameter(const food_web_solver *s, double *rows, const double *values, double value)
 {
-    for (ptrdiff_t i = -food_web_LEAD; i < s->width - food_web_LEAD; ++i) rows[i] = value;
+    for (ptrdiff_t i = 0; i < s->width; ++i) rows[i] = value;
     if (values != NULL) food_web_put(s, rows, values);
 }
 
@@ -429,8 +420,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return food_web_BAD_ARGUMENT;
     const food_web_params own = params != NULL ? *params : food_web_default_params;
-    const size_t rows = food_web_shape(sizes, &width), length = sizes[food_web_AXES - 1],
-        sites = rows * length;
+    const size_t rows = food_web_shape(sizes, &width), length = sizes[0], sites = rows * length;
     const size_t count = bonds != NULL ? bonds->count : 0;
     if (!food_web_few(sites, count) || !food_web_connected(bonds, sites) || !food_web_finite(x0,
         food_web_DIM * sites) || !food_web_allowed(&own, sites, count))
@@ -445,7 +435,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + food_web_LEAD;
+    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = food_web_block(rows, width);
     for (size_t k = 0; k < food_web_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < food_web_DIM; ++k) s->before[k] = aligned + (food_web_ARRAYS + k) * block;
@@ -453,7 +443,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
         s->gathered[k] = aligned + (food_web_ARRAYS + food_web_DIM + k) * block;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
     food_web_put_parameters(s, &own);
-    food_web_connect(s, bonds, aligned - food_web_LEAD + food_web_RESERVED * block);
+    food_web_connect(s, bonds, aligned + food_web_RESERVED * block);
     food_web_put_at_bonds(s, &own);
     return food_web_OK;
 }
@@ -472,18 +462,17 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
     return food_web_OK;
 }
 
-static int food_web_all_hold(const food_web_solver *s, double *const x[food_web_DIM])
+static int food_web_all_hold(const food_web_solver *s, double *const *x)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
         if (!food_web_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void food_web_copy(double *const to[food_web_DIM], double *const from[food_web_DIM],
-    const food_web_solver *s)
+static void food_web_copy(double *const *to, double *const *from, const food_web_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k] - food_web_LEAD, from[k] - food_web_LEAD, block);
+    for (size_t k = 0; k < food_web_DIM; ++k) memcpy(to[k], from[k], block);
 }
 
 /* ---- The flows ---- */
@@ -494,7 +483,7 @@ static void food_web_sweep_colour(const food_web_solver *s, int part, const doub
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) food_web_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) food_web_sweep_piece(s, part, coef, unit);
 }
 
 /* The first flow, those between it and the last, the last, or those between, backwards. */
@@ -566,11 +555,10 @@ food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 food_web_status food_web_step(food_web_solver *s, double h) { return food_web_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void food_web_take(const food_web_solver *s, double *const fields[food_web_DIM], double *x)
+static void food_web_take(const food_web_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void food_web_state(const food_web_solver *s, double *x) { food_web_take(s, s->x, x); }

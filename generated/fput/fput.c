@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: bf79cd40ebff725aebecadb0e146b443043d295f125c2a440797fc1fdbcd7dbd
+ * body-sha256: 468567692f0a1e5bb48f7a83b516f88fe236783a607e360b89c754a8ee15f7a0
  */
 #include "fput.h"
 #include <float.h>
@@ -262,14 +262,11 @@ enum { fput_BUFFER = 256 }; /* densities that are added in one go */
 static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / fput_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < fput_AXES; ++a)
-        if (sizes[a] < fput_least[a] || sizes[a] % fput_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    size_t wide = fput_LEAD + ((sizes[fput_AXES - 1] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
+    if (sizes[0] < fput_least[0] || sizes[0] % fput_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    size_t wide = fput_LEAD + ((sizes[0] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
@@ -317,7 +314,7 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return fput_BAD_ARGUMENT;
     const fput_params own = params != NULL ? *params : fput_default_params;
-    const size_t rows = fput_shape(sizes, &width), length = sizes[fput_AXES - 1], sites = rows * length;
+    const size_t rows = fput_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !fput_finite(x0, fput_DIM * sites) || !fput_allowed(&own, sites))
         return fput_BAD_ARGUMENT;
     double coef[fput_COEFFICIENTS];
@@ -353,14 +350,14 @@ static fput_status fput_set_step(fput_solver *s, double h)
     return fput_OK;
 }
 
-static int fput_all_hold(const fput_solver *s, double *const x[fput_DIM])
+static int fput_all_hold(const fput_solver *s, double *const *x)
 {
     for (size_t k = 0; k < fput_DIM; ++k)
         if (!fput_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void fput_copy(double *const to[fput_DIM], double *const from[fput_DIM], const fput_solver *s)
+static void fput_copy(double *const *to, double *const *from, const fput_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < fput_DIM; ++k) memcpy(to[k] - fput_LEAD, from[k] - fput_LEAD, block);
@@ -515,11 +512,10 @@ fput_status fput_integrate(fput_solver *s, double h, size_t steps)
 fput_status fput_step(fput_solver *s, double h) { return fput_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void fput_take(const fput_solver *s, double *const fields[fput_DIM], double *x)
+static void fput_take(const fput_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < fput_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void fput_state(const fput_solver *s, double *x) { fput_take(s, s->x, x); }

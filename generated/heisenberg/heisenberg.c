@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: c5a5faeaf208cde747f806bfe4b98f135bccd430abe1596a7da356114e1e7c40
+ * body-sha256: 99de6c8641a672287c58afc036c9fdb1235c055fa679dffc726dd195f927159b
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -549,9 +549,8 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
     }
     size_t wide = heisenberg_LEAD + ((sizes[heisenberg_AXES - 1] + 7) / 8 * 8 + heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return rows > most / wide ? 0 : rows;
 }
 
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
@@ -679,7 +678,7 @@ static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
     return heisenberg_OK;
 }
 
-static int heisenberg_all_hold(const heisenberg_solver *s, double *const x[heisenberg_DIM])
+static int heisenberg_all_hold(const heisenberg_solver *s, double *const *x)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -687,8 +686,7 @@ static int heisenberg_all_hold(const heisenberg_solver *s, double *const x[heise
     return 1;
 }
 
-static void heisenberg_copy(double *const to[heisenberg_DIM], double *const from[heisenberg_DIM],
-    const heisenberg_solver *s)
+static void heisenberg_copy(double *const *to, double *const *from, const heisenberg_solver *s)
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < heisenberg_DIM; ++k)
@@ -865,7 +863,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 heisenberg_status heisenberg_step(heisenberg_solver *s, double h) { return heisenberg_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void heisenberg_take(const heisenberg_solver *s, double *const fields[heisenberg_DIM], double *x)
+static void heisenberg_take(const heisenberg_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)

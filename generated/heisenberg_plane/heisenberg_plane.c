@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 62c786965527ecfd0dd7721e22a0ce2abef86036ef7dd88b2aa215ac9b46b8c7
+ * body-sha256: f1c96afd0d576bf8fa5e4765d152d8da9e2bb922f05b0e351da761bafce6a1fd
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -247,31 +247,29 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void heisenberg_plane_sweep_rows(const heisenberg_plane_solver *s, int part, const double *coef,
-    size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void heisenberg_plane_sweep_piece(const heisenberg_plane_solver *s, int part, const double *coef,
+    size_t unit)
 {
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
-    for (size_t unit = first; unit < end; ++unit) {
-        heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
-            heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-            heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            at.row.x = y_z_x;
-            heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
-            heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
-            break;
-        default: /* H_3 */
-            heisenberg_plane_sweep3(coef, &at.row, at.from, at.wide);
-            heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-            heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-            break;
-        }
+    heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
+        heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        at.row.x = y_z_x;
+        heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
+        heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        break;
+    default: /* H_3 */
+        heisenberg_plane_sweep3(coef, &at.row, at.from, at.wide);
+        heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -360,9 +358,8 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
     size_t wide = heisenberg_plane_LEAD + ((sizes[heisenberg_plane_AXES - 1] + 7) / 8 * 8
         + heisenberg_plane_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return rows > most / wide ? 0 : rows;
 }
 
 /* Doubles from one array to the next. */
@@ -473,7 +470,7 @@ static heisenberg_plane_status heisenberg_plane_set_step(heisenberg_plane_solver
     return heisenberg_plane_OK;
 }
 
-static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s, double *const x[heisenberg_plane_DIM])
+static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s, double *const *x)
 {
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -481,8 +478,7 @@ static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s, double *c
     return 1;
 }
 
-static void heisenberg_plane_copy(double *const to[heisenberg_plane_DIM],
-    double *const from[heisenberg_plane_DIM], const heisenberg_plane_solver *s)
+static void heisenberg_plane_copy(double *const *to, double *const *from, const heisenberg_plane_solver *s)
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
@@ -497,7 +493,7 @@ static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int pa
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) heisenberg_plane_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) heisenberg_plane_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -565,8 +561,7 @@ heisenberg_plane_status heisenberg_plane_step(heisenberg_plane_solver *s, double
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void heisenberg_plane_take(const heisenberg_plane_solver *s,
-    double *const fields[heisenberg_plane_DIM], double *x)
+static void heisenberg_plane_take(const heisenberg_plane_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)

@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 92c9608d3137a4cbb3bf71ae79814222bab52e150f277a2c33f6063fea4f1637
+ * body-sha256: 01d76f0444471397fd8d4b92f161fe87d8fe69bc399ea2ef5319b2a38107fe35
  */
 #include "kdv.h"
 #include <float.h>
@@ -310,14 +310,11 @@ enum { kdv_BUFFER = 256 }; /* densities that are added in one go */
 static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / (kdv_RESERVED + 8 * kdv_BAND * kdv_DIM);
-    size_t rows = 1;
-    for (int a = 0; a < kdv_AXES; ++a)
-        if (sizes[a] < kdv_least[a] || sizes[a] % kdv_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    size_t wide = kdv_LEAD + ((sizes[kdv_AXES - 1] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
+    if (sizes[0] < kdv_least[0] || sizes[0] % kdv_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    size_t wide = kdv_LEAD + ((sizes[0] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
@@ -379,7 +376,7 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return kdv_BAD_ARGUMENT;
     const kdv_params own = params != NULL ? *params : kdv_default_params;
-    const size_t rows = kdv_shape(sizes, &width), length = sizes[kdv_AXES - 1], sites = rows * length;
+    const size_t rows = kdv_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !kdv_finite(x0, kdv_DIM * sites) || !kdv_allowed(&own, sites)) return kdv_BAD_ARGUMENT;
     double coef[kdv_COEFFICIENTS];
     kdv_prepare_step(&own, 1e-100, coef);
@@ -414,14 +411,14 @@ static kdv_status kdv_set_step(kdv_solver *s, double h)
     return kdv_OK;
 }
 
-static int kdv_all_hold(const kdv_solver *s, double *const x[kdv_DIM])
+static int kdv_all_hold(const kdv_solver *s, double *const *x)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
         if (!kdv_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void kdv_copy(double *const to[kdv_DIM], double *const from[kdv_DIM], const kdv_solver *s)
+static void kdv_copy(double *const *to, double *const *from, const kdv_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < kdv_DIM; ++k) memcpy(to[k] - kdv_LEAD, from[k] - kdv_LEAD, block);
@@ -805,11 +802,10 @@ kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps)
 kdv_status kdv_step(kdv_solver *s, double h) { return kdv_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void kdv_take(const kdv_solver *s, double *const fields[kdv_DIM], double *x)
+static void kdv_take(const kdv_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void kdv_state(const kdv_solver *s, double *x) { kdv_take(s, s->x, x); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 5ff84702f80122163a4fd6f2078ed2258eec36c28076269c738b41026fe8d7b5
+ * body-sha256: 065b63414d7c3ce108e1b7a7c8de01f2298bf5e114a264b6a1a3fdeeaae81b57
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -154,22 +154,19 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void klein_gordon_sweep_rows(const klein_gordon_solver *s, int part, const double *coef, size_t first,
-    size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void klein_gordon_sweep_piece(const klein_gordon_solver *s, int part, const double *coef, size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            klein_gordon_sweep1(coef, &at.row, at.from, at.to);
-            klein_gordon_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_2 */
-            klein_gordon_sweep2(coef, &at.row, at.from, at.to);
-            klein_gordon_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        }
+    const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        klein_gordon_sweep1(coef, &at.row, at.from, at.to);
+        klein_gordon_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    default: /* H_2 */
+        klein_gordon_sweep2(coef, &at.row, at.from, at.to);
+        klein_gordon_ends(s->x[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -215,16 +212,12 @@ enum { klein_gordon_BUFFER = 256 }; /* densities that are added in one go */
 static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < klein_gordon_AXES; ++a)
-        if (sizes[a] < klein_gordon_least[a] || sizes[a] % klein_gordon_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = klein_gordon_LEAD + ((sizes[klein_gordon_AXES - 1] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8
-        * 8;
+    if (sizes[0] < klein_gordon_least[0] || sizes[0] % klein_gordon_periods[0] != 0 || sizes[0] > most / 2)
+        return 0;
+    size_t wide = klein_gordon_LEAD + ((sizes[0] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -268,8 +261,7 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return klein_gordon_BAD_ARGUMENT;
     const klein_gordon_params own = params != NULL ? *params : klein_gordon_default_params;
-    const size_t rows = klein_gordon_shape(sizes, &width), length = sizes[klein_gordon_AXES - 1],
-        sites = rows * length;
+    const size_t rows = klein_gordon_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !klein_gordon_finite(x0, klein_gordon_DIM * sites) || !klein_gordon_allowed(&own, sites))
         return klein_gordon_BAD_ARGUMENT;
     double coef[klein_gordon_COEFFICIENTS];
@@ -304,15 +296,14 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
     return klein_gordon_OK;
 }
 
-static int klein_gordon_all_hold(const klein_gordon_solver *s, double *const x[klein_gordon_DIM])
+static int klein_gordon_all_hold(const klein_gordon_solver *s, double *const *x)
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
         if (!klein_gordon_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void klein_gordon_copy(double *const to[klein_gordon_DIM], double *const from[klein_gordon_DIM],
-    const klein_gordon_solver *s)
+static void klein_gordon_copy(double *const *to, double *const *from, const klein_gordon_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
@@ -327,7 +318,7 @@ static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, cons
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) klein_gordon_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) klein_gordon_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -393,11 +384,10 @@ klein_gordon_status klein_gordon_step(klein_gordon_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void klein_gordon_take(const klein_gordon_solver *s, double *const fields[klein_gordon_DIM], double *x)
+static void klein_gordon_take(const klein_gordon_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void klein_gordon_state(const klein_gordon_solver *s, double *x) { klein_gordon_take(s, s->x, x); }

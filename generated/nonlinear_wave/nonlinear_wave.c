@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3eb44324540879164ee0c53b5acefe69ea1cf8c16e0ad93a263ef29c8f64bf16
+ * body-sha256: 1425b1cd0c69614454bc7d016bb243c93c39788e28a68c1c6896cbc5df10fe38
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -159,22 +159,20 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void nonlinear_wave_sweep_rows(const nonlinear_wave_solver *s, int part, const double *coef,
-    size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void nonlinear_wave_sweep_piece(const nonlinear_wave_solver *s, int part, const double *coef,
+    size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
-            nonlinear_wave_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_2 */
-            nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
-            nonlinear_wave_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        }
+    const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
+        nonlinear_wave_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    default: /* H_2 */
+        nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
+        nonlinear_wave_ends(s->x[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -233,16 +231,12 @@ enum { nonlinear_wave_BUFFER = 256 }; /* densities that are added in one go */
 static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < nonlinear_wave_AXES; ++a)
-        if (sizes[a] < nonlinear_wave_least[a] || sizes[a] % nonlinear_wave_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = nonlinear_wave_LEAD + ((sizes[nonlinear_wave_AXES - 1] + 7) / 8 * 8 + nonlinear_wave_HALO
-        + 7) / 8 * 8;
+    if (sizes[0] < nonlinear_wave_least[0] || sizes[0] % nonlinear_wave_periods[0] != 0
+        || sizes[0] > most / 2) return 0;
+    size_t wide = nonlinear_wave_LEAD + ((sizes[0] + 7) / 8 * 8 + nonlinear_wave_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -286,8 +280,7 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return nonlinear_wave_BAD_ARGUMENT;
     const nonlinear_wave_params own = params != NULL ? *params : nonlinear_wave_default_params;
-    const size_t rows = nonlinear_wave_shape(sizes, &width), length = sizes[nonlinear_wave_AXES - 1],
-        sites = rows * length;
+    const size_t rows = nonlinear_wave_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !nonlinear_wave_finite(x0, nonlinear_wave_DIM * sites) || !nonlinear_wave_allowed(&own,
         sites)) return nonlinear_wave_BAD_ARGUMENT;
     double coef[nonlinear_wave_COEFFICIENTS];
@@ -324,15 +317,14 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
     return nonlinear_wave_OK;
 }
 
-static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s, double *const x[nonlinear_wave_DIM])
+static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s, double *const *x)
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
         if (!nonlinear_wave_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void nonlinear_wave_copy(double *const to[nonlinear_wave_DIM], double *const from[nonlinear_wave_DIM],
-    const nonlinear_wave_solver *s)
+static void nonlinear_wave_copy(double *const *to, double *const *from, const nonlinear_wave_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
@@ -347,7 +339,7 @@ static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, 
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) nonlinear_wave_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) nonlinear_wave_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -413,12 +405,10 @@ nonlinear_wave_status nonlinear_wave_step(nonlinear_wave_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void nonlinear_wave_take(const nonlinear_wave_solver *s, double *const fields[nonlinear_wave_DIM],
-    double *x)
+static void nonlinear_wave_take(const nonlinear_wave_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void nonlinear_wave_state(const nonlinear_wave_solver *s, double *x) { nonlinear_wave_take(s, s->x, x); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0f69286f3eeee5c1cfa2d335156992c17f3c598dd02feedcfc5eacff5418710a
+ * body-sha256: bcfd04a8ba8daac6ac85e0db2d058dd76a57dd93d82518d9232a742f37ee05c3
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -27,8 +27,6 @@
 /* ---- The model ---- */
 const outer_planets_params outer_planets_default_params = { 0.000295912208286, NULL };
 
-enum { outer_planets_HALO = 0 };           /* sites that are copied beside a row */
-enum { outer_planets_LEAD = 0 };           /* doubles before the first site of a row */
 enum { outer_planets_RESERVED = 16 };      /* arrays over the sites in the memory of a solver */
 enum { outer_planets_ROW = 2 };            /* coefficients of one flow */
 enum { outer_planets_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
@@ -185,21 +183,19 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void outer_planets_sweep_rows(const outer_planets_solver *s, int part, const double *coef,
-    size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void outer_planets_sweep_piece(const outer_planets_solver *s, int part, const double *coef,
+    size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const outer_planets_piece at = outer_planets_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            outer_planets_gather1(coef, &at.row, at.from, at.to);
-            outer_planets_sweep1(coef, &at.row, at.from, at.to);
-            break;
-        default: /* H_2 */
-            outer_planets_sweep2(coef, &at.row, at.from, at.to);
-            break;
-        }
+    const outer_planets_piece at = outer_planets_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        outer_planets_gather1(coef, &at.row, at.from, at.to);
+        outer_planets_sweep1(coef, &at.row, at.from, at.to);
+        break;
+    default: /* H_2 */
+        outer_planets_sweep2(coef, &at.row, at.from, at.to);
+        break;
     }
 }
 
@@ -294,16 +290,12 @@ enum { outer_planets_BUFFER = 256 }; /* densities that are added in one go */
 static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < outer_planets_AXES; ++a)
-        if (sizes[a] < outer_planets_least[a] || sizes[a] % outer_planets_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = outer_planets_LEAD + ((sizes[outer_planets_AXES - 1] + 7) / 8 * 8 + outer_planets_HALO + 7)
-        / 8 * 8;
+    if (sizes[0] < outer_planets_least[0] || sizes[0] % outer_planets_periods[0] != 0 || sizes[0] > most / 2)
+        return 0;
+    size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -322,7 +314,7 @@ size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 static void outer_planets_put(const outer_planets_solver *s, double *rows, const double *values)
 {
     double *row = rows;
-    memset(row - outer_planets_LEAD, 0, (size_t)s->width * sizeof *row);
+    memset(row, 0, (size_t)s->width * sizeof *row);
     memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
@@ -330,7 +322,7 @@ static void outer_planets_put(const outer_planets_solver *s, double *rows, const
 static void outer_planets_put_parameter(const outer_planets_solver *s, double *rows, const double *values,
     double value)
 {
-    for (ptrdiff_t i = -outer_planets_LEAD; i < s->width - outer_planets_LEAD; ++i) rows[i] = value;
+    for (ptrdiff_t i = 0; i < s->width; ++i) rows[i] = value;
     if (values != NULL) outer_planets_put(s, rows, values);
 }
 
@@ -361,8 +353,7 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return outer_planets_BAD_ARGUMENT;
     const outer_planets_params own = params != NULL ? *params : outer_planets_default_params;
-    const size_t rows = outer_planets_shape(sizes, &width), length = sizes[outer_planets_AXES - 1],
-        sites = rows * length;
+    const size_t rows = outer_planets_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !outer_planets_finite(x0, outer_planets_DIM * sites) || !outer_planets_allowed(&own,
         sites)) return outer_planets_BAD_ARGUMENT;
     double coef[outer_planets_COEFFICIENTS];
@@ -375,8 +366,7 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
-        + outer_planets_LEAD;
+    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = outer_planets_block(rows, width);
     for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < outer_planets_DIM; ++k)
@@ -402,19 +392,17 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
     return outer_planets_OK;
 }
 
-static int outer_planets_all_hold(const outer_planets_solver *s, double *const x[outer_planets_DIM])
+static int outer_planets_all_hold(const outer_planets_solver *s, double *const *x)
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
         if (!outer_planets_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void outer_planets_copy(double *const to[outer_planets_DIM], double *const from[outer_planets_DIM],
-    const outer_planets_solver *s)
+static void outer_planets_copy(double *const *to, double *const *from, const outer_planets_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < outer_planets_DIM; ++k)
-        memcpy(to[k] - outer_planets_LEAD, from[k] - outer_planets_LEAD, block);
+    for (size_t k = 0; k < outer_planets_DIM; ++k) memcpy(to[k], from[k], block);
 }
 
 /* ---- The flows ---- */
@@ -425,7 +413,7 @@ static void outer_planets_sweep_part(const outer_planets_solver *s, int part, co
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 512)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) outer_planets_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) outer_planets_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -491,12 +479,10 @@ outer_planets_status outer_planets_step(outer_planets_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void outer_planets_take(const outer_planets_solver *s, double *const fields[outer_planets_DIM],
-    double *x)
+static void outer_planets_take(const outer_planets_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void outer_planets_state(const outer_planets_solver *s, double *x) { outer_planets_take(s, s->x, x); }

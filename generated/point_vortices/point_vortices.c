@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: a6fd90c5172cf99d9d0cca890a57d3929930563338d3265987786c261c4e015d
+ * body-sha256: 167f86a22ec507baf69464a5b68371e4815e9a101f0a963f9bbc872eb3354622
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -29,8 +29,6 @@
 /* ---- The model ---- */
 const point_vortices_params point_vortices_default_params = { NULL };
 
-enum { point_vortices_HALO = 0 };          /* sites that are copied beside a row */
-enum { point_vortices_LEAD = 0 };          /* doubles before the first site of a row */
 enum { point_vortices_RESERVED = 84 };     /* arrays over the sites in the memory of a solver */
 enum { point_vortices_ROW = 1 };           /* coefficients of one flow */
 enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
@@ -323,16 +321,12 @@ enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < point_vortices_AXES; ++a)
-        if (sizes[a] < point_vortices_least[a] || sizes[a] % point_vortices_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = point_vortices_LEAD + ((sizes[point_vortices_AXES - 1] + 7) / 8 * 8 + point_vortices_HALO
-        + 7) / 8 * 8;
+    if (sizes[0] < point_vortices_least[0] || sizes[0] % point_vortices_periods[0] != 0
+        || sizes[0] > most / 2) return 0;
+    size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. The values of a site are far apart in their pages: reading waits for
@@ -356,7 +350,7 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 static void point_vortices_put(const point_vortices_solver *s, double *rows, const double *values)
 {
     double *row = rows;
-    memset(row - point_vortices_LEAD, 0, (size_t)s->width * sizeof *row);
+    memset(row, 0, (size_t)s->width * sizeof *row);
     memcpy(row, values, (size_t)s->length * sizeof *row);
 }
 
@@ -364,7 +358,7 @@ static void point_vortices_put(const point_vortices_solver *s, double *rows, con
 static void point_vortices_put_parameter(const point_vortices_solver *s, double *rows, const double *values,
     double value)
 {
-    for (ptrdiff_t i = -point_vortices_LEAD; i < s->width - point_vortices_LEAD; ++i) rows[i] = value;
+    for (ptrdiff_t i = 0; i < s->width; ++i) rows[i] = value;
     if (values != NULL) point_vortices_put(s, rows, values);
 }
 
@@ -412,8 +406,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return point_vortices_BAD_ARGUMENT;
     const point_vortices_params own = params != NULL ? *params : point_vortices_default_params;
-    const size_t rows = point_vortices_shape(sizes, &width), length = sizes[point_vortices_AXES - 1],
-        sites = rows * length;
+    const size_t rows = point_vortices_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites) || !point_vortices_allowed(&own,
         sites)) return point_vortices_BAD_ARGUMENT;
     double coef[point_vortices_COEFFICIENTS];
@@ -426,8 +419,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
-        + point_vortices_LEAD;
+    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = point_vortices_block(rows, width);
     for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < point_vortices_DIM; ++k)
@@ -454,19 +446,17 @@ static point_vortices_status point_vortices_set_step(point_vortices_solver *s, d
     return point_vortices_OK;
 }
 
-static int point_vortices_all_hold(const point_vortices_solver *s, double *const x[point_vortices_DIM])
+static int point_vortices_all_hold(const point_vortices_solver *s, double *const *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
         if (!point_vortices_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void point_vortices_copy(double *const to[point_vortices_DIM], double *const from[point_vortices_DIM],
-    const point_vortices_solver *s)
+static void point_vortices_copy(double *const *to, double *const *from, const point_vortices_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < point_vortices_DIM; ++k)
-        memcpy(to[k] - point_vortices_LEAD, from[k] - point_vortices_LEAD, block);
+    for (size_t k = 0; k < point_vortices_DIM; ++k) memcpy(to[k], from[k], block);
 }
 
 /* ---- The stages ---- */
@@ -535,8 +525,7 @@ static void point_vortices_predict(const point_vortices_solver *s, double *const
     point_vortices_EACH_PIECE
     for (size_t row = 0; row < s->rows; ++row)
         for (int k = 0; k < point_vortices_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)row * s->width - point_vortices_HALO,
-                end = first + s->length + 2 * point_vortices_HALO;
+            const ptrdiff_t first = (ptrdiff_t)row * s->width, end = first + s->length;
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
             for (int d = 0; d < s->guess[stage].order; ++d) {
                 const double *difference = s->guess[stage].difference[d][k];
@@ -555,8 +544,7 @@ static void point_vortices_remember(point_vortices_solver *s, double *const *fro
     for (size_t row = 0; row < s->rows; ++row) {
         double own[point_vortices_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < point_vortices_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)row * s->width - point_vortices_HALO,
-                end = first + s->length + 2 * point_vortices_HALO;
+            const ptrdiff_t first = (ptrdiff_t)row * s->width, end = first + s->length;
             const double *restrict y = s->y[now][k], *restrict x = from[k];
             for (ptrdiff_t i = first; i < end; ++i) {
                 double next = y[i] - x[i];
@@ -811,12 +799,10 @@ point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void point_vortices_take(const point_vortices_solver *s, double *const fields[point_vortices_DIM],
-    double *x)
+static void point_vortices_take(const point_vortices_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }

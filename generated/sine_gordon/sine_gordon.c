@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 87031b3667ddec3e36c7c3562e10b412ec59ff5b7a368661e3b6f592eeeb01b2
+ * body-sha256: a2be6284d498d366fb7eaa985f47dee5345f7676e4558a5c2d6b6bd5e4d83576
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -188,22 +188,19 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void sine_gordon_sweep_rows(const sine_gordon_solver *s, int part, const double *coef, size_t first,
-    size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void sine_gordon_sweep_piece(const sine_gordon_solver *s, int part, const double *coef, size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            sine_gordon_sweep1(coef, &at.row, at.from, at.to);
-            sine_gordon_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_2 */
-            sine_gordon_sweep2(coef, &at.row, at.from, at.to);
-            sine_gordon_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        }
+    const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        sine_gordon_sweep1(coef, &at.row, at.from, at.to);
+        sine_gordon_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    default: /* H_2 */
+        sine_gordon_sweep2(coef, &at.row, at.from, at.to);
+        sine_gordon_ends(s->x[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -247,16 +244,12 @@ enum { sine_gordon_BUFFER = 256 }; /* densities that are added in one go */
 static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / sine_gordon_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < sine_gordon_AXES; ++a)
-        if (sizes[a] < sine_gordon_least[a] || sizes[a] % sine_gordon_periods[a] != 0 || sizes[a] > most / 2)
-            return 0;
-    size_t wide = sine_gordon_LEAD + ((sizes[sine_gordon_AXES - 1] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8
-        * 8;
+    if (sizes[0] < sine_gordon_least[0] || sizes[0] % sine_gordon_periods[0] != 0 || sizes[0] > most / 2)
+        return 0;
+    size_t wide = sine_gordon_LEAD + ((sizes[0] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -300,8 +293,7 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return sine_gordon_BAD_ARGUMENT;
     const sine_gordon_params own = params != NULL ? *params : sine_gordon_default_params;
-    const size_t rows = sine_gordon_shape(sizes, &width), length = sizes[sine_gordon_AXES - 1],
-        sites = rows * length;
+    const size_t rows = sine_gordon_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !sine_gordon_finite(x0, sine_gordon_DIM * sites) || !sine_gordon_allowed(&own, sites))
         return sine_gordon_BAD_ARGUMENT;
     double coef[sine_gordon_COEFFICIENTS];
@@ -336,15 +328,14 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
     return sine_gordon_OK;
 }
 
-static int sine_gordon_all_hold(const sine_gordon_solver *s, double *const x[sine_gordon_DIM])
+static int sine_gordon_all_hold(const sine_gordon_solver *s, double *const *x)
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
         if (!sine_gordon_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void sine_gordon_copy(double *const to[sine_gordon_DIM], double *const from[sine_gordon_DIM],
-    const sine_gordon_solver *s)
+static void sine_gordon_copy(double *const *to, double *const *from, const sine_gordon_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
@@ -359,7 +350,7 @@ static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const 
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) sine_gordon_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) sine_gordon_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -425,11 +416,10 @@ sine_gordon_status sine_gordon_step(sine_gordon_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void sine_gordon_take(const sine_gordon_solver *s, double *const fields[sine_gordon_DIM], double *x)
+static void sine_gordon_take(const sine_gordon_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void sine_gordon_state(const sine_gordon_solver *s, double *x) { sine_gordon_take(s, s->x, x); }

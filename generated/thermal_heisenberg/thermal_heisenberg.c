@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: e27e2f3fee4cd88dee38e402dbfc2998afcc4af7b39c4795740226a42f92c22e
+ * body-sha256: f25a82578d298b2512e71c5356249418afae889c9afa65eb7a25a9f4fb3cd036
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -305,64 +305,46 @@ static inline void thermal_heisenberg_sweep_x_y(const double *coef, const therma
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void thermal_heisenberg_sweep_rows(const thermal_heisenberg_solver *s, int part, const double *coef,
-    size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void thermal_heisenberg_sweep_piece(const thermal_heisenberg_solver *s, int part, const double *coef,
+    size_t unit)
 {
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0], s->x[3], s->x[5], s->x[6], s->x[4] };
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3], s->x[6], s->x[4], s->x[5] };
-    for (size_t unit = first; unit < end; ++unit) {
-        thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            at.row.x = y_z_x;
-            thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        case 3: /* H_3 */
-            at.row.x = z_x_y;
-            thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        case 4: /* H_4 */
-            thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        case 5: /* H_5 */
-            thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        case 6: /* H_6 */
-            at.row.x = y_z_x;
-            thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        case 7: /* H_7 */
-            at.row.x = z_x_y;
-            thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        default: /* H_8 */
-            at.row.swept = 1;
-            thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
-            thermal_heisenberg_ends(s->x[0], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[1], s->length, at.from, at.to);
-            thermal_heisenberg_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        }
+    thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        at.row.x = y_z_x;
+        thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
+        break;
+    case 3: /* H_3 */
+        at.row.x = z_x_y;
+        thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
+        break;
+    case 4: /* H_4 */
+        thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
+        break;
+    case 5: /* H_5 */
+        thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
+    case 6: /* H_6 */
+        at.row.x = y_z_x;
+        thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
+    case 7: /* H_7 */
+        at.row.x = z_x_y;
+        thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
+        break;
+    default: /* H_8 */
+        at.row.swept = 1;
+        thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
+        break;
     }
+    for (int k = 0; k < thermal_heisenberg_DIM; ++k)
+        thermal_heisenberg_ends(s->x[k], s->length, at.from, at.to);
 }
 
 /* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
@@ -453,34 +435,32 @@ static void thermal_heisenberg_two_normals(uint64_t seed, uint32_t c[4], double 
 }
 
 /* ---- Noise ---- */
-/* The increments of a part of a step after so many others, for pieces of rows: a function of seed, member,
+/* The increments of a part of a step after so many others, for a piece of a row: a function of seed, member,
    step, part and site alone. A step of -h has them in the order in which it undoes one of h. */
-static void thermal_heisenberg_draw_rows(const thermal_heisenberg_solver *s, size_t steps, int part,
-    size_t first, size_t end)
+static void thermal_heisenberg_draw_piece(const thermal_heisenberg_solver *s, size_t steps, int part,
+    size_t unit)
 {
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? thermal_heisenberg_PARTS - 1 - part
         : part) * ((thermal_heisenberg_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)thermal_heisenberg_PARTS), s->h);
-    for (size_t unit = first; unit < end; ++unit) {
-        const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
-        for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
-            double *one = s->x[thermal_heisenberg_DRAWN + k];
-            double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
-            for (ptrdiff_t i = at.from; i < at.to; ++i) {
-                const uint64_t site = (uint64_t)i;
-                const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
-                uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
-                    (uint32_t)site };
-                double pair[2];
-                thermal_heisenberg_two_normals(s->seed, counter, pair);
-                other[i] = size * pair[1];
-                one[i] = size * pair[0];
-            }
+    const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+    for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
+        double *one = s->x[thermal_heisenberg_DRAWN + k];
+        double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
+        for (ptrdiff_t i = at.from; i < at.to; ++i) {
+            const uint64_t site = (uint64_t)i;
+            const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
+            uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
+                (uint32_t)site };
+            double pair[2];
+            thermal_heisenberg_two_normals(s->seed, counter, pair);
+            other[i] = size * pair[1];
+            one[i] = size * pair[0];
         }
-        for (int k = 0; k < thermal_heisenberg_SOURCES; ++k)
-            thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, at.from, at.to);
     }
+    for (int k = 0; k < thermal_heisenberg_SOURCES; ++k)
+        thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, at.from, at.to);
 }
 
 thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver *s, uint64_t seed,
@@ -502,16 +482,12 @@ enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go 
 static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / thermal_heisenberg_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < thermal_heisenberg_AXES; ++a)
-        if (sizes[a] < thermal_heisenberg_least[a] || sizes[a] % thermal_heisenberg_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = thermal_heisenberg_LEAD + ((sizes[thermal_heisenberg_AXES - 1] + 7) / 8 * 8
-        + thermal_heisenberg_HALO + 7) / 8 * 8;
+    if (sizes[0] < thermal_heisenberg_least[0] || sizes[0] % thermal_heisenberg_periods[0] != 0
+        || sizes[0] > most / 2) return 0;
+    size_t wide = thermal_heisenberg_LEAD + ((sizes[0] + 7) / 8 * 8 + thermal_heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -573,8 +549,7 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return thermal_heisenberg_BAD_ARGUMENT;
     const thermal_heisenberg_params own = params != NULL ? *params : thermal_heisenberg_default_params;
-    const size_t rows = thermal_heisenberg_shape(sizes, &width), length = sizes[thermal_heisenberg_AXES - 1],
-        sites = rows * length;
+    const size_t rows = thermal_heisenberg_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !thermal_heisenberg_finite(x0, thermal_heisenberg_DIM * sites)
         || !thermal_heisenberg_allowed(&own, sites)) return thermal_heisenberg_BAD_ARGUMENT;
     double coef[thermal_heisenberg_COEFFICIENTS];
@@ -628,16 +603,15 @@ thermal_heisenberg_status thermal_heisenberg_passed(thermal_heisenberg_solver *s
     return thermal_heisenberg_OK;
 }
 
-static int thermal_heisenberg_all_hold(const thermal_heisenberg_solver *s,
-    double *const x[thermal_heisenberg_DIM])
+static int thermal_heisenberg_all_hold(const thermal_heisenberg_solver *s, double *const *x)
 {
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
         if (!thermal_heisenberg_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void thermal_heisenberg_copy(double *const to[thermal_heisenberg_DIM],
-    double *const from[thermal_heisenberg_DIM], const thermal_heisenberg_solver *s)
+static void thermal_heisenberg_copy(double *const *to, double *const *from,
+    const thermal_heisenberg_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
@@ -652,17 +626,15 @@ static void thermal_heisenberg_sweep_part(const thermal_heisenberg_solver *s, in
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_sweep_piece(s, part, coef, unit);
 }
 
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+/* The flow of that number in a step after so many. */
 static void thermal_heisenberg_make_flow(const thermal_heisenberg_solver *s, size_t steps, int number)
 {
-    const int joined = number == thermal_heisenberg_FLOWS, row = joined ? thermal_heisenberg_JOINED
-        : thermal_heisenberg_flow_rows[number];
-    const double *coef = s->coef + row * thermal_heisenberg_ROW;
+    const double *coef = s->coef + thermal_heisenberg_flow_rows[number] * thermal_heisenberg_ROW;
     (void)steps;
-    thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[joined ? 0 : number], coef);
+    thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[number], coef);
 }
 
 /* The increments of a part of a step after so many, at all sites. */
@@ -672,7 +644,7 @@ static void thermal_heisenberg_draw(const thermal_heisenberg_solver *s, size_t s
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_draw_rows(s, steps, part, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_draw_piece(s, steps, part, unit);
 }
 
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
@@ -700,7 +672,7 @@ thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver
 {
     thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);
     if (status != thermal_heisenberg_OK || steps == 0) return status;
-    thermal_heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    thermal_heisenberg_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = thermal_heisenberg_STRETCH; s->steps < end && status == thermal_heisenberg_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -713,12 +685,6 @@ thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver
             status = thermal_heisenberg_NOT_FINITE;
         }
     }
-    /* the last flow of the last step, before which steps go on */
-    if (s->open && !thermal_heisenberg_try(s, 0)) {
-        status = thermal_heisenberg_NOT_FINITE;
-        s->open = 0;
-        --s->steps;
-    }
     s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     return status;
 }
@@ -729,12 +695,10 @@ thermal_heisenberg_status thermal_heisenberg_step(thermal_heisenberg_solver *s, 
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void thermal_heisenberg_take(const thermal_heisenberg_solver *s,
-    double *const fields[thermal_heisenberg_DIM], double *x)
+static void thermal_heisenberg_take(const thermal_heisenberg_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x)
@@ -744,7 +708,7 @@ void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x)
 
 int thermal_heisenberg_saved(const thermal_heisenberg_solver *s, double *x, size_t *far)
 {
-    if (s->open) thermal_heisenberg_take(s, s->before, x);
+    (void)x;
     *far = s->far;
     return s->open;
 }
@@ -754,13 +718,7 @@ thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s
 {
     const thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);
     s->far = far;
-    if (status == thermal_heisenberg_OK && x == NULL) return thermal_heisenberg_OK;
-    if (status != thermal_heisenberg_OK || !thermal_heisenberg_finite(x, thermal_heisenberg_DIM * s->sites))
-        return thermal_heisenberg_BAD_ARGUMENT;
-    for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
-        thermal_heisenberg_put(s, s->before[k], x + k * s->sites);
-    s->open = 1;
-    return thermal_heisenberg_OK;
+    return x == NULL ? status : thermal_heisenberg_BAD_ARGUMENT;
 }
 
 /* ---- What is seen at sites ---- */

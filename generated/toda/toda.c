@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 1f44a486ae2ef2e92a203c06a1c49fc473d611d01cfa4db6d255df4a4345b3a4
+ * body-sha256: 898523ffe21888ba014b8c45cce161d4cd8b5614a39dd1dbf75c50bfb2ee944d
  */
 #include "toda.h"
 #include <float.h>
@@ -185,21 +185,19 @@ static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void toda_sweep_rows(const toda_solver *s, int part, const double *coef, size_t first, size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void toda_sweep_piece(const toda_solver *s, int part, const double *coef, size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        const toda_piece at = toda_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            toda_sweep1(coef, &at.row, at.from, at.to);
-            toda_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        default: /* H_2 */
-            toda_sweep2(coef, &at.row, at.from, at.to);
-            toda_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        }
+    const toda_piece at = toda_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        toda_sweep1(coef, &at.row, at.from, at.to);
+        toda_ends(s->x[1], s->length, at.from, at.to);
+        break;
+    default: /* H_2 */
+        toda_sweep2(coef, &at.row, at.from, at.to);
+        toda_ends(s->x[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -252,14 +250,11 @@ enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < toda_AXES; ++a)
-        if (sizes[a] < toda_least[a] || sizes[a] % toda_periods[a] != 0 || sizes[a] > most / 2) return 0;
-    size_t wide = toda_LEAD + ((sizes[toda_AXES - 1] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
+    if (sizes[0] < toda_least[0] || sizes[0] % toda_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -302,7 +297,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return toda_BAD_ARGUMENT;
     const toda_params own = params != NULL ? *params : toda_default_params;
-    const size_t rows = toda_shape(sizes, &width), length = sizes[toda_AXES - 1], sites = rows * length;
+    const size_t rows = toda_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !toda_finite(x0, toda_DIM * sites) || !toda_allowed(&own, sites))
         return toda_BAD_ARGUMENT;
     double coef[toda_COEFFICIENTS];
@@ -337,14 +332,14 @@ static toda_status toda_set_step(toda_solver *s, double h)
     return toda_OK;
 }
 
-static int toda_all_hold(const toda_solver *s, double *const x[toda_DIM])
+static int toda_all_hold(const toda_solver *s, double *const *x)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
         if (!toda_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void toda_copy(double *const to[toda_DIM], double *const from[toda_DIM], const toda_solver *s)
+static void toda_copy(double *const *to, double *const *from, const toda_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < toda_DIM; ++k) memcpy(to[k] - toda_LEAD, from[k] - toda_LEAD, block);
@@ -358,7 +353,7 @@ static void toda_sweep_part(const toda_solver *s, int part, const double *coef)
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) toda_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) toda_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -419,11 +414,10 @@ toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 toda_status toda_step(toda_solver *s, double h) { return toda_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void toda_take(const toda_solver *s, double *const fields[toda_DIM], double *x)
+static void toda_take(const toda_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void toda_state(const toda_solver *s, double *x) { toda_take(s, s->x, x); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6b8e990070e3085932c968abef37caf989e5e6d26923d164277a5b4901901193
+ * body-sha256: 1cb15e01b656b2ff01796227d1989f1b02394a3e85f972cde16a87faf305047a
  */
 #include "volterra.h"
 #include <float.h>
@@ -186,23 +186,20 @@ static inline void volterra_sweep_a(const double *coef, const volterra_row *row,
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void volterra_sweep_rows(const volterra_solver *s, int part, const double *coef, size_t first,
-    size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void volterra_sweep_piece(const volterra_solver *s, int part, const double *coef, size_t unit)
 {
-    for (size_t unit = first; unit < end; ++unit) {
-        volterra_piece at = volterra_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            at.row.swept = 1;
-            volterra_sweep_a(coef, &at.row, at.from, at.to);
-            volterra_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        default: /* H_2 */
-            volterra_sweep_a(coef, &at.row, at.from, at.to);
-            volterra_ends(s->x[0], s->length, at.from, at.to);
-            break;
-        }
+    volterra_piece at = volterra_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        at.row.swept = 1;
+        volterra_sweep_a(coef, &at.row, at.from, at.to);
+        volterra_ends(s->x[0], s->length, at.from, at.to);
+        break;
+    default: /* H_2 */
+        volterra_sweep_a(coef, &at.row, at.from, at.to);
+        volterra_ends(s->x[0], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -253,15 +250,11 @@ enum { volterra_BUFFER = 256 }; /* densities that are added in one go */
 static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / volterra_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < volterra_AXES; ++a)
-        if (sizes[a] < volterra_least[a] || sizes[a] % volterra_periods[a] != 0 || sizes[a] > most / 2)
-            return 0;
-    size_t wide = volterra_LEAD + ((sizes[volterra_AXES - 1] + 7) / 8 * 8 + volterra_HALO + 7) / 8 * 8;
+    if (sizes[0] < volterra_least[0] || sizes[0] % volterra_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    size_t wide = volterra_LEAD + ((sizes[0] + 7) / 8 * 8 + volterra_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -305,8 +298,7 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return volterra_BAD_ARGUMENT;
     const volterra_params own = params != NULL ? *params : volterra_default_params;
-    const size_t rows = volterra_shape(sizes, &width), length = sizes[volterra_AXES - 1],
-        sites = rows * length;
+    const size_t rows = volterra_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !volterra_finite(x0, volterra_DIM * sites) || !volterra_allowed(&own, sites))
         return volterra_BAD_ARGUMENT;
     double coef[volterra_COEFFICIENTS];
@@ -341,15 +333,14 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
     return volterra_OK;
 }
 
-static int volterra_all_hold(const volterra_solver *s, double *const x[volterra_DIM])
+static int volterra_all_hold(const volterra_solver *s, double *const *x)
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
         if (!volterra_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void volterra_copy(double *const to[volterra_DIM], double *const from[volterra_DIM],
-    const volterra_solver *s)
+static void volterra_copy(double *const *to, double *const *from, const volterra_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < volterra_DIM; ++k) memcpy(to[k] - volterra_LEAD, from[k] - volterra_LEAD, block);
@@ -363,7 +354,7 @@ static void volterra_sweep_part(const volterra_solver *s, int part, const double
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) volterra_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) volterra_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -424,11 +415,10 @@ volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
 volterra_status volterra_step(volterra_solver *s, double h) { return volterra_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void volterra_take(const volterra_solver *s, double *const fields[volterra_DIM], double *x)
+static void volterra_take(const volterra_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void volterra_state(const volterra_solver *s, double *x) { volterra_take(s, s->x, x); }

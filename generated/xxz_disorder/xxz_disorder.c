@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: bb7476a7b154164e50f95f7f51a66ccf765df501b83e50c577bffb902758353b
+ * body-sha256: d47b12009554c19bff9f82b8b897db19391d7f002bfcf91a8d6c33ecb7f28d4d
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -204,31 +204,28 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of a part of H, for the pieces of rows from first on, before end. */
-static void xxz_disorder_sweep_rows(const xxz_disorder_solver *s, int part, const double *coef, size_t first,
-    size_t end)
+/* The flow of a part of H, for a piece of a row. */
+static void xxz_disorder_sweep_piece(const xxz_disorder_solver *s, int part, const double *coef, size_t unit)
 {
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3] };
-    for (size_t unit = first; unit < end; ++unit) {
-        xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
-        switch (part) {
-        case 1: /* H_1 */
-            xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
-            xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
-            xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        case 2: /* H_2 */
-            at.row.x = z_x_y;
-            xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
-            xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
-            xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
-            break;
-        default: /* H_3 */
-            xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
-            xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
-            xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
-            break;
-        }
+    xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+    switch (part) {
+    case 1: /* H_1 */
+        xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
+        xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
+        xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
+        break;
+    case 2: /* H_2 */
+        at.row.x = z_x_y;
+        xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
+        xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
+        xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
+        break;
+    default: /* H_3 */
+        xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
+        xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
+        xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
+        break;
     }
 }
 
@@ -288,16 +285,12 @@ enum { xxz_disorder_BUFFER = 256 }; /* densities that are added in one go */
 static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
-    size_t rows = 1;
-    for (int a = 0; a < xxz_disorder_AXES; ++a)
-        if (sizes[a] < xxz_disorder_least[a] || sizes[a] % xxz_disorder_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
-    size_t wide = xxz_disorder_LEAD + ((sizes[xxz_disorder_AXES - 1] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8
-        * 8;
+    if (sizes[0] < xxz_disorder_least[0] || sizes[0] % xxz_disorder_periods[0] != 0 || sizes[0] > most / 2)
+        return 0;
+    size_t wide = xxz_disorder_LEAD + ((sizes[0] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+    return 1;
 }
 
 /* Doubles from one array to the next. */
@@ -356,8 +349,7 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     ptrdiff_t width;
     if (s == NULL || sizes == NULL || x0 == NULL || work == NULL) return xxz_disorder_BAD_ARGUMENT;
     const xxz_disorder_params own = params != NULL ? *params : xxz_disorder_default_params;
-    const size_t rows = xxz_disorder_shape(sizes, &width), length = sizes[xxz_disorder_AXES - 1],
-        sites = rows * length;
+    const size_t rows = xxz_disorder_shape(sizes, &width), length = sizes[0], sites = rows * length;
     if (rows == 0 || !xxz_disorder_finite(x0, xxz_disorder_DIM * sites) || !xxz_disorder_allowed(&own, sites))
         return xxz_disorder_BAD_ARGUMENT;
     double coef[xxz_disorder_COEFFICIENTS];
@@ -393,15 +385,14 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
     return xxz_disorder_OK;
 }
 
-static int xxz_disorder_all_hold(const xxz_disorder_solver *s, double *const x[xxz_disorder_DIM])
+static int xxz_disorder_all_hold(const xxz_disorder_solver *s, double *const *x)
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
         if (!xxz_disorder_finite(x[k], (size_t)s->length)) return 0;
     return 1;
 }
 
-static void xxz_disorder_copy(double *const to[xxz_disorder_DIM], double *const from[xxz_disorder_DIM],
-    const xxz_disorder_solver *s)
+static void xxz_disorder_copy(double *const *to, double *const *from, const xxz_disorder_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
@@ -416,7 +407,7 @@ static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, cons
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) xxz_disorder_sweep_rows(s, part, coef, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) xxz_disorder_sweep_piece(s, part, coef, unit);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -482,11 +473,10 @@ xxz_disorder_status xxz_disorder_step(xxz_disorder_solver *s, double h)
 }
 
 /* The sites of fields, without what is beside their rows. */
-static void xxz_disorder_take(const xxz_disorder_solver *s, double *const fields[xxz_disorder_DIM], double *x)
+static void xxz_disorder_take(const xxz_disorder_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k],
-            (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
 }
 
 void xxz_disorder_state(const xxz_disorder_solver *s, double *x) { xxz_disorder_take(s, s->x, x); }

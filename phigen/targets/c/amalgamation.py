@@ -36,6 +36,14 @@ _ONE_ROW = (
     (re.compile(r" \+ at\.row\.at\[0\]|at\.row\.at\[0\] \+ "), ""),
     (re.compile(r"(?:\(ptrdiff_t\))?s->rows \* (?=(?:\(size_t\))?s->width)"), ""),
     (re.compile(r"phi_locate\(s, (?:r|0), "), "phi_locate(s, "),
+    (re.compile(r"sizes\[PHI_AXES - 1\]"), "sizes[0]"),
+)
+
+#: What lies beside rows: nothing, where sites read of no others along them.
+_NO_HALO = (
+    (re.compile(r" [-+] (?:2 \* )?PHI_(?:LEAD|HALO)\b"), ""),
+    (re.compile(r"= -PHI_(?:LEAD|HALO)\b"), "= 0"),
+    (re.compile(r"PHI_LEAD \+ \((.*) \+ 7\) / 8 \* 8;"), r"\1;"),
 )
 
 #: Arguments that say whether those of functions may be large: what a lattice has whose functions are the same for all.
@@ -119,7 +127,9 @@ class Amalgam:
         """Lines of the runtime with the prefix of the solver."""
         kept = lines if self.switches["COMPOSED"] else one_stage(lines)
         kept = _without_loops(kept, _OVER_ROWS, _ONE_ROW) if self.switches.get("ONE_ROW") else kept
-        for pattern, text in () if self.switches.get("NEAR", True) else _NEVER_FAR:
+        left_out = [*(() if self.switches.get("NEAR", True) else _NEVER_FAR)]
+        left_out += () if self.switches.get("HALO", True) else _NO_HALO
+        for pattern, text in left_out:
             kept = [pattern.sub(text, line) for line in kept]
         return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
 

@@ -82,10 +82,12 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 #else
     const size_t most = SIZE_MAX / 64 / PHI_RESERVED;
 #endif
+#if PHI_ONE_ROW
+    if (sizes[0] < phi_least[0] || sizes[0] % phi_periods[0] != 0 || sizes[0] > most / 2) return 0;
+#else
     size_t rows = 1;
     for (int a = 0; a < PHI_AXES; ++a)
         if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
-#if !PHI_ONE_ROW
     for (int a = 0; a < PHI_AXES - 1; ++a) {
         if (rows > most / sizes[a]) return 0;
         rows *= sizes[a];
@@ -93,9 +95,12 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 #endif
     size_t wide = PHI_LEAD + ((sizes[PHI_AXES - 1] + 7) / 8 * 8 + PHI_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
-    if (rows > most / wide) return 0;
     *width = (ptrdiff_t)wide;
-    return rows;
+#if PHI_ONE_ROW
+    return 1;
+#else
+    return rows > most / wide ? 0 : rows;
+#endif
 }
 
 #if PHI_SPREAD
@@ -390,7 +395,7 @@ static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PH
 }
 #endif
 
-static int phi_all_hold(const phi_solver *s, double *const x[PHI_DIM])
+static int phi_all_hold(const phi_solver *s, double *const *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
@@ -398,7 +403,7 @@ static int phi_all_hold(const phi_solver *s, double *const x[PHI_DIM])
     return 1;
 }
 
-static void phi_copy(double *const to[PHI_DIM], double *const from[PHI_DIM], const phi_solver *s)
+static void phi_copy(double *const *to, double *const *from, const phi_solver *s)
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
     for (size_t k = 0; k < PHI_DIM; ++k) memcpy(to[k] - PHI_LEAD, from[k] - PHI_LEAD, block);
@@ -427,12 +432,11 @@ static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
 /* The sites of fields, without what is beside their rows. */
-static void phi_take(const phi_solver *s, double *const fields[PHI_DIM], double *x)
+static void phi_take(const phi_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
         for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width,
-                (size_t)s->length * sizeof *x);
+            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width, (size_t)s->length * sizeof *x);
 }
 
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
@@ -478,9 +482,13 @@ phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, ch
 #if !PHI_SERIES
 int phi_saved(const phi_solver *s, double *x, size_t *far)
 {
+#if PHI_NOISE
+    (void)x;
+#else
     if (s->open) phi_take(s, s->before, x);
 #if PHI_COMPENSATED
     if (s->open) phi_take(s, s->carry + PHI_DIM, x + PHI_DIM * s->sites);
+#endif
 #endif
     *far = s->far;
     return s->open;
@@ -490,6 +498,9 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
 {
     const phi_status status = phi_set_step(s, h);
     s->far = far;
+#if PHI_NOISE
+    return x == NULL ? status : PHI_BAD_ARGUMENT;
+#else
     if (status == PHI_OK && x == NULL) return PHI_OK;
     if (status != PHI_OK || !phi_finite(x, PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->before[k], x + k * s->sites);
@@ -498,6 +509,7 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
 #endif
     s->open = 1;
     return PHI_OK;
+#endif
 }
 
 #endif

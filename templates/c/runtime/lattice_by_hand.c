@@ -43,7 +43,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
     s->from = (ptrdiff_t)from;
     s->to = (ptrdiff_t)to;
 #if PHI_NOISE
-    if (drawing) phi_draw_rows(s, s->steps, number > 0, 0, units);
+    for (size_t unit = 0; drawing && unit < units; ++unit) phi_draw_piece(s, s->steps, number > 0, unit);
 #endif
     phi_sweep_rows(s, part, coef, far, 0, units);
     s->from = 0;
@@ -53,7 +53,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #endif
 #else
 #if PHI_NOISE
-    if (drawing) phi_draw_rows(s, s->steps, number > 0, from * units, to * units);
+    for (size_t unit = from * units; drawing && unit < to * units; ++unit) phi_draw_piece(s, s->steps, number > 0, unit);
 #endif
     phi_sweep_rows(s, part, coef, far, from * units, to * units);
 #endif

@@ -34,7 +34,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
 #pragma omp parallel for if (s->sites > 4096)
 #endif
 #endif
-    for (size_t unit = 0; unit < units; ++unit) phi_sweep_rows(s, part, coef, far, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) phi_sweep_piece(s, part, coef, far, unit);
 #endif
 }
 
@@ -86,6 +86,20 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
     phi_sweep_part(s, flow.part, flow.coef, s->far > 0);
 }
 
+#elif PHI_NOISE
+/* The flow of that number in a step after so many. */
+static void phi_make_flow(const phi_solver *s, size_t steps, int number)
+{
+#if PHI_RENEWED
+    double coef[PHI_ROW];
+    phi_renew(s, phi_flow_rows[number], steps, coef);
+#else
+    const double *coef = s->coef + phi_flow_rows[number] * PHI_ROW;
+    (void)steps;
+#endif
+    phi_sweep_part(s, phi_flow_parts[number], coef, s->far > 0);
+}
+
 #else
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void phi_make_flow(const phi_solver *s, size_t steps, int number)
@@ -112,14 +126,14 @@ static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
 #if PHI_SHARED
     size_t first, end = phi_share(phi_units(s), &first);
-    phi_draw_rows(s, steps, part, first, end);
+    for (; first < end; ++first) phi_draw_piece(s, steps, part, first);
     phi_wait();
 #else
     const size_t units = phi_units(s);
 #ifdef _OPENMP
 #pragma omp parallel for if (s->sites > 4096)
 #endif
-    for (size_t unit = 0; unit < units; ++unit) phi_draw_rows(s, steps, part, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) phi_draw_piece(s, steps, part, unit);
 #endif
 }
 
@@ -203,7 +217,11 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || steps == 0) return status;
+#if PHI_NOISE
+    phi_copy(s->before, s->x, s);
+#else
     phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+#endif
 #endif
     const size_t end = s->steps + steps;
     for (size_t stretch = PHI_STRETCH; s->steps < end && status == PHI_OK;) {
@@ -242,9 +260,14 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || steps == 0) return status;
+#if PHI_NOISE
+    phi_copy(s->before, s->x, s);
+#else
     phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+#endif
     status = phi_march(s, steps);
 #endif
+#if !PHI_NOISE
 #if PHI_NEAR
     if (s->open && !phi_close(s)) { /* the last flow of the last step, before which steps go on */
 #else
@@ -254,6 +277,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         s->open = 0;
         --s->steps;
     }
+#endif
     s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
 #if PHI_TIMED
     s->now = s->t;

@@ -25,36 +25,34 @@ static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 }
 
 #endif
-/* The increments of a part of a step after so many others, for pieces of rows: a function of seed, member, step, part and site
+/* The increments of a part of a step after so many others, for a piece of a row: a function of seed, member, step, part and site
    alone. A step of -h has them in the order in which it undoes one of h. */
-static void phi_draw_rows(const phi_solver *s, size_t steps, int part, size_t first, size_t end)
+static void phi_draw_piece(const phi_solver *s, size_t steps, int part, size_t unit)
 {
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? PHI_PARTS - 1 - part : part) * ((PHI_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h);
-    for (size_t unit = first; unit < end; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
-        for (int k = 0; k < PHI_SOURCES; k += 2) {
-            double *one = s->x[PHI_DRAWN + k] + at.row.at[0];
-            double *other = s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)] + at.row.at[0];
-            for (ptrdiff_t i = at.from; i < at.to; ++i) {
+    const phi_piece at = phi_piece_of(s, unit);
+    for (int k = 0; k < PHI_SOURCES; k += 2) {
+        double *one = s->x[PHI_DRAWN + k] + at.row.at[0];
+        double *other = s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)] + at.row.at[0];
+        for (ptrdiff_t i = at.from; i < at.to; ++i) {
 #if PHI_BY_HAND || !PHI_ONE_ROW
-                const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
+            const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
 #else
-                const uint64_t site = (uint64_t)i;
+            const uint64_t site = (uint64_t)i;
 #endif
-                const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
-                uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member, (uint32_t)site };
-                double pair[2];
-                phi_two_normals(s->seed, counter, pair);
-                other[i] = size * pair[1];
-                one[i] = size * pair[0];
-            }
+            const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
+            uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member, (uint32_t)site };
+            double pair[2];
+            phi_two_normals(s->seed, counter, pair);
+            other[i] = size * pair[1];
+            one[i] = size * pair[0];
         }
-#if PHI_HALO
-        for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(s->x[PHI_DRAWN + k] + at.row.at[0], s->length, at.from, at.to);
-#endif
     }
+#if PHI_HALO
+    for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(s->x[PHI_DRAWN + k] + at.row.at[0], s->length, at.from, at.to);
+#endif
 }
 
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step)

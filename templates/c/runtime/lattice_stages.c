@@ -178,7 +178,7 @@ static phi_status phi_stages(phi_solver *s, int far)
 #endif
 #if PHI_NOISE
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_draw_rows(s, s->steps, 0, unit, unit + 1);
+    for (size_t unit = 0; unit < units; ++unit) phi_draw_piece(s, s->steps, 0, unit);
 #endif
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
 #if PHI_RENEWED

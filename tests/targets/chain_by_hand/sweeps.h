@@ -10,17 +10,15 @@ static double phi_force(double g, const phi_row *row, ptrdiff_t i)
     return -g * sin(q[i]) + (before[i] - q[i]) + (after[i] - q[i]) + right * (q[i + 1] - q[i]) + left * (q[i - 1] - q[i]);
 }
 
-static void phi_sweep_rows(const phi_solver *s, int part, const double *coef, int far, size_t first, size_t end)
+static void phi_sweep_piece(const phi_solver *s, int part, const double *coef, int far, size_t unit)
 {
     (void)far;
-    for (size_t unit = first; unit < end; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
-        double *q = s->x[0] + at.row.at[0], *p = s->x[1] + at.row.at[0];
-        for (ptrdiff_t i = at.from; i < at.to; ++i)
-            if (part == 1) q[i] += coef[0] * p[i];
-            else p[i] += coef[0] * phi_force(s->params.g, &at.row, i);
-        if (part == 1) phi_ends(q, s->length, at.from, at.to);
-    }
+    const phi_piece at = phi_piece_of(s, unit);
+    double *q = s->x[0] + at.row.at[0], *p = s->x[1] + at.row.at[0];
+    for (ptrdiff_t i = at.from; i < at.to; ++i)
+        if (part == 1) q[i] += coef[0] * p[i];
+        else p[i] += coef[0] * phi_force(s->params.g, &at.row, i);
+    if (part == 1) phi_ends(q, s->length, at.from, at.to);
 }
 
 static void phi_energy_row(const phi_params *params, const phi_row *row, ptrdiff_t from, ptrdiff_t to,

@@ -111,8 +111,8 @@ def model(program: Program, step: Sweeps) -> str:
     has = switches(program, step, layout)
     reserved, of_stage = _reserved(program, layout, has)
     constants = [
-        ("HALO", layout.halo, "sites that are copied beside a row"),
-        ("LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"),
+        *[("HALO", layout.halo, "sites that are copied beside a row")] * has["HALO"],
+        *[("LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row")] * has["HALO"],
         ("RESERVED", reserved, "arrays over the sites in the memory of a solver"),
         *[("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it")] * several,
         ("ROW", max(1, step.row), "coefficients of one flow"),

@@ -98,6 +98,7 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         yield replace(same[0].loop, name=names[code]).text(program, purposes)
     near = rows is not None and bool(rows.limited)
     unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in made)), rows is None
+    alone = not switches(program, step, layout)["SHARED"]
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
     cases: list[Case | str] = []
     for k, forms in enumerate(made):
@@ -117,10 +118,11 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         layout,
         cases,
         title=f"How {what[0].lower()}{what[1:]} carries a tangent vector" if varied else what,
-        head="tangent_rows" if varied else "sweep_rows",
+        head="tangent_rows" if varied else "sweep_piece" if alone else "sweep_rows",
         arguments=f"int {flow}, const double *coef{', double *const *v' * varied}{', int far' * near}",
         coloured=bool(step.by_colour),
         unused=["part"] * (len(cases) == 1 and not step.by_colour) + ([] if varied else unused),
+        alone=alone,
     )
 
 
@@ -181,23 +183,25 @@ def _case(
     coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
     lines = {form: [*_called(program, called, names)] for form, called in forms.items()}
     moved = sorted({f for sweep in part for f in sweep.moved})
-    statements = [*either(lines), *_copied_ends(program, layout, moved, "v" if varied else "s->x")]
     setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
     all_called = [call for called in forms.values() for call in called]
     orders = [*_reordered(layout, [call.order for call in all_called])]
     orders += _other_bonds(layout, [call.bonds for call in all_called])
-    return Case(statements, setup, has_ends(program, [sweep.kernel for sweep in part]), orders)
+    beside, where = has_ends(program, [sweep.kernel for sweep in part]), "v" if varied else "s->x"
+    return Case(either(lines), setup, beside, orders, moved, where)
 
 
 @dataclass(frozen=True)
 class Case:
     """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends; the
-    declarations of ``orders`` of the fields."""
+    declarations of ``orders`` of the fields; which fields are ``moved``, and where these are."""
 
     calls: Sequence[str]
     setup: Sequence[str]
     beside: bool
     orders: Sequence[str] = ()
+    moved: Sequence[int] = ()
+    where: str = "s->x"
 
 
 @dataclass(frozen=True)
@@ -302,7 +306,7 @@ def either(lines: Mapping[str, Sequence[str]]) -> list[str]:
     return ["if (far) {", *indented["_far"], "} else {", *indented["_near"], "}"]
 
 
-def _copied_ends(program: Program, layout: Layout, fields: Sequence[int], where: str) -> list[str]:
+def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], where: str) -> list[str]:
     """What copies the ends of a row of some fields that were changed."""
     found = [f"{program.name}_ends({where}[{f}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);" for f in fields]
     return found if layout.halo else []
@@ -334,13 +338,12 @@ def _of_equation(
         "side": "How a sweep follows x along v",
         "follow": "How the end of a stage follows y along v, added",
     }
-    changed = relaxing or moves or kernel.name == "follow"
-    ends = _copied_ends(program, layout, range(program.dimension), "to") if changed else []
+    moved = range(program.dimension) if relaxing or moves or kernel.name == "follow" else ()
     setup = ["at.row.x = y;", *reads, "at.row.out = to;"]
     yield over_rows(
         program,
         layout,
-        [Case([*gathered, *either(lines), *ends], setup, has_ends(program, [kernel]))],
+        [Case([*gathered, *either(lines)], setup, has_ends(program, [kernel]), (), moved, "to")],
         title=titles[kernel.name],
         head=f"{kernel.name}_piece",
         arguments=f"const double *coef, {'int far, ' * far}double *const *y, {'double *const *v, ' * varied}"
@@ -374,21 +377,33 @@ def over_rows(
         "alone": alone,
     }
     body = [line for case in cases if not isinstance(case, str) for line in case.orders]
-    body = [*dict.fromkeys(body), *_over_pieces(program, values, cases, labels or range(1, 1 + len(cases)))]
+    body = [*dict.fromkeys(body), *_over_pieces(program, layout, values, cases, labels or range(1, 1 + len(cases)))]
     return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": body, **more})
 
 
 def _over_pieces(
-    program: Program, values: Mapping[str, object], cases: Sequence[Case | str], labels: Sequence[int]
+    program: Program, layout: Layout, values: Mapping[str, object], cases: Sequence[Case | str], labels: Sequence[int]
 ) -> list[str]:
-    """The loop over pieces; short code tells the parts of H apart in it, other code has a loop for each."""
+    """The loop over pieces; short code tells the parts of H apart in it, other code has a loop for each.
+
+    What lies beside the open ends of a single row is read by their pieces alone: short code copies it of all fields.
+    """
     pieces = [case for case in cases if isinstance(case, Case)]
-    own = [[*case.setup, *case.calls] for case in pieces]
+    ends = [_copied_ends(program, layout, case.moved, case.where) for case in pieces]
+    own, last = [[*case.setup, *case.calls] for case in pieces], list[str]()
+    if layout.step.sites.open == (True,) and any(ends):
+        (line,) = _copied_ends(program, layout, ["k"], pieces[0].where)
+        last = [f"for (int k = 0; k < {program.name}_DIM; ++k) {line}"]
+    else:
+        own = [[*lines, *copied] for lines, copied in zip(own, ends, strict=True)]
     if len(own) > 1 and program.profile == "small" and all(lines[0].startswith(("at.", program.name)) for lines in own):
         changed = ["row"] * any("at.row." in line.split(" = ")[0] for lines in own for line in lines)
-        calls = ["switch (part) {", *_cases(own, labels), "}"]
+        calls = ["switch (part) {", *_cases(own, labels), "}", *last]
         return _piece(values, Case(calls, (), beside=False), changed)
-    loops = [[case] if isinstance(case, str) else _piece(values, case, [*case.setup, *case.orders]) for case in cases]
+    whole = iter([replace(case, calls=[*case.calls, *copied]) for case, copied in zip(pieces, ends, strict=True)])
+    loops = [
+        [case] if isinstance(case, str) else _piece(values, next(whole), [*case.setup, *case.orders]) for case in cases
+    ]
     return loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels), "}"]
 
 
