@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c1988f21fc937a0d1fcc426c4b2ab915579850a1c6b9aa4e4b848f52b8bb6f7e
+ * body-sha256: e9adc1c273ce8ddd90cb8f94954396e0cc420349eb3f4f32a92432544155f711
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -85,6 +85,7 @@ typedef struct {
     double side; /* 1, or -1 where a loop is told of bonds as if they ran the other way */
     const int *colours;
     int chosen; /* the colour that a part of H belongs to */
+    int across; /* whether it is that of the other ends of bonds, where a loop is told */
 } chiral_magnet_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -111,6 +112,7 @@ static inline void chiral_magnet_locate(const chiral_magnet_solver *s, chiral_ma
     row->side = 1.0;
     row->colours = s->colours;
     row->chosen = 0;
+    row->across = 0;
 }
 
 enum { chiral_magnet_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
@@ -170,8 +172,12 @@ static inline double chiral_magnet_turned_sin(double u, double offset)
 static inline double chiral_magnet_sin_lane(double u) { return chiral_magnet_turned_sin(u, 0.0); }
 
 /* what all other sites b add to the forces of H_1 at a site a
-   what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, x, z, with
-      other parameters at bonds, the other way */
+   what all other sites b add to the forces of H_1 at a site a, where x, y, z stand for its y, z, x, the other
+      way, across bonds
+   what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its z, x, y, with
+      other parameters at bonds, the other way
+   what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, z, x, with
+      other parameters at bonds, across bonds */
 static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
 {
@@ -179,7 +185,8 @@ static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magn
     const double *restrict y_row = row->x[1];
     for (ptrdiff_t i = from; i < to; ++i) {
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; row->colours[i] == row->chosen && k < row->bonds[i + 1]; ++k) {
+        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
+            if (row->colours[row->across ? row->other[k] : i] != row->chosen) continue;
             const ptrdiff_t j = row->other[k];
             const double side = k < row->middle[i] ? row->side : -row->side;
             const double y_b_ = y_row[j], Dx = side * row->at_bonds[0][k];
@@ -215,28 +222,8 @@ static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magn
     }
 }
 
-/* what all other sites b add to the forces of H_1 at a site a what all other sites b add to the forces of H_5
-   at a site a, with other parameters at bonds, the other way */
-static inline void chiral_magnet_gather1_1(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
-{
-    const double c1 = coef[1];
-    const double *restrict z_row = row->x[2];
-    for (ptrdiff_t i = from; i < to; ++i) {
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            if (row->colours[row->other[k]] != row->chosen) continue;
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? row->side : -row->side;
-            const double z_b_ = z_row[j], Dx = side * row->at_bonds[0][k];
-            sum0 += z_b_ * (Dx * c1);
-        }
-        row->gathered[0][i] = sum0;
-    }
-}
-
 /* what all other sites b add to the forces of H_2 at a site a
-   what all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, x, z
+   what all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, z, x
    what all other sites b add to the forces of H_4 at a site a, where x, y, z stand for its z, x, y */
 static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
     ptrdiff_t to)
@@ -281,9 +268,8 @@ static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, c
     int part = 1, colour = flow;
     for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
         colour -= own;
-    double *const z_x_y[] = { s->x[2], s->x[0], s->x[1] };
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
-    double *const y_x_z[] = { s->x[1], s->x[0], s->x[2] };
+    double *const z_x_y[] = { s->x[2], s->x[0], s->x[1] };
     double *const Dy_Dx[] = { s->at_bonds[1], s->at_bonds[0] };
     chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
     switch (part) {
@@ -291,7 +277,10 @@ static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, c
         at.row.chosen = colour;
         chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
         chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-        chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
+        at.row.side = -1.0;
+        at.row.across = 1;
+        at.row.x = y_z_x;
+        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
         at.row.x = z_x_y;
         chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
         break;
@@ -301,7 +290,7 @@ static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, c
         chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
         break;
     case 3: /* H_3 */
-        at.row.x = y_x_z;
+        at.row.x = y_z_x;
         chiral_magnet_gather2(coef, &at.row, at.from, at.to);
         at.row.x = z_x_y;
         chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
@@ -316,12 +305,14 @@ static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, c
         at.row.chosen = colour;
         at.row.at_bonds = Dy_Dx;
         at.row.side = -1.0;
-        at.row.x = y_x_z;
+        at.row.x = z_x_y;
         chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
         at.row.x = s->x;
         chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-        chiral_magnet_gather1_1(coef, &at.row, at.from, at.to);
+        at.row.side = 1.0;
+        at.row.across = 1;
         at.row.x = y_z_x;
+        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
         chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
         break;
     }

@@ -42,6 +42,9 @@ typedef struct {
 #if PHI_BY_COLOUR
     const int *colours;
     int chosen;                   /* the colour that a part of H belongs to */
+#if PHI_ACROSS
+    int across;                   /* whether it is that of the other ends of bonds, where a loop is told */
+#endif
 #endif
 #endif
 #if PHI_OPEN && !PHI_ONE_ROW
@@ -151,6 +154,9 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #if PHI_BY_COLOUR
     row->colours = s->colours;
     row->chosen = 0;
+#if PHI_ACROSS
+    row->across = 0;
+#endif
 #endif
 #endif
 #if PHI_COLOURS

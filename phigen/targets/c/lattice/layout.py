@@ -135,6 +135,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "BY_COLOUR": bool(step.by_colour),
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "SIDED": program.profile == "small" and bool(step.parts),
+        "ACROSS": program.profile == "small" and not step.adjoint and {"here", "there"} <= chosen_ends(step),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
         "HANDS": any(hands(step)),
         "SHARES": shares(step),
@@ -154,6 +155,12 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
+
+
+def chosen_ends(step: Sweeps) -> set[str]:
+    """At which ends of the bonds that sweeps add up there may be the sites of a colour."""
+    gathers = (sweep.gather for part in step.parts for sweep in part if sweep.gather)
+    return {ends.chosen for gather in gathers for ends in gather.ends}
 
 
 def site_blocks(program: Program, step: Sweeps, layout: Layout) -> bool:

@@ -8,7 +8,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout
+from phigen.targets.c.lattice.layout import Layout, switches
 from phigen.targets.c.lattice.loops import Loop, in_loops, seen_calls
 from phigen.targets.c.lattice.names import SiteNames, pointers
 from phigen.targets.code import lower
@@ -43,14 +43,23 @@ def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> 
 _BONDS = {"": "row->bonds[i]; k < row->bonds[i + 1]", "a": "row->bonds[i]; k < row->middle[i]",
           "b": "row->middle[i]; k < row->bonds[i + 1]"}  # fmt: skip
 _PASSED = {"there": "row->colours[row->other[k]] != row->chosen"}
+_TOLD = "row->colours[row->across ? row->other[k] : i] != row->chosen"
 
 
-def bonds_of(ends: Ends) -> tuple[str, list[str]]:
-    """The loop over the bonds of a site i that are meant, and the statement that passes some of them over."""
-    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" else ""
+def bonds_of(ends: Ends, *, told: bool = False) -> tuple[str, list[str]]:
+    """The loop over the bonds of a site i that are meant, and the statement that passes some of them over; it may be
+    ``told`` at which of their ends there are sites of the colour that is chosen."""
+    told = told and ends.chosen != ""
+    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" and not told else ""
     bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
-    passed = [f"if ({_PASSED[ends.chosen]}) continue;"] if ends.chosen in _PASSED else []
+    meant = _TOLD if told else _PASSED.get(ends.chosen)
+    passed = [f"if ({meant}) continue;"] if meant else []
     return f"for (ptrdiff_t k = {bounds}; ++k) {{", passed
+
+
+def is_told_ends(program: Program, layout: Layout) -> bool:
+    """Whether loops over bonds are told at which of their ends there are sites of the colour that is chosen."""
+    return switches(program, layout.step, layout)["ACROSS"]
 
 
 def _over_bonds(
@@ -75,7 +84,7 @@ def _over_bonds(
     added = [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
     out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
     one = "row->side" if program.profile == "small" and layout.step.parts else "1.0"
-    loop, passed = bonds_of(ends)
+    loop, passed = bonds_of(ends, told=is_told_ends(program, layout))
     reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
     reads += [f"const double side = k < row->middle[i] ? {one} : -{one};"] * bool(opposite)
     inner = [*passed, *reads, *other, *values, *added]

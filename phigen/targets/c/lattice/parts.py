@@ -26,7 +26,7 @@ from phigen.targets.c.lattice.loops import (
     site_block,
     sweep_loop,
 )
-from phigen.targets.c.lattice.partners import gathering, partners
+from phigen.targets.c.lattice.partners import gathering, is_told_ends, partners
 from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
 from phigen.targets.rendering import render
 
@@ -208,7 +208,8 @@ class Case:
 class _Call:
     """A loop for some sites of a piece: the text of the last two arguments; the ``colour`` that it is told, if any; the
     fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
-    likewise, and the ``side`` that bonds are seen from; ``others`` would do the same."""
+    likewise, and the ``side`` that bonds are seen from; whether the colour that is chosen lies ``across`` them;
+    ``others`` would do the same."""
 
     loop: Loop
     sites: str = "at.from, at.to"
@@ -216,12 +217,14 @@ class _Call:
     order: tuple[str, ...] = ()
     bonds: tuple[str, ...] | None = None
     side: float | None = None
+    across: bool | None = None
     others: tuple[_Call, ...] = ()
 
     def purpose(self, fields: Sequence[str]) -> str:
         """What the loop is for."""
         said = f", where {', '.join(fields)} stand for its {', '.join(self.order)}" if self.order else ""
         said += ", with other parameters at bonds" * bool(self.bonds) + ", the other way" * (self.side == -1.0)
+        said += ", across bonds" * bool(self.across)
         return self.loop.purpose + said
 
 
@@ -231,6 +234,7 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
     colour: int | None = 0
     bonds: tuple[str, ...] | None = ()
     side: float | None = 1.0
+    across: bool | None = False
     for call in called:
         if call.bonds not in (bonds, None):
             bonds = call.bonds
@@ -238,6 +242,9 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
         if call.side not in (side, None):
             side = call.side
             yield f"at.row.side = {side!r};"
+        if call.across not in (across, None):
+            across = call.across
+            yield f"at.row.across = {int(across)};"
         if call.colour not in (colour, None):
             colour = call.colour
             yield f"at.row.swept = {colour};"
@@ -268,13 +275,16 @@ def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]
 
 def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[_Call]:
     """The loops of a sweep, in the order in which they are called for a piece of a row."""
+    told = layout.graph and is_told_ends(program, layout)
+    meant = [ends.chosen for ends, _ in over_ends(sweep.gather)] if sweep.gather else []
+    across = [chosen == "there" if told and chosen else None for chosen in meant]
     for k, loop in enumerate(gathering(program, layout, sweep.gather, "coef") if sweep.gather else ()):
         others = []
         alone = program.profile == "fast" or layout.step.adjoint
         for gather, bonds, side in () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather):
             again = [*gathering(program, layout, gather, "coef")]
-            others.append(_Call(again[k], bonds=bonds, side=side))
-        yield _Call(loop, bonds=(), side=1.0, others=tuple(others))
+            others.append(_Call(again[k], bonds=bonds, side=side, across=across[k]))
+        yield _Call(loop, bonds=(), side=1.0, across=across[k], others=tuple(others))
     loops = [
         sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
         for kernel, more in forms_of(program, sweep.kernel)

@@ -18,9 +18,12 @@ MOST_FIELDS = 3
 
 
 def orders(fields: Sequence[str]) -> Iterator[tuple[str, ...]]:
-    """All orders of some fields but their own; none where they are many."""
+    """All orders of some fields but their own, first those that turn them round, which parts of H often share; none
+    where they are many."""
     own = tuple(fields)
-    return (order for order in permutations(own) if order != own and len(own) <= MOST_FIELDS)
+    round_ = [own[k:] + own[:k] for k in range(1, len(own))]
+    found = dict.fromkeys([*round_, *permutations(own)]) if len(own) <= MOST_FIELDS else ()
+    return (order for order in found if order != own)
 
 
 def turned_increments(sites: Sites, fields: Sequence[str], order: Sequence[str]) -> dict[str, str]:
