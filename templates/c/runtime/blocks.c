@@ -152,7 +152,7 @@ enum {
     PHI_MEETINGS = 3 /* evaluations of a stage until its point is nearly where alpha(y) = x */
 };
 
-#define PHI_FAR 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
+#define PHI_ASTRAY 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
 
 /* Make a step by Adams' method of order 9, predicted by that of order 8, from x with the slope given, before which are those
    of earlier steps. 0, and x as before, where the two differ much: the steps are too long for them then. */
@@ -185,7 +185,7 @@ static int phi_adams(const phi_solver *s, double (*slope)[PHI_DIM], double x[PHI
 #endif
     for (int i = 0; i < PHI_DIM; ++i) {
         corrected[i] += s->h * next * ahead[i];
-        far += !(fabs(corrected[i] - predicted[i]) <= PHI_FAR * (fabs(x[i]) + fabs(s->h * ahead[i])));
+        far += !(fabs(corrected[i] - predicted[i]) <= PHI_ASTRAY * (fabs(x[i]) + fabs(s->h * ahead[i])));
     }
     if (far > 0) return 0;
     memcpy(x, corrected, sizeof corrected);
