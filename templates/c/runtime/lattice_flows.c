@@ -194,7 +194,7 @@ static int phi_try(phi_solver *s, size_t steps)
     return 0;
 }
 
-#if PHI_NEAR
+#if PHI_NEAR && !PHI_NOISE || PHI_NEAR && PHI_ADJOINT
 /* The last flow of a step, by functions for large arguments if need be; whether it leads to finite values. */
 static int phi_close(phi_solver *s)
 {
