@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -46,8 +47,23 @@ def lattice_text(spec: Spec) -> str:
     return spec_text(found)
 
 
-def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:
+def typed_sizes(given: str) -> tuple[int, ...] | None:
+    """Sizes as they are typed, ``3x3``; None for another text."""
+    found = re.fullmatch(r"[1-9][0-9]{0,9}(x[1-9][0-9]{0,9})*", given)
+    return tuple(map(int, given.split("x"))) if found else None
+
+
+def too_small(cell: Cell, sizes: Sequence[int], given: str) -> str:
+    """What is said of sizes that the stencil does not fit in, nothing of others."""
     from phigen.lattice.building import least_sizes
+
+    least = least_sizes(cell)
+    if all(size >= room for size, room in zip(sizes, least, strict=False)):
+        return ""
+    return f"{given} is too small for the stencil; sizes are at least {'x'.join(map(str, least))}"
+
+
+def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:
     from phigen.lattice.expansion import expand, ring
     from phigen.lattice.states import start_of
     from phigen.spec import limits
@@ -55,8 +71,8 @@ def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:
     if given in spec.runs:
         start = start_of(spec, spec.runs[given])
         sizes, bonds = start.sizes, [(int(a), int(b)) for a, b in start.bonds]
-    elif re.fullmatch(r"[1-9][0-9]{0,6}(x[1-9][0-9]{0,6})*", given):
-        sizes = tuple(map(int, given.split("x")))
+    elif typed := typed_sizes(given):
+        sizes = typed
         bonds = ring(sizes[0]) if cell.relation == "graph" else []
     else:
         runs = f", or the name of a run: {', '.join(spec.runs)}" if spec.runs else ""
@@ -67,10 +83,8 @@ def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:
     if count > limits.COORDINATES:
         message = f"{count} coordinates; an ordinary spec has at most {limits.COORDINATES}"
         raise LimitError([Diagnostic(f"{spec.file}: {OPTION} {given}: {message}")])
-    small = [n < least for n, least in zip(sizes, least_sizes(cell), strict=False)]
-    if any(small):
-        least = "x".join(map(str, least_sizes(cell)))
-        raise SpecError([Diagnostic(f"{spec.file}: {given} is too small for the stencil; sizes are at least {least}")])
+    if small := too_small(cell, sizes, given):
+        raise SpecError([Diagnostic(f"{spec.file}: {small}")])
     try:
         return expand(cell, sizes, bonds)
     except ValueError as error:
