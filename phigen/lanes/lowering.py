@@ -160,10 +160,9 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     looped = [kernel for kernel in step.kernels if kernel is not step.prepare and kernel.name not in energies]
     if program.profile == "small":
         return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
-    used = operations(swept)
-    called = used & _called_in_forms(step)
+    called = operations(swept) & _called_in_forms(step)
     near = tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
-    limited = frozenset({*near, *LANE_FUNCTIONS, *LANE_FORMULAS} & used)
+    limited = frozenset({*near, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)
     return Rows(with_formulas(operations(looped)), near, limited)
 
 
