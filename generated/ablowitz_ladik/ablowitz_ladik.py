@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 3b89a7df6fa738b5d1bc6e066b457341867d4ee98d7454b6e8b1c90fe362ff50
+# body-sha256: 36d86bbec200531ea958057db02ae56f39a1b1970dd4d1b8ca5759f2cf71ee04
 import numpy as np
 
 VERSION = "0.1.0"
@@ -31,10 +31,6 @@ POSITIVE = ()
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -115,15 +111,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -252,7 +239,7 @@ def _sweep1(coef, x, sites):
     t4 = t3 + t2 * t3
     t5 = coef[1] * _sinroot(t4)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (-((t1 * (y * y) + (t1 + t2 * t1)) * t5 * np.where(_cosroot(t4) + y * t1 * t5 > 0.0, 1.0 / (_cosroot(t4) + y * t1 * t5), np.nan))), x[1])
+    moved[1] = x[1] + (-((t1 * (y * y) + (t1 + t2 * t1)) * t5 * np.where(_cosroot(t4) + y * t1 * t5 > 0.0, 1.0 / (_cosroot(t4) + y * t1 * t5), np.nan)))
     return moved
 
 
@@ -260,8 +247,8 @@ def _sweep2(coef, x, sites):
     x_ = x[0]
     y = x[1]
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(coef[3] * y + coef[2] * x_)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (coef[3] * x_ - coef[2] * y), x[1])
+    moved[0] = x[0] + (-(coef[3] * y + coef[2] * x_))
+    moved[1] = x[1] + (coef[3] * x_ - coef[2] * y)
     return moved
 
 
@@ -276,7 +263,7 @@ def _sweep3(coef, x, sites):
     t4 = t3 + t1 * t3
     t5 = coef[1] * _sinroot(t4)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + ((t1 * t2 + (t2 + x_ * x_ * t2)) * t5 * np.where(_cosroot(t4) - x_ * t2 * t5 > 0.0, 1.0 / (_cosroot(t4) - x_ * t2 * t5), np.nan)), x[0])
+    moved[0] = x[0] + ((t1 * t2 + (t2 + x_ * x_ * t2)) * t5 * np.where(_cosroot(t4) - x_ * t2 * t5 > 0.0, 1.0 / (_cosroot(t4) - x_ * t2 * t5), np.nan))
     return moved
 
 

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 18be6e42d4c16f0a5bb452dbfac0ba1b9fdf443cd5fe5e0f83a38fa03aba5ee9
+# body-sha256: 49cf75b0aaf1633a2c5a6285bf6d5b98a1f28f5bf23be259738d201ac6d5e600
 import numpy as np
 
 VERSION = "0.1.0"
@@ -37,10 +37,6 @@ POSITIVE = ()
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -121,15 +117,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 # Parameters that may be arrays with a value at each bond.
@@ -430,8 +417,8 @@ def _sweep1_0(coef, x, sites):
     t2 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     t3 = np.sin(t1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(x_ * t2 + y * t3)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (x_ * t3 - y * t2), x[1])
+    moved[0] = x[0] + (-(x_ * t2 + y * t3))
+    moved[1] = x[1] + (x_ * t3 - y * t2)
     return moved
 
 
@@ -443,8 +430,8 @@ def _sweep1_1(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (z * t2 - x_ * t3), x[0])
-    moved[2] = sites.coloured(0, x[2] + (-(z * t3 + x_ * t2)), x[2])
+    moved[0] = x[0] + (z * t2 - x_ * t3)
+    moved[2] = x[2] + (-(z * t3 + x_ * t2))
     return moved
 
 
@@ -456,8 +443,8 @@ def _sweep2(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (-(z * t2 + y * t3)), x[1])
-    moved[2] = sites.coloured(0, x[2] + (y * t2 - z * t3), x[2])
+    moved[1] = x[1] + (-(z * t2 + y * t3))
+    moved[2] = x[2] + (y * t2 - z * t3)
     return moved
 
 
@@ -469,8 +456,8 @@ def _sweep3(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (z * t2 - x_ * t3), x[0])
-    moved[2] = sites.coloured(0, x[2] + (-(z * t3 + x_ * t2)), x[2])
+    moved[0] = x[0] + (z * t2 - x_ * t3)
+    moved[2] = x[2] + (-(z * t3 + x_ * t2))
     return moved
 
 
@@ -483,8 +470,8 @@ def _sweep4(coef, x, sites):
     t2 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     t3 = np.sin(t1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(x_ * t2 + y * t3)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (x_ * t3 - y * t2), x[1])
+    moved[0] = x[0] + (-(x_ * t2 + y * t3))
+    moved[1] = x[1] + (x_ * t3 - y * t2)
     return moved
 
 
@@ -496,8 +483,8 @@ def _sweep5_0(coef, x, sites):
     t2 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     t3 = np.sin(t1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(x_ * t2 + y * t3)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (x_ * t3 - y * t2), x[1])
+    moved[0] = x[0] + (-(x_ * t2 + y * t3))
+    moved[1] = x[1] + (x_ * t3 - y * t2)
     return moved
 
 
@@ -509,8 +496,8 @@ def _sweep5_1(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (-(z * t2 + y * t3)), x[1])
-    moved[2] = sites.coloured(0, x[2] + (y * t2 - z * t3), x[2])
+    moved[1] = x[1] + (-(z * t2 + y * t3))
+    moved[2] = x[2] + (y * t2 - z * t3)
     return moved
 
 

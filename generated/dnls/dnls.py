@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: af1dacf249e66b057bdaa4345f26f846902426f1348210f0d5974c7a50fddae5
+# body-sha256: 5a26bc30d0d2e691a3cd04dbc0bc30a37f0c75934e9c73cdc51e4d990c446ad5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -32,10 +32,6 @@ POSITIVE = ()
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -116,15 +112,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -209,7 +196,7 @@ def _sweep1(coef, x, sites):
     p_i_1_ = sites.shifted(x[1], 1)
     p_i_1__ = sites.shifted(x[1], -1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(coef[0] * (p_i_1_ + p_i_1__))), x[0])
+    moved[0] = x[0] + (-(coef[0] * (p_i_1_ + p_i_1__)))
     return moved
 
 
@@ -217,7 +204,7 @@ def _sweep2(coef, x, sites):
     q_i_1_ = sites.shifted(x[0], 1)
     q_i_1__ = sites.shifted(x[0], -1)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (coef[0] * (q_i_1_ + q_i_1__)), x[1])
+    moved[1] = x[1] + (coef[0] * (q_i_1_ + q_i_1__))
     return moved
 
 
@@ -228,8 +215,8 @@ def _sweep3(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (p * t2 - q * t3), x[0])
-    moved[1] = sites.coloured(0, x[1] + (-(p * t3 + q * t2)), x[1])
+    moved[0] = x[0] + (p * t2 - q * t3)
+    moved[1] = x[1] + (-(p * t3 + q * t2))
     return moved
 
 

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c47caee59bd36d10df3ddd33d0f5ef7fff665d0555a3edd38f5e9855ca12665b
+# body-sha256: 09fc29e1a4eeaa78d6975cd61e58ca113a9e4c9a62847c09aab884ea2653ec2b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ()
 OPEN = (True,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -210,7 +197,7 @@ def _sweep1(coef, x, sites):
     p_i_1_ = sites.shifted(x[1], 1)
     p_i_1__ = sites.shifted(x[1], -1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(coef[0] * (p_i_1__ * sites.present(-1, 0) + p_i_1_ * sites.present(0, 1)))), x[0])
+    moved[0] = x[0] + (-(coef[0] * (p_i_1__ * sites.present(-1, 0) + p_i_1_ * sites.present(0, 1))))
     return moved
 
 
@@ -218,7 +205,7 @@ def _sweep2(coef, x, sites):
     q_i_1_ = sites.shifted(x[0], 1)
     q_i_1__ = sites.shifted(x[0], -1)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (coef[0] * (sites.present(0, 1) * q_i_1_ + sites.present(-1, 0) * q_i_1__)), x[1])
+    moved[1] = x[1] + (coef[0] * (sites.present(0, 1) * q_i_1_ + sites.present(-1, 0) * q_i_1__))
     return moved
 
 
@@ -230,8 +217,8 @@ def _sweep3(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (p * t2 - q * t3), x[0])
-    moved[1] = sites.coloured(0, x[1] + (-(q * t2 + p * t3)), x[1])
+    moved[0] = x[0] + (p * t2 - q * t3)
+    moved[1] = x[1] + (-(q * t2 + p * t3))
     return moved
 
 

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: c8a1199a3954d2e2fc66de5c00adc9d844c5e914537993c77aadb2e794581b09
+# body-sha256: 54e33aa6e40e107c7d26db1fa4cd14a77703ec144e97be4344750c22bb1e6bb1
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ("k",)
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 # Parameters that may be arrays with a value at each bond.
@@ -309,7 +296,7 @@ def _sweep1(coef, x, sites):
     gathered = _gather1(coef, x, sites)
     x_ = x[0]
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (x_ * np.expm1(coef[0] * gathered[0])), x[0])
+    moved[0] = x[0] + (x_ * np.expm1(coef[0] * gathered[0]))
     return moved
 
 

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 85c1e268574c29a47187b52733328f162228af1e544d901c99e529ad4c14f9b5
+# body-sha256: 989db2f62d96db1c6cb7a0dde1c66dc848c3946a404daf5a3473fe3ae9ae2fa9
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ()
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -216,14 +203,14 @@ def _sweep1(coef, x, sites):
     t3 = q_i_1_ - q
     t4 = t3 * t3
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (coef[2] * (coef[1] * (t2 - t4) + (t1 + (q - q_i_1_) + coef[0] * (t1 * t2 - t3 * t4)))), x[1])
+    moved[1] = x[1] + (coef[2] * (coef[1] * (t2 - t4) + (t1 + (q - q_i_1_) + coef[0] * (t1 * t2 - t3 * t4))))
     return moved
 
 
 def _sweep2(coef, x, sites):
     p = x[1]
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (coef[3] * p), x[0])
+    moved[0] = x[0] + (coef[3] * p)
     return moved
 
 

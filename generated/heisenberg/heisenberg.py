@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 9718f0fffb47d030d27f2785119359895acaac9e92229e0f167fddbfc6bc543a
+# body-sha256: cd8128d9f668cd265a63e9f94dc7a4ed5b29e3b376ac6fdd352aea3421675bfe
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ()
 OPEN = (False, False, False,)
 LEAST = (2, 2, 2,)
 PERIODS = (1, 1, 1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0, 0, 0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -219,8 +206,8 @@ def _sweep1(coef, x, sites):
     t2 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     t3 = np.sin(t1)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (-(y * t2 + z * t3)), x[1])
-    moved[2] = sites.coloured(0, x[2] + (y * t3 - z * t2), x[2])
+    moved[1] = x[1] + (-(y * t2 + z * t3))
+    moved[2] = x[2] + (y * t3 - z * t2)
     return moved
 
 
@@ -237,8 +224,8 @@ def _sweep2(coef, x, sites):
     t2 = np.sin(t1)
     t3 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (z * t2 - x_ * t3), x[0])
-    moved[2] = sites.coloured(0, x[2] + (-(z * t3 + x_ * t2)), x[2])
+    moved[0] = x[0] + (z * t2 - x_ * t3)
+    moved[2] = x[2] + (-(z * t3 + x_ * t2))
     return moved
 
 
@@ -256,8 +243,8 @@ def _sweep3(coef, x, sites):
     t2 = (2.0 * np.sin(0.5 * (t1)) ** 2)
     t3 = np.sin(t1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (-(x_ * t2 + y * t3)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (x_ * t3 - y * t2), x[1])
+    moved[0] = x[0] + (-(x_ * t2 + y * t3))
+    moved[1] = x[1] + (x_ * t3 - y * t2)
     return moved
 
 

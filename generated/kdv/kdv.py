@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 990247718073adce04015ac34bea41b5e6ea7dd1bde81f7b50cf5882c968a8e7
+# body-sha256: ef8f932e775aa88b9394e4cf310b30730b11ee106954797b20c04d64f7a73772
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ("d",)
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 # Sweeps that a stage may take; values that guesses are extrapolated from; a change by this part of y may be rounding.

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 69df183689045e2e35e8672d9d120ac0d9eedffbc54f277d7e74e10a6eb662c8
+# body-sha256: 3ab7ec98f7c89e1418e9f9d7d28b5b1686835c83a109c822d794e1749e5e7402
 import numpy as np
 
 VERSION = "0.1.0"
@@ -32,10 +32,6 @@ POSITIVE = ("d",)
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -116,15 +112,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -211,14 +198,14 @@ def _sweep1(coef, x, sites):
     q_i_1_ = sites.shifted(x[0], 1)
     q_i_1__ = sites.shifted(x[0], -1)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (-(coef[1] * (coef[0] * (q - q_i_1__) + (q * (q * q - 1.0) - coef[0] * (q_i_1_ - q))))), x[1])
+    moved[1] = x[1] + (-(coef[1] * (coef[0] * (q - q_i_1__) + (q * (q * q - 1.0) - coef[0] * (q_i_1_ - q)))))
     return moved
 
 
 def _sweep2(coef, x, sites):
     p = x[1]
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (coef[1] * p), x[0])
+    moved[0] = x[0] + (coef[1] * p)
     return moved
 
 

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: dfdd2375b8b5ca242eeda3d7d64e5895472a63e88841117a2ef426d60e069086
+# body-sha256: 50e125af42ff6524d91489c7248d865e9d07a3fb0abfffdb586e9d5196ac4b05
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ("d",)
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -213,7 +200,7 @@ def _sweep1(coef, x, sites):
     u = x[0]
     u_i_1_ = sites.shifted(x[0], -1)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (coef[2] * (coef[0] * u + coef[1] * (u * (u * u)) - (coef[0] * u_i_1_ + coef[1] * (u_i_1_ * (u_i_1_ * u_i_1_))))), x[1])
+    moved[1] = x[1] + (coef[2] * (coef[0] * u + coef[1] * (u * (u * u)) - (coef[0] * u_i_1_ + coef[1] * (u_i_1_ * (u_i_1_ * u_i_1_)))))
     return moved
 
 
@@ -221,7 +208,7 @@ def _sweep2(coef, x, sites):
     v_ = x[1]
     v_i_1_ = sites.shifted(x[1], 1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (coef[3] * (v_i_1_ - v_)), x[0])
+    moved[0] = x[0] + (coef[3] * (v_i_1_ - v_))
     return moved
 
 

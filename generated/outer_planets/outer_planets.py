@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 1add6c7b9a4f3350ad514a6446bdd65ba5f40e229ef384e8dc1bce9d051d54b3
+# body-sha256: 48e99e3b0940bcf2aa9dd5f066c8c18405c0ad32636e8fba2bd0053e30401dda
 import numpy as np
 
 VERSION = "0.1.0"
@@ -33,10 +33,6 @@ POSITIVE = ("m",)
 OPEN = (False,)
 LEAST = (1,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -117,15 +113,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -276,9 +263,9 @@ def _forces(parameters, x, sites):
 def _sweep1(coef, x, sites):
     gathered = _gather1(coef, x, sites)
     moved = x.copy()
-    moved[3] = sites.coloured(0, x[3] + (-(coef[0] * gathered[0])), x[3])
-    moved[4] = sites.coloured(0, x[4] + (-(coef[0] * gathered[1])), x[4])
-    moved[5] = sites.coloured(0, x[5] + (-(coef[0] * gathered[2])), x[5])
+    moved[3] = x[3] + (-(coef[0] * gathered[0]))
+    moved[4] = x[4] + (-(coef[0] * gathered[1]))
+    moved[5] = x[5] + (-(coef[0] * gathered[2]))
     return moved
 
 
@@ -289,9 +276,9 @@ def _sweep2(coef, x, sites):
     pz = x[5]
     t1 = 1.0 / m
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (coef[0] * (px * t1)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (coef[0] * (py * t1)), x[1])
-    moved[2] = sites.coloured(0, x[2] + (coef[0] * (pz * t1)), x[2])
+    moved[0] = x[0] + (coef[0] * (px * t1))
+    moved[1] = x[1] + (coef[0] * (py * t1))
+    moved[2] = x[2] + (coef[0] * (pz * t1))
     return moved
 
 

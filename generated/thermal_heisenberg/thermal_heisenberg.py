@@ -14,7 +14,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 11fb24d3438187e25cf1b60aad2b7995e20db9339f2a77fc9b8ed4303459a8d2
+# body-sha256: b5963274362c9203420ec6a700fea6635ebe7d2dbca21d25ef0a4bee44725da1
 import numpy as np
 
 VERSION = "0.1.0"
@@ -127,8 +127,6 @@ class _Sites:
 
     def coloured(self, colour, new, old):
         """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
         if colour not in self._known:
             total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
             self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
@@ -353,7 +351,7 @@ def _sweep3(coef, x, sites):
     return moved
 
 
-def _sweep4(coef, x, sites):
+def _sweep4(coef, x, sites, colour=0):
     x_ = x[0]
     x_i_1_ = sites.shifted(x[0], 1)
     x_i_1__ = sites.shifted(x[0], -1)
@@ -377,9 +375,9 @@ def _sweep4(coef, x, sites):
     t12 = y + coef[2] * t11
     t13 = (t9 * t10 + (t11 * t12 + t7 * t8)) * np.where(t10 * t10 + (t12 * t12 + t8 * t8) > 0.0, 1.0 / (t10 * t10 + (t12 * t12 + t8 * t8)), 0.0)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (coef[3] * (t7 - t8 * t13)), x[0])
-    moved[1] = sites.coloured(0, x[1] + (coef[3] * (t11 - t12 * t13)), x[1])
-    moved[2] = sites.coloured(0, x[2] + (coef[3] * (t9 - t10 * t13)), x[2])
+    moved[0] = sites.coloured(colour, x[0] + (coef[3] * (t7 - t8 * t13)), x[0])
+    moved[1] = sites.coloured(colour, x[1] + (coef[3] * (t11 - t12 * t13)), x[1])
+    moved[2] = sites.coloured(colour, x[2] + (coef[3] * (t9 - t10 * t13)), x[2])
     return moved
 
 
@@ -426,33 +424,7 @@ def _sweep7(coef, x, sites):
 
 
 def _sweep8(coef, x, sites):
-    x_ = x[0]
-    x_i_1_ = sites.shifted(x[0], 1)
-    x_i_1__ = sites.shifted(x[0], -1)
-    y = x[1]
-    y_i_1_ = sites.shifted(x[1], 1)
-    y_i_1__ = sites.shifted(x[1], -1)
-    z = x[2]
-    z_i_1_ = sites.shifted(x[2], 1)
-    z_i_1__ = sites.shifted(x[2], -1)
-    t1 = sites.present(-1, 0) * x_i_1__ + sites.present(0, 1) * x_i_1_
-    t2 = z * z + (x_ * x_ + y * y)
-    t3 = sites.present(0, 1) * z_i_1_ + sites.present(-1, 0) * z_i_1__
-    t4 = sites.present(-1, 0) * y_i_1__ + sites.present(0, 1) * y_i_1_
-    t5 = coef[1] * (t2 * (t3 * t3 + (t4 * t4 + t1 * t1)))
-    t6 = t2 * (_sinroot(t5) / _cosroot(t5))
-    t7 = t1 * t6
-    t8 = x_ + coef[2] * t7
-    t9 = t3 * t6
-    t10 = z + coef[2] * t9
-    t11 = t4 * t6
-    t12 = y + coef[2] * t11
-    t13 = (t9 * t10 + (t11 * t12 + t7 * t8)) * np.where(t10 * t10 + (t12 * t12 + t8 * t8) > 0.0, 1.0 / (t10 * t10 + (t12 * t12 + t8 * t8)), 0.0)
-    moved = x.copy()
-    moved[0] = sites.coloured(1, x[0] + (coef[3] * (t7 - t8 * t13)), x[0])
-    moved[1] = sites.coloured(1, x[1] + (coef[3] * (t11 - t12 * t13)), x[1])
-    moved[2] = sites.coloured(1, x[2] + (coef[3] * (t9 - t10 * t13)), x[2])
-    return moved
+    return _sweep4(coef, x, sites, colour=1)
 
 
 # The sweeps of each part of H.

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 34b9dbf54e2c974510197c644e29d19d4b17634b65aef3e066ff218debb5822d
+# body-sha256: 5d47932f54fad1d5f407afe380595cc0ef7e031750b6ee937be2af49e26b9fc5
 import numpy as np
 
 VERSION = "0.1.0"
@@ -31,10 +31,6 @@ POSITIVE = ()
 OPEN = (False,)
 LEAST = (2,)
 PERIODS = (1,)
-
-# The colour of a site is the sum of these multiples of its position, modulo their number.
-COLOURS = 1
-COLOUR_WEIGHTS = (0,)
 
 # The times of the flows of one step, as fractions of it, each with coefficients of its own; and the flows in order: the
 # part of H, and its row.
@@ -115,15 +111,6 @@ class _Sites:
                 there = there * (place + low >= 0) * (place + high < size)
             self._known[bounds] = there
         return self._known[bounds]
-
-    def coloured(self, colour, new, old):
-        """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
-        if colour not in self._known:
-            total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
-            self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
-        return np.where(self._known[colour], new, old)
 
 
 def _advance(sites, rows, x, past):
@@ -207,7 +194,7 @@ def _sweep1(coef, x, sites):
     a = x[0]
     a_i_1_ = sites.shifted(x[0], -1)
     moved = x.copy()
-    moved[1] = sites.coloured(0, x[1] + (coef[0] * (a * a - a_i_1_ * a_i_1_)), x[1])
+    moved[1] = x[1] + (coef[0] * (a * a - a_i_1_ * a_i_1_))
     return moved
 
 
@@ -216,7 +203,7 @@ def _sweep2(coef, x, sites):
     b = x[1]
     b_i_1_ = sites.shifted(x[1], 1)
     moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (a * np.expm1(coef[1] * (b_i_1_ - b))), x[0])
+    moved[0] = x[0] + (a * np.expm1(coef[1] * (b_i_1_ - b)))
     return moved
 
 

@@ -10,7 +10,7 @@
 # DO NOT EDIT: change the spec and regenerate; edits are noticed by the checksum below.
 # SPDX-License-Identifier: 0BSD
 # This file belongs to whoever generated it; phigen claims no rights in it.
-# body-sha256: 4b7216246a02ade653d91b425627e4e6f9d9ca4217c2a49168ccff35a654a1ba
+# body-sha256: 6da00a89922be0388f4ea40a608ce1abb57286a5f76fde8c76b0a1eab4be914b
 import numpy as np
 
 VERSION = "0.1.0"
@@ -118,8 +118,6 @@ class _Sites:
 
     def coloured(self, colour, new, old):
         """The new values at sites of a colour, the old ones elsewhere."""
-        if COLOURS == 1:
-            return new
         if colour not in self._known:
             total = sum(weight * place for weight, place in zip(COLOUR_WEIGHTS, self._positions))
             self._known[colour] = np.broadcast_to(total % COLOURS == colour, self.sizes)
@@ -203,22 +201,17 @@ def _prepare(parameters, h):
     return [h]
 
 
-def _sweep1(coef, x, sites):
+def _sweep1(coef, x, sites, colour=1):
     a = x[0]
     a_i_1_ = sites.shifted(x[0], 1)
     a_i_1__ = sites.shifted(x[0], -1)
     moved = x.copy()
-    moved[0] = sites.coloured(1, x[0] + (a * np.expm1(coef[0] * (a_i_1_ - a_i_1__))), x[0])
+    moved[0] = sites.coloured(colour, x[0] + (a * np.expm1(coef[0] * (a_i_1_ - a_i_1__))), x[0])
     return moved
 
 
 def _sweep2(coef, x, sites):
-    a = x[0]
-    a_i_1_ = sites.shifted(x[0], 1)
-    a_i_1__ = sites.shifted(x[0], -1)
-    moved = x.copy()
-    moved[0] = sites.coloured(0, x[0] + (a * np.expm1(coef[0] * (a_i_1_ - a_i_1__))), x[0])
-    return moved
+    return _sweep1(coef, x, sites, colour=0)
 
 
 # The sweeps of each part of H.

@@ -12,9 +12,8 @@ from phigen.targets import special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import facts
 from phigen.targets.names import Scope
-from phigen.targets.numpy import lattice_adjoint
+from phigen.targets.numpy import colours, lattice_adjoint
 from phigen.targets.numpy.language import LANGUAGE, listed, quoted
-from phigen.targets.numpy.lattice_adjoint import chosen
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
 
@@ -36,6 +35,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         "open": listed(sites.open),
         "least": listed(sites.least),
         "periods": listed(sites.periods),
+        "parted": sites.colours > 1,
         "colours": sites.colours,
         "colour_weights": listed(sites.weights),
         "times": listed(schedule.times),
@@ -82,7 +82,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     ]
     pieces += _gathers(program, step)
     every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
-    pieces += [_sweep(program, step, sweep) for sweep in every]
+    pieces += colours.functions(step, (_sweep(program, step, sweep) for sweep in every))
     if step.equation:
         pieces += [_at_middle(program, step, kernel) for kernel in step.equation.kernels]
     else:
@@ -101,21 +101,20 @@ def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]]) -> str:
     return "\n".join([f"# {comment}", f"{name} = (", *listed, ")\n"])
 
 
-def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> str:
-    """One sweep as a function from a state to the next, or from a variation of the state to the next."""
+def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> tuple[Sweep, str, str, list[str]]:
+    """One sweep as a function from a state to the next, or from a variation of the state to the next: its parts."""
     kernel, code = sweep.kernel, lower(sweep.kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"v", "moved", "gathered"})
+    scope = Scope(PYTHON_RESERVED | _OWN | {"v", "moved", "gathered", "colour"})
     own, given = ("v", "x, v") if sweep.is_tangent else ("x", "x")
-    lines = [f"def _{kernel.name}(coef, {given}, sites):"]
-    lines += [f"    gathered = _{_sums_of(sweep)}(coef, {given}, sites)"] if sweep.gather else []
+    lines = [f"    gathered = _{_sums_of(sweep)}(coef, {given}, sites)"] if sweep.gather else []
     names = sweep.gather.names if sweep.gather else ()
     lines += [*_body(program, step, kernel, code, scope, names), f"    moved = {own}.copy()"]
     show = LANGUAGE.printer(scope)
     for store in code.stores:
         place = f"[{sweep.moved[store.index]}]"
         new = f"{own}{place} + ({show(store.value)})"
-        lines.append(f"    moved{place} = {chosen(sweep, new, own + place)}")
-    return "\n".join([*lines, "    return moved\n"])
+        lines.append(f"    moved{place} = {colours.chosen(step, sweep, new, own + place)}")
+    return sweep, kernel.name, f"coef, {given}, sites", [*lines, "    return moved"]
 
 
 def _sums_of(sweep: Sweep) -> str:

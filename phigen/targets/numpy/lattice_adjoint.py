@@ -11,6 +11,7 @@ from phigen.scheme.steps import Gather, Sweep, Sweeps
 from phigen.symbolic.expression import Expression
 from phigen.targets.code import Code, lower
 from phigen.targets.names import Scope
+from phigen.targets.numpy import colours
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.reserved import PYTHON_RESERVED
 
@@ -24,8 +25,9 @@ _OWN |= {"here", "there", "bond", *LANGUAGE.functions.values()}
 def functions(program: Program, step: Sweeps, body: Body) -> Iterator[str]:
     """The transposes of all sweeps, or of the kernels of an equation, and the list of those of each part."""
     kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
-    for sweep in (sweep for part in step.parts for sweep in part):
-        yield _sweep(program, step, sweep, kernels[sweep.kernel.name + BACK], body)
+    every = [sweep for part in step.parts for sweep in part]
+    yield from colours.functions(step, (_sweep(program, step, s, kernels[s.kernel.name + BACK], body) for s in every))
+    for sweep in every:
         if sweep.gather:
             yield _gather(program, step, sweep.gather, kernels, body)
     if step.equation and step.partners and step.partners.field.names:
@@ -37,17 +39,14 @@ def functions(program: Program, step: Sweeps, body: Body) -> Iterator[str]:
         yield "\n".join(["# Their transposes.", "PARTS_BACK = (", *listed, ")\n"])
 
 
-def chosen(sweep: Sweep, new: str, old: str) -> str:
-    """The new values where a sweep is made, the old ones elsewhere."""
-    return new if sweep.colour is None else f"sites.coloured({sweep.colour}, {new}, {old})"
-
-
-def _sweep(program: Program, step: Sweeps, sweep: Sweep, kernel: Kernel, body: Body) -> str:
-    """The cotangent before a sweep from that after it, x being the state before."""
-    code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"change_bar"})
+def _sweep(
+    program: Program, step: Sweeps, sweep: Sweep, kernel: Kernel, body: Body
+) -> tuple[Sweep, str, str, list[str]]:
+    """The cotangent before a sweep from that after it, x being the state before: the parts of a function."""
+    code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"change_bar", "colour"})
     names = sweep.gather.names if sweep.gather else ()
-    seeds = ", ".join(chosen(sweep, f"bar[{f}]", "0.0") for f in sweep.moved)
-    lines = [f"def _{kernel.name}(coef, x, bar, sites, coef_bar, own):", f"    change_bar = [{seeds}]"]
+    seeds = ", ".join(colours.chosen(step, sweep, f"bar[{f}]", "0.0") for f in sweep.moved)
+    lines = [f"    change_bar = [{seeds}]"]
     gather = _name(sweep.gather) if sweep.gather else ""
     lines += [f"    gathered = _{gather}(coef, x, sites)"] if gather else []
     lines += [*body(program, step, kernel, code, scope, names), "    bar = bar.copy()"]
@@ -55,7 +54,7 @@ def _sweep(program: Program, step: Sweeps, sweep: Sweep, kernel: Kernel, body: B
     if gather:
         listed = _gathered(kernel, code, scope, names)
         lines.append(f"    bar = _{gather}{BACK}(coef, x, [{listed}], bar, sites, coef_bar, own)")
-    return "\n".join([*lines, "    return bar\n"])
+    return sweep, kernel.name, "coef, x, bar, sites, coef_bar, own", [*lines, "    return bar"]
 
 
 def _name(gather: Gather) -> str:
