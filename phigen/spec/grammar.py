@@ -112,6 +112,9 @@ _CHARACTER_HINTS = {
     ":": "expressions are not Python",
 }
 
+#: What is meant by characters that stand for operators: reading goes on with these, so that all errors are told.
+_MEANT = {"^": "**", "−": "-", "–": "-", "·": "*", "×": "*"}
+
 
 @dataclass(frozen=True)
 class Token:
@@ -127,20 +130,25 @@ class _AbandonedError(Exception):
 
 
 def tokens(source: str, report: Report) -> list[Token] | None:
-    """The tokens of an expression, the last of kind ``end``, or ``None`` after reporting an error."""
+    """The tokens of an expression, the last of kind ``end``, or ``None`` after reporting what cannot be read."""
     if len(source) > limits.EXPRESSION_LENGTH:
         message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
         report(message, 0, "name parts of it under definitions", limit=True)
         return None
     found: list[Token] = []
+    told: set[str] = set()
     for match in _TOKEN.finditer(source):
         kind = match.lastgroup
         assert kind is not None
         text, index = match.group(kind), match.start(kind)
-        if kind == "other":
+        if kind == "other" and text not in told:
             shape = shown(text) if text.isascii() and text.isprintable() else describe(text)
             report(f"the character {shape} does not belong in an expression", index, _CHARACTER_HINTS.get(text, ""))
-            return None
+            told.add(text)
+        if kind == "other":
+            if text not in _MEANT:
+                return None
+            kind, text = "operator", _MEANT[text]
         found.append(Token(kind, text, index))
         if kind == "end":
             break
