@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen.cli.arguments import many_specs
 from phigen.cli.console import Console, counted, indented, mend, out, pass_console, verbosity
 from phigen.cli.failures import Collector
 from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
-from phigen.cli.sources import found, load_all, many_specs
+from phigen.cli.sources import found, load_all
 from phigen.errors import CheckError
 from phigen.registry import TARGETS
 

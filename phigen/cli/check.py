@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen.cli.arguments import ORDER, many_specs, order_option, scheme_option
 from phigen.cli.console import Console, heading, out, out_json, pass_console, verbosity
 from phigen.cli.failures import Collector
-from phigen.cli.sources import ORDER, load_all, many_specs, order_option, scheme_option
+from phigen.cli.sources import load_all
 from phigen.errors import CheckError, SpecError
 
 if TYPE_CHECKING:

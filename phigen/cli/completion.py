@@ -8,12 +8,12 @@ import click
 from click.shell_completion import CompletionItem
 
 from phigen import resources
+from phigen.cli.sources import SUFFIXES, load_one
+from phigen.errors import PhigenError
 
 
 def specs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[CompletionItem[str]]:
     """Bundled specs, and the spec files and folders here; where no bundled one is meant, the shell finds the files."""
-    from phigen.cli.sources import SUFFIXES
-
     named = bundled_names(ctx, parameter, begun)
     if not named:
         return [CompletionItem(begun, type="file")]
@@ -30,9 +30,6 @@ def bundled_names(ctx: click.Context, parameter: click.Parameter, begun: str) ->
 
 def runs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
     """The runs of the specs given so far; none of a spec with errors, which a shell has no place for."""
-    from phigen.cli.sources import load_one
-    from phigen.errors import PhigenError
-
     found: list[str] = []
     # click stops at an option without value, before it has told which parameter the other words belong to.
     for given in ctx.args:

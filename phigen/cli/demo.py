@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen.cli.arguments import target_option
 from phigen.cli.console import Console, heading, out, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, loaded, prepared
-from phigen.cli.sources import target_option
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from phigen import resources
-from phigen.cli.sources import CORRECTIONS, order_option, scheme_option
+from phigen.cli.arguments import CORRECTIONS, order_option, scheme_option
 from phigen.registry import TARGETS
 from phigen.spec.names import PARTS, PROFILES, REALS
 

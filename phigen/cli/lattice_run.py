@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from phigen.cli.arguments import FILMS
 from phigen.cli.console import Console, heading, out, out_json, table
 from phigen.cli.experiment import expect_positive, setting_of
 from phigen.cli.run_summary import described_spectrum, finite
-from phigen.cli.sources import FILMS
 from phigen.errors import StepError
 
 if TYPE_CHECKING:

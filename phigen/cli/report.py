@@ -7,9 +7,10 @@ from pathlib import Path
 
 import click
 
+from phigen.cli.arguments import expect_writable, one_spec, order_option, run_option, scheme_option
 from phigen.cli.console import Console, out_document, pass_console, verbosity
-from phigen.cli.experiment import prepared
-from phigen.cli.sources import expect_writable, load_one, one_spec, order_option, run_option, scheme_option
+from phigen.cli.experiment import prepared, run_of
+from phigen.cli.sources import load_one
 from phigen.errors import CheckError
 from phigen.writing import write
 
@@ -41,23 +42,22 @@ def command(
     with classical methods beside them. The page needs no network. Nothing is written if the mathematics of the spec is
     refuted. Exit code 5 if the solver falls short of what it promises: the page says where.
     """
-    from phigen.cli.report_lattice import report_lattice
+    from phigen.cli.report_lattice import gathered_of_lattice
     from phigen.cli.report_material import gathered
     from phigen.cli.verify import with_tangent
     from phigen.compiler import examine
     from phigen.proofs.examination import refutation
     from phigen.report.document import document
+    from phigen.report.lattice import lattice_document
 
     spec = load_one(spec_file)
     target = output if output and output != "-" else f"{spec.name}.html"
     if output != "-":
         expect_writable(Path(target), "--output")
-    if spec.lattice:
-        report_lattice(console, spec, spec_file, output, target, name, order, scheme, lyapunov, quick)
-        return
-    experiment = prepared(spec, name) if spec.runs or name or lyapunov else None
-    if experiment is None:
+    run = run_of(spec, name) if spec.runs or name or lyapunov else None
+    if run is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
+    experiment = prepared(spec, name) if run and not spec.lattice else None
     found = examine(spec, order=order, scheme=scheme, extras=with_tangent(spec))
     if found.refuted:
         raise CheckError(refutation(found))
@@ -65,8 +65,13 @@ def command(
         raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
     console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
     written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
-    material, failures = gathered(found, found.compilation, experiment, written, scheme, lyapunov, quick, console)
-    write_page(document(material), bool(material.methods), output, target, console)
+    if spec.lattice:
+        cell, failures = gathered_of_lattice(found, found.compilation, run, written, scheme, lyapunov, quick, console)
+        page, figures = lattice_document(cell), cell.trajectory is not None
+    else:
+        material, failures = gathered(found, found.compilation, experiment, written, scheme, lyapunov, quick, console)
+        page, figures = document(material), bool(material.methods)
+    write_page(page, figures, output, target, console)
     if failures:
         raise failures[0]
 

@@ -1,58 +1,43 @@
-"""``phigen report`` of a lattice."""
+"""What ``phigen report`` puts on the page of a lattice: one run integrated and verified."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from phigen.cli.console import Console
-from phigen.errors import CheckError, PhigenError, StepError
+from phigen.errors import PhigenError, StepError
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
+    from phigen.proofs.examination import Examination
     from phigen.report.lattice import LatticeMaterial
-    from phigen.spec.model import Spec
+    from phigen.spec.model import Run
 
 
-def report_lattice(
-    console: Console,
-    spec: Spec,
-    spec_file: str,
-    output: str | None,
-    target: str,
-    name: str | None,
-    order: int | None,
+def gathered_of_lattice(
+    found: Examination,
+    compilation: Compilation,
+    run: Run | None,
+    written: str,
     scheme: str | None,
     lyapunov: bool,
     quick: bool,
-) -> None:
-    """Write the page of a lattice. Raises what ended its run, or the `CheckError` of what fell short, after that."""
-    from phigen.cli.report import command_of, write_page
-    from phigen.cli.verify import with_tangent
-    from phigen.compiler import examine
-    from phigen.proofs.examination import refutation
-    from phigen.report.lattice import LatticeMaterial, lattice_document
+    console: Console,
+) -> tuple[LatticeMaterial, list[PhigenError]]:
+    """What the page is made of, with a run and what was verified on it, and what failed on the way."""
+    from phigen.report.lattice import LatticeMaterial
 
-    found = examine(spec, order=order, scheme=scheme, extras=with_tangent(spec))
-    if found.refuted:
-        raise CheckError(refutation(found))
-    if found.compilation is None:
-        raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
-    console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
-    written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
-    material, failure = LatticeMaterial(found, found.compilation, written), None
-    if spec.runs or name:
-        material, failure = _measured(material, found.compilation, name, scheme, lyapunov, quick, console)
-    else:
-        console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
-    write_page(lattice_document(material), material.trajectory is not None, output, target, console)
-    if failure:
-        raise failure
+    material = LatticeMaterial(found, compilation, written)
+    if run is None:
+        return material, []
+    material, failure = _measured(material, compilation, run, scheme, lyapunov, quick, console)
+    return material, [failure] if failure else []
 
 
 def _measured(
     material: LatticeMaterial,
     compilation: Compilation,
-    name: str | None,
+    run: Run,
     scheme: str | None,
     lyapunov: bool,
     quick: bool,
@@ -65,7 +50,6 @@ def _measured(
 
     from phigen import registry
     from phigen.api import chosen_target, lattice_solver_of
-    from phigen.cli.experiment import run_of
     from phigen.cli.lattice_run import exponents_of
     from phigen.cli.verify import fallen_short, verified_lattice
     from phigen.lattice.observing import errors_of
@@ -74,7 +58,6 @@ def _measured(
     from phigen.runtime import toolchain
 
     spec = compilation.spec
-    run = run_of(spec, name)
     start = start_of(spec, run)
     solver = lattice_solver_of(compilation, chosen_target("auto", console.note))
     console.note(f"{spec.name}: run {run.name}, {run.steps} steps")

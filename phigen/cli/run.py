@@ -7,17 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import loaded, prepared, run_of, with_steps
-from phigen.cli.interruption import InterruptedRunError
-from phigen.cli.lattice_run import expect_no, run_lattice
-from phigen.cli.resizing import resized, sizes_option
-from phigen.cli.run_summary import described_run, finite, print_summary
-from phigen.cli.sources import (
+from phigen.cli.arguments import (
     FIGURES,
     FILMS,
     file_ending,
-    load_one,
     one_spec,
     order_option,
     run_option,
@@ -25,6 +18,13 @@ from phigen.cli.sources import (
     settings_option,
     target_option,
 )
+from phigen.cli.console import Console, out_json, pass_console, verbosity
+from phigen.cli.experiment import loaded, prepared, run_of, with_steps
+from phigen.cli.interruption import InterruptedRunError
+from phigen.cli.lattice_run import expect_no, run_lattice
+from phigen.cli.resizing import resized, sizes_option
+from phigen.cli.run_summary import described_run, finite, print_summary
+from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder

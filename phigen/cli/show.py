@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-import unicodedata
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from phigen.cli.arguments import CORRECTIONS, one_spec, order_option, scheme_option
 from phigen.cli.console import heading, out, out_document, out_json, verbosity
-from phigen.cli.sources import CORRECTIONS, load_one, one_spec, order_option, scheme_option
+from phigen.cli.sections import assignments, section
+from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
@@ -151,24 +151,6 @@ def _print_series(compilation: Compilation, most: int | None) -> None:
     section(f"Bi-realisation: {compilation.chart.kind}", [*why, *maps])
     series = [*_gauged(compilation), *assignments(_series(compilation, most))]
     section(f"Generating function: {generating.method(compilation)}", series)
-
-
-def section(title: str, lines: Sequence[str]) -> None:
-    """Indented lines under a heading."""
-    out("\n" + heading(title))
-    for line in lines:
-        out(f"  {line}")
-
-
-def assignments(pairs: Sequence[tuple[str, str]]) -> list[str]:
-    """Lines ``name = value``, the signs below one another."""
-    width = max((_width(name) for name, _ in pairs), default=0)
-    return [f"{name}{' ' * (width - _width(name))} = {value}" for name, value in pairs]
-
-
-def _width(name: str) -> int:
-    """Columns on a terminal: the tilde of H̃ takes none."""
-    return sum(not unicodedata.combining(c) for c in name)
 
 
 def brackets(compilation: Compilation) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from phigen.cli.console import heading, out
+from phigen.cli.sections import assignments, section
 
 if TYPE_CHECKING:
     from phigen.lattice.cell import Cell
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
 
 def print_cell(spec: Spec, cell: Cell, most: int | None) -> None:
     """The formulas of a cell."""
-    from phigen.cli.show import assignments, section
     from phigen.notation.lattices import described, sections
 
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))

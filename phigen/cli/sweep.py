@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen.cli.arguments import FIGURES, file_ending, one_spec, order_option, scheme_option, target_option
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, order_option, scheme_option, target_option
+from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
     from phigen.spec.model import Spec, Sweep

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from phigen.cli.arguments import FIGURES, file_ending, one_spec, run_option, settings_option
 from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import prepared, run_of
-from phigen.cli.sources import FIGURES, file_ending, load_one, one_spec, run_option, settings_option
+from phigen.cli.sources import load_one
 from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
 from phigen.errors import CheckError, SpecError
 

@@ -10,11 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from phigen.cli.arguments import FIGURES, file_ending, many_specs, order_option, run_option, scheme_option
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, expect_system, prepared
 from phigen.cli.failures import Collector
 from phigen.cli.resizing import resized, sizes_option
-from phigen.cli.sources import FIGURES, file_ending, load_all, many_specs, order_option, run_option, scheme_option
+from phigen.cli.sources import load_all
 from phigen.errors import CheckError, StepError
 from phigen.registry import loadable
 

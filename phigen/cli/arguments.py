@@ -1,0 +1,76 @@
+"""Arguments and options that several commands have, each said once, and what is wrong with a file that one names."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from phigen.cli.completion import runs, specs
+from phigen.registry import LOADABLE
+from phigen.spec import limits
+from phigen.spec.names import SCHEMES
+
+#: What files of figures end in.
+FIGURES = (".png", ".svg", ".pdf")
+#: And of films, of lattices.
+FILMS = (".gif", ".mp4")
+
+#: The type of ``--order``.
+ORDER = click.IntRange(1, limits.ORDER)
+
+#: The type of ``--modified``.
+CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
+
+order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+
+#: What runs are made with.
+target_option = click.option(
+    "-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True
+)
+
+settings_option = click.option(
+    "--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate."
+)
+
+#: How the one-step map is made, instead of the spec's way.
+scheme_option = click.option(
+    "--scheme", type=click.Choice(SCHEMES), help="How steps are made, instead of the spec's scheme."
+)
+
+#: Which run of a spec; the argument SPEC stands before it.
+run_option = click.option(
+    "--run", "name", metavar="NAME", shell_complete=runs, help="Which run of the spec.  [default: the first]"
+)
+
+one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path(), shell_complete=specs)
+many_specs = click.argument(
+    "spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path(), shell_complete=specs
+)
+
+
+def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
+    """The callback of an option that names a file: checks its suffix and its folder before any work is done."""
+
+    def checked(ctx: click.Context, parameter: click.Parameter, value: str | None) -> Path | None:
+        if value is None:
+            return None
+        if Path(value).suffix.lower() not in suffixes:
+            raise click.BadParameter(f"{value!r} must end in {' or '.join(suffixes)}")
+        expect_writable(Path(value))
+        return Path(value)
+
+    return checked
+
+
+def expect_writable(path: Path, option: str | None = None) -> None:
+    """Raises `click.BadParameter` for a file that could not be written after the work, so far as that can be known."""
+    device = path.exists() and not path.is_file() and not path.is_dir()
+    if path.is_dir():
+        raise click.BadParameter(f"{str(path)!r} is a folder", param_hint=option)
+    if not path.parent.is_dir():
+        raise click.BadParameter(f"there is no folder {str(path.parent)!r}", param_hint=option)
+    if not device and not os.access(path.parent, os.W_OK):
+        raise click.BadParameter(f"nothing can be written to the folder {str(path.parent)!r}", param_hint=option)
