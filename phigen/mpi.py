@@ -30,6 +30,7 @@ from phigen.runtime.arguments import Beginning
 from phigen.runtime.c_lattice import CLattice, CLatticeSession, Stage
 from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.memory import filled
 from phigen.writing import replacing
 
 #: As in the C, whose bits these are: see templates/c/runtime/lattice.c.
@@ -402,7 +403,7 @@ class _Frames:
         self.domain, self.path, self.array = domain, path, None
         first, end = domain.planes
         if path is None:
-            self.array = np.empty((shape[0], shape[1], end - first, *shape[3:]))
+            self.array = filled(f"{shape[0]} frames", (shape[0], shape[1], end - first, *shape[3:]))
             return
         if path.suffix != ".npy":
             raise ValueError(f"frames of processes go to files that end in .npy, not {str(path)!r}")

@@ -29,10 +29,7 @@ def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     are small; Casimirs of sites by the site where they changed most. Where H depends on the time, or forces act, the
     energy is less the work that was done, in runs that are not too long.
     """
-    found = _of_energy(cell, run)
-    for name, values in run.casimirs.items():
-        changed = np.abs(values - values[0])
-        found[name] = changed.reshape(len(run), -1).max(axis=1)
+    found = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
         times = [{t: time} for time in run.t.tolist() for t in cell.times] or [{}] * len(run)
         sums = np.array([summed(cell, density, x, {**run.parameters, **t}) for x, t in zip(run.x, times, strict=True)])

@@ -22,7 +22,7 @@ from phigen.runtime.interface import (
     status_name,
 )
 from phigen.runtime.interrupts import interruptible
-from phigen.runtime.memory import expect_room
+from phigen.runtime.memory import expect_room, filled
 
 _POINTER, _DOUBLE, _SIZE, _INT = ctypes.c_void_p, ctypes.c_double, ctypes.c_size_t, ctypes.c_int
 _SIGNATURES: dict[str, tuple[Any, tuple[Any, ...]]] = {
@@ -161,6 +161,7 @@ class CLatticeSession:
         carried = np.array(vectors, dtype=self._real, order="C")
         needed = self._c.tangent_size(self._address, len(carried))
         if len(self._beside) < needed:
+            expect_room(f"the arrays of {len(carried)} tangent vectors", needed)
             self._beside = np.zeros(needed, dtype=np.uint8)
         status = self._c.integrate_tangent(
             self._address, h, steps, len(carried), carried.ctypes.data, self._beside.ctypes.data
@@ -170,20 +171,22 @@ class CLatticeSession:
         return np.asarray(carried, dtype=np.float64)
 
     def pull_back(self, h: float, steps: int, stride: int, bars: Floats, found: int) -> tuple[Floats, Floats]:
-        """The rows of a run but for the first, and the cotangent of the state, from those of these rows.
+        """The rows of a run, and the cotangent of the state, from those of all rows but the first.
 
         ``found`` is the address of a struct, to which the cotangents of parameters are added.
         """
-        given = np.ascontiguousarray(bars, dtype=self._real)
-        rows, x0_bar = np.empty_like(given), np.empty(self._shape, self._real)
+        given = np.ascontiguousarray(bars[1:], dtype=self._real)
+        rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
         most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
         state, of_step = x0_bar.nbytes, int(self._c.trail_size(self._address, 2)) - least
         twice = least + 3 * math.isqrt(steps * state * of_step)  # segments that are made once more have room by this
         room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, twice))
-        trail = np.empty(min(most or least, room), dtype=np.uint8)
-        pointers = (rows.ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found, trail.ctypes.data)
+        size = max(least, min(most or least, room))
+        expect_room("what is kept of steps to go back", size)
+        trail = np.empty(size, dtype=np.uint8)
+        pointers = (rows[1:].ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found, trail.ctypes.data)
         with interruptible(lambda question: self._c.ask(self._address, question)):
-            status = self._c.pullback(self._address, h, steps, stride, *pointers, max(len(trail), least))
+            status = self._c.pullback(self._address, h, steps, stride, *pointers, size)
         if status:
             self.advance(h, steps)  # tells where
             raise BackendError(status_name(status), 0, self.state()[None])
@@ -340,12 +343,13 @@ class CLattice:
             raise MissingExtraError("pullback")
         zero = dict.fromkeys(self.interface.parameters, 0.0)
         struct, arrays = _packed(self.interface, zero, x0.shape[1:], len(parameters.get("bonds", ())))
-        rows, x0_bar = self.start(x0, parameters, t0).pull_back(h, steps, stride, bars[1:], struct.ctypes.data)
+        rows, x0_bar = self.start(x0, parameters, t0).pull_back(h, steps, stride, bars, struct.ctypes.data)
         found = {name: np.asarray(struct[name][0], dtype=np.float64) for name in zero if name not in arrays}
         for name, own in arrays.items():
             of_array = np.asarray(own, dtype=np.float64)
             found[name] = of_array if np.ndim(parameters[name]) else of_array.sum()
-        return np.concatenate([x0[None], rows]), x0_bar + bars[0], {name: found[name] for name in zero}
+        rows[0] = x0
+        return rows, x0_bar + bars[0], {name: found[name] for name in zero}
 
 
 def _packed(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import zipfile
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -28,6 +28,7 @@ from phigen.runtime.interface import (
 )
 from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
 from phigen.runtime.live import LiveLattice
+from phigen.runtime.memory import expect_room
 from phigen.runtime.named import Named
 from phigen.writing import replacing
 
@@ -182,9 +183,7 @@ class LatticeTrajectory:
         What time, forces or noise did to the energy is in it. Of Casimirs of sites it is the site at the worst.
         """
         found = {"energy": np.abs(self.energy - self.energy[0]) / (self.energy_scale or 1.0)}
-        for name, values in self.casimirs.items():
-            found[name] = np.abs(values - values[0]).reshape(len(self), -1).max(axis=1)
-        return found
+        return found | self.casimir_changes()
 
     @property
     def energy_scale(self) -> float:
@@ -195,8 +194,21 @@ class LatticeTrajectory:
     @property
     def casimirs(self) -> dict[str, Floats]:
         """The Casimirs by name: (frames, *sizes) for those of sites, (frames,) for sums and products."""
-        rows = [self.solver.casimirs(x, parameters=self.parameters) for x in self.x]
+        rows = list(self._casimirs_by_frame())
         return {name: np.array([row[name] for row in rows]) for name in self.solver.interface.casimirs}
+
+    def _casimirs_by_frame(self) -> Iterator[dict[str, Any]]:
+        return (self.solver.casimirs(x, parameters=self.parameters) for x in self.x)
+
+    def casimir_changes(self) -> dict[str, Floats]:
+        """How far each Casimir went since the start, (frames,), the worst site of those of sites. Holds one frame."""
+        if not self.solver.interface.casimirs:
+            return {}
+        frames = self._casimirs_by_frame()
+        first = next(frames)
+        rows = [dict.fromkeys(first, 0.0)]
+        rows += [{name: float(np.abs(row[name] - first[name]).max()) for name in first} for row in frames]
+        return {name: np.array([row[name] for row in rows]) for name in first}
 
     def column(self, coordinate: str) -> Floats:
         """The frames (frames, *sizes) of one coordinate; raises `KeyError` for a name that is none."""
@@ -321,8 +333,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     ) -> tuple[Floats, Floats]:
         """The state one step after ``x``, and where its derivative carries ``vectors`` (count, coordinates, *sizes).
 
-        The derivative is exact to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without
-        ``tangent=True``.
+        The derivative is exact to round-off. Raises `StepError`, `LimitError` for more than there is memory for, and
+        `TypeError` if the solver was compiled without ``tangent=True``.
         """
         for found in self.tangents(x, h, 1, vectors, t0=t0, seed=seed, step0=step0, parameters=parameters, **more):
             return found
@@ -349,6 +361,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """
         at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "step0": step0})
         start, steps = at.x, arguments.count(steps, "steps", 0)
+        expect_room("tangent vectors", 8 * np.size(vectors))
         carried = np.array(vectors, dtype=np.float64)
         if carried.ndim != start.ndim + 1 or carried.shape[1:] != start.shape or not np.isfinite(carried).all():
             shape = ", ".join(map(str, start.shape))

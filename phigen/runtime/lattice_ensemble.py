@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from phigen.errors import StepError
 from phigen.runtime import arguments
 from phigen.runtime.interface import BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.members import cores, in_threads
+from phigen.runtime.memory import filled
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver
@@ -44,7 +46,7 @@ def ensemble(
         solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
         for m in range(count)
     ]
-    frames, failures = np.full((len(marks), *start.shape), np.nan), dict[int, str]()
+    frames, failures = filled(f"{len(marks)} frames of {count} members", (len(marks), *start.shape)), dict[int, str]()
     frames[0] = final = start.copy()
 
     def make(m: int) -> None:
@@ -84,12 +86,16 @@ def has_members(interface: LatticeInterface, name: str, value: Any) -> bool:
 def states(solver: LatticeSolver, X0: ArrayLike, own: Mapping[str, Any], what: str = "X0") -> Floats:
     """The initial states (members, coordinates, *sizes), checked."""
     axes = 1 + len(solver.interface.axes)
+    each: Iterable[Floats]
     if np.ndim(X0) == axes and own:
-        start = np.stack([solver.state(X0, what)] * len(next(iter(own.values()))))
+        count, each = len(next(iter(own.values()))), repeat(solver.state(X0, what))
     elif np.ndim(X0) == 1 + axes:
-        start = np.array([solver.state(x, what) for x in np.asarray(X0)], dtype=np.float64).reshape(np.shape(X0))
+        count, each = len(np.asarray(X0)), (solver.state(x, what) for x in np.asarray(X0))
     else:
         raise ValueError(f"{what} must have shape (members, {solver.shape_text()}), not {np.shape(X0)}")
+    start = filled(f"the states of {count} members", (count, *np.shape(X0)[-axes:]))
+    for m, x in zip(range(count), each, strict=False):
+        start[m] = x
     for name, value in own.items():
         if len(value) != len(start):
             raise ValueError(f"{name} has {len(value)} members, not {len(start)}")

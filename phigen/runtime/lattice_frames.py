@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
@@ -16,7 +15,7 @@ import numpy as np
 from phigen.runtime import checkpoint
 from phigen.runtime.checkpoint import Checkpoint
 from phigen.runtime.interface import FIRST_DRAWS, Floats, Progress
-from phigen.runtime.memory import expect_room
+from phigen.runtime.memory import filled
 
 if TYPE_CHECKING:
     from phigen.runtime.arguments import Beginning
@@ -42,7 +41,6 @@ class LatticeRun:
 
     def made(self, progress: Progress | None) -> int:
         """All frames that are left."""
-        self.frames.expect_room()
         first = self._resumed()
         self.session = self.solver.started(replace(self.at, x=first))
         if self.count:
@@ -106,18 +104,13 @@ class Frames:
 
     @property
     def array(self) -> Floats:
-        """All frames."""
+        """All frames. Raises `LimitError` if they are kept in memory and do not fit."""
         if self._array is None:
             if self._part is None:
-                self._array = np.empty(self._shape)
+                self._array = filled(f"{self._shape[0]} frames", self._shape)
             else:
                 self._array = np.lib.format.open_memmap(self._part, "w+", np.float64, self._shape)
         return self._array
-
-    def expect_room(self) -> None:
-        """Raises `LimitError` if they are kept in memory and do not fit."""
-        if self._part is None:
-            expect_room(f"{self._shape[0]} frames", 8 * math.prod(self._shape))
 
     def put(self, k: int, state: Floats) -> None:
         """Store frame k."""

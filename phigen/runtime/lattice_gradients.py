@@ -12,6 +12,7 @@ from phigen.runtime import arguments
 from phigen.runtime.gradients import Pullback, cotangents
 from phigen.runtime.interface import BackendError, Floats, MissingExtraError, row_steps
 from phigen.runtime.lattice_ensemble import has_members, states
+from phigen.runtime.memory import filled
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver
@@ -39,7 +40,8 @@ def pullback(
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *start.shape)), bars])
     times = np.broadcast_to(t0, len(start))
-    made, x0_bar, found = np.empty((rows, *start.shape)), np.empty_like(start), list[dict[str, Floats]]()
+    made = filled(f"{rows} frames", (rows, *start.shape))
+    x0_bar, found = np.empty_like(start), list[dict[str, Floats]]()
     for m, x in enumerate(start):
         values = solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
         try:

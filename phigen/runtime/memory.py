@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from phigen.errors import Diagnostic, LimitError, Location
 
@@ -23,6 +28,15 @@ def expect_room(what: str, needed: int, place: Location | None = None) -> None:
         return
     message = f"{what} take {_readable(needed)} of memory at least, and {_readable(free)} are available"
     raise LimitError([Diagnostic(message, place, _HINT)])
+
+
+def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:
+    """An array of NaN. Raises `LimitError` where it does not fit, as `expect_room`.
+
+    It is written to at once: what ``np.empty`` promises would count as free when the next array is asked for.
+    """
+    expect_room(what, np.dtype(dtype).itemsize * math.prod(shape))
+    return np.full(shape, np.nan, dtype)
 
 
 def available() -> int | None:

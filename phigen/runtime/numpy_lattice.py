@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -180,6 +181,8 @@ class NumpyLattice:
         """See `phigen.runtime.lattice.LatticeBackend`."""
         if not hasattr(self._module, "pullback"):
             raise MissingExtraError("pullback")
+        kept = min(steps, 2 * math.isqrt(steps)) + 2 * len(bars)
+        expect_room("the states that are kept to go back", kept * x0.nbytes)
         try:
             found: tuple[Floats, Floats, dict[str, Floats]]
             when = {"t0": t0} if self.interface.time else {}

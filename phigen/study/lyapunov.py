@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from phigen.runtime.interface import Progress
 from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.memory import expect_room
 from phigen.runtime.solver import Solver
 from phigen.symbolic.arrays import Floats
 
@@ -154,6 +155,7 @@ def lattice_spectrum(
     x = np.asarray(x0, dtype=float)
     if not 1 <= count <= x.size:
         raise ValueError(f"a lattice of these sizes has 1 to {x.size} exponents, not {count}")
+    expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)  # drawn, in qr, and orthonormal
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)
     given: Any = {"t0": t0, "parameters": parameters, **draws}

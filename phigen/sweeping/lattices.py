@@ -13,6 +13,7 @@ import numpy as np
 from phigen.lattice.states import Start, start_of
 from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.lattice import LatticeSession, LatticeSolver, reduced
+from phigen.runtime.memory import filled
 from phigen.spec.model import Run, Spec, Values
 from phigen.sweeping.plan import Plan
 from phigen.sweeping.store import Job
@@ -61,9 +62,9 @@ def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numb
     found: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
     found |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
     if "final" in plan.keep:
-        found["final"] = np.full((count, *shape), np.nan)
+        found["final"] = filled(f"the states of {count} members", (count, *shape))
     if plan.frames:
-        found["frames"] = np.full((count, len(plan.rows), *shape), np.nan)
+        found["frames"] = filled(f"the frames of {count} members", (count, len(plan.rows), *shape))
     for m in range(count):
         own = {name: float(values[m]) for name, values in varied.items()}
         member = _Member(job.plan, solver, _start(job, int(own.pop("seed", 0))), own, int(numbers[m]))
@@ -100,17 +101,19 @@ class _Member:
             self.kept = kept
 
     def _made(self, state: Floats, h: float) -> dict[str, Any]:
-        plan, states = self.plan, [state]
-        marks = row_steps(plan.steps, plan.frames or max(1, plan.steps))
+        plan, marks = self.plan, row_steps(self.plan.steps, self.plan.frames or max(1, self.plan.steps))
+        frames = filled("the frames of a member", (len(plan.rows), *state.shape))
+        frames[:1] = state
         before, errors = self._seen(), dict.fromkeys(("energy_error", "casimir_error"), 0.0)
-        for ahead in np.diff(marks):
+        for row, ahead in enumerate(np.diff(marks), 1):
             self.session.advance(h, int(ahead))
-            states.append(self.session.state())
+            if row < len(frames):
+                frames[row] = self.session.state()
             for name, changes in self._changes(before).items():
                 errors[name] = max(errors[name], changes)
         found: dict[str, Any] = {name: error for name, error in errors.items() if name in plan.keep}
-        found |= {"final": states[-1]} if "final" in plan.keep else {}
-        return found | ({"frames": np.array(states[: len(plan.rows)])} if plan.frames else {})
+        found |= {"final": self.session.state()} if "final" in plan.keep else {}
+        return found | ({"frames": frames} if plan.frames else {})
 
     def _seen(self) -> tuple[float, list[Floats]]:
         """The energy, and the Casimirs."""

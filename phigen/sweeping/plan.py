@@ -84,6 +84,11 @@ class Plan:
         """The numbers of the steps that are stored as frames."""
         return tuple(range(0, self.steps + 1, self.frames)) if self.frames else ()
 
+    @property
+    def bytes_of_member(self) -> int:
+        """What a member takes while it is made, at least: its states of now, and all of its frames."""
+        return 8 * len(self.coordinates) * prod(self.sizes) * (len(self.rows) + 4)
+
     def region(self, number: int) -> tuple[slice, ...]:
         """The box of a chunk."""
         place = np.unravel_index(number, self.boxes)
@@ -151,8 +156,7 @@ def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
 
 def chunk_of(plan: Plan, members: int) -> tuple[int, ...]:
     """The sizes of a chunk of so many members at most, and of no more than memory has room for."""
-    bytes_of_one = 8 * len(plan.coordinates) * prod(plan.sizes) * (len(plan.rows) + 4)
-    left = max(1, min(members, _MOST_BYTES // bytes_of_one))
+    left = max(1, min(members, _MOST_BYTES // plan.bytes_of_member))
     found: list[int] = []
     for size in reversed(plan.shape):
         found.append(min(size, left))

@@ -6,6 +6,7 @@ import csv
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from phigen.compiler import emit
 from phigen.errors import FileError
 from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
+from phigen.runtime.memory import expect_room
 from phigen.spec.model import Extras, Run, Spec, Sweep
 from phigen.spec.names import SWEEP_NAMES
 from phigen.sweeping import cluster, lattices, store
@@ -60,7 +62,8 @@ def made(
 ) -> Outcome:
     """Make what the store lacks of a sweep; ``started`` is told how many members that is.
 
-    Raises `SpecError`, `FileError` where the store holds something else, and `SweepError`.
+    Raises `SpecError`, `FileError` where the store holds something else, `LimitError` where the members that are made
+    at a time do not fit into memory, and `SweepError`.
     """
     store.imported("zarr")
     extras = replace(spec.extras, tangent=True) if "lyapunov" in sweep.keep else spec.extras
@@ -80,6 +83,9 @@ def made(
         with cluster.connected(setting.scheduler, setting.workers) as (client, slots):
             job = job or _created(setting.output, plan, beside, listed, slots)
             chunks = store.waiting(job)
+            if setting.scheduler is None:  # another machine has memory of its own, of which its workers ask
+                running, held = min(slots, len(chunks)), prod(job.plan.chunk) * job.plan.bytes_of_member
+                expect_room(f"{running} chunks of a sweep at a time", running * held)
             started(sum(_members_of(job.plan, number) for number in chunks))
             place = str(setting.output.resolve()), store.digest_of(job.plan, beside)
             cluster.make_all(client, slots, *place, chunks, count)

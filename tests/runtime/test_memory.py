@@ -1,13 +1,17 @@
 """Arrays over sites that cannot fit are refused before they are made."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from phigen import compile
+from phigen import compile, sweep
 from phigen.cli import group
 from phigen.errors import LimitError
 from phigen.runtime import memory
+from phigen.study.lyapunov import lattice_spectrum
+from phigen.sweeping import cluster
 
 #: The arrays of a state of 12 sites, (q, p).
 STATE = 8 * 2 * 12
@@ -66,3 +70,51 @@ def test_solvers_and_frames_are_refused_where_they_do_not_fit_and_only_there(cha
         solver.integrate(x, 0.05, 0)
     monkeypatch.setattr(memory, "available", lambda: None)
     solver.integrate(x, 0.05, 101)
+
+
+def carry(solver, x):
+    next(solver.tangents(x, 0.05, 1, np.ones((500, *x.shape))))
+
+
+def back(solver, x):
+    solver.pullback(x, 0.05, 500, np.ones((501, *x.shape)), 1)
+
+
+def alike(solver, x):
+    solver.ensemble(np.tile(x, (9, 1, 1)), 0.05, 1)
+
+
+#: What is made beside a solver; for how many states of the chain there is room where it is refused, and where not.
+TAKING = [
+    ("tangent vectors", "numpy", 499, 500, carry),
+    ("the arrays of 500 tangent vectors", "c", 1338, 1340, carry),
+    ("the arrays of 24 tangent vectors", "c", 71, 72, lambda solver, x: lattice_spectrum(solver, x, 0.05, 1, 24)),
+    ("the states of 9 members", "c", 8, 18, alike),
+    ("the states of 9 members", "c", 8, 18, lambda solver, x: solver.ensemble(x, np.full(9, 0.05), 1)),
+    ("2 frames of 9 members", "c", 17, 18, alike),
+    ("501 frames", "numpy", 500, 1046, back),
+    ("what is kept of steps to go back", "c", 680, 681, back),
+    ("what is kept of steps to go back", "c", 15, 16, lambda solver, x: solver.pullback(x, 0.05, 0, x)),
+    ("the states that are kept to go back", "numpy", 1045, 1046, back),
+]
+
+
+@pytest.mark.parametrize(("words", "target", "refused", "allowed", "call"), TAKING)
+def test_vectors_members_and_ways_back_are_refused_where_they_do_not_fit(
+    chain, words, target, refused, allowed, call, monkeypatch
+):
+    solver, x = compile(chain, target=target, tangent=True, adjoint=True), np.zeros((2, 12))
+    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "available", lambda: allowed * STATE)
+    call(solver, x)
+    monkeypatch.setattr(memory, "available", lambda: refused * STATE)
+    with pytest.raises(LimitError, match=words):
+        call(solver, x)
+
+
+def test_chunks_of_a_sweep_that_are_made_at_a_time_fit_together(chain, monkeypatch, tmp_path):
+    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "available", lambda: 2 * 45 * STATE - 1)
+    monkeypatch.setattr(cluster, "connected", lambda scheduler, workers: nullcontext((None, workers)))
+    with pytest.raises(LimitError, match="2 chunks of a sweep at a time"):
+        sweep(chain, over={"step": [0.05, 0.06]}, frames=1, workers=2, target="numpy", output=tmp_path / "made.zarr")
