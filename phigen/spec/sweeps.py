@@ -116,8 +116,11 @@ def _expect_sense(
         _fail(over, "over: there is nothing to vary", declared)
     members = found.random or prod(axis.size for axis in grid)
     if members > limits.SWEPT:
-        _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, limit=True)
+        hint = "several sweeps, of a part each, or random members"
+        _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, hint, limit=True)
     if "crossings" in found.keep and run is not None and run.section is None:
-        _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared)
+        hint = "give the run a section: an expression whose zeros are the crossings"
+        _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)
     if "energy_error" in found.keep and declared.time:
-        _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared)
+        hint = "keep final, or frames: solver.hamiltonian(x, t) is the energy there"
+        _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared, hint)
