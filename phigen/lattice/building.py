@@ -12,6 +12,10 @@ from phigen.symbolic.expression import ZERO, Expression, neg
 from phigen.symbolic.neighbours import Neighbours, minus
 
 
+class MisfitError(SpecError):
+    """Sizes of runs are no multiples of the periods of colours."""
+
+
 def cell_from_spec(spec: Spec) -> Cell:
     """The cell of a spec. Raises `SpecError` where a form of π does not fit, or a run is too small for the stencil."""
     lattice = spec.lattice
@@ -52,9 +56,9 @@ def least_sizes(cell: Cell) -> tuple[int, ...]:
 
 
 def expect_coloured(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> None:
-    """Raises `SpecError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
+    """Raises `MisfitError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
     if problems := misfits(spec, axes, periods):
-        raise SpecError(problems)
+        raise MisfitError(problems)
 
 
 def misfits(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> list[Diagnostic]:

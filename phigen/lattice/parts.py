@@ -143,32 +143,30 @@ class NoPartError(Exception):
         self.expression, self.reason = expression, reason
 
 
-def split_cell(
+def splittings(
     cell: Cell, place: Location | None = None, search: Callable[[Cell, Colouring], PartSearch] | None = None
-) -> CellSplitting:
-    """H as a sum of parts with elementary flows, by a search for each colouring.
+) -> Iterator[CellSplitting]:
+    """H as sums of parts with elementary flows, by a search for each colouring: few colours first, then few parts.
 
-    Raises `SpecError`, at ``place``, naming the term in the way.
+    Raises `SpecError`, at ``place``, naming the term in the way, if there are none.
     """
     search = search or PartSearch
     refused: NoPartError | None = None
-    best: CellSplitting | None = None
-    for colouring in colourings(cell):
-        if best is not None and colouring.count > best.colouring.count:
-            break
-        try:
-            found = search(cell, colouring).splitting()
-        except NoPartError as error:
-            refused = refused or error
-            continue
-        if best is None or len(found.flows) < len(best.flows):
-            best = found
-    if best is None:
+    some = False
+    for _, alike in itertools.groupby(colourings(cell), lambda colouring: colouring.count):
+        found: list[CellSplitting] = []
+        for colouring in alike:
+            try:
+                found.append(search(cell, colouring).splitting())
+            except NoPartError as error:
+                refused = refused or error
+        some = some or bool(found)
+        yield from sorted(found, key=lambda parts: len(parts.flows))
+    if not some:
         assert refused is not None
         message = f"scheme splitting: the term {refused.expression} has no elementary flow on the lattice"
         hint = "terms in coordinates that commute over the whole lattice split, and terms of one site with a flow"
         raise SpecError([Diagnostic(f"{message}: {refused.reason}", place, hint)])
-    return best
 
 
 def colourings(cell: Cell) -> Iterator[Colouring]:

@@ -7,7 +7,7 @@ covectors written out, both are formulas of a site and its neighbourhood, whatev
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 
 from phigen.errors import Diagnostic, SpecError
@@ -43,6 +43,7 @@ class SeriesPlan:
     fractions: tuple[float, ...]
     middle: Mapping[str, Expression]
     increment: Mapping[str, Expression]
+    since: str = field(default="", kw_only=True)  # why steps are not split, although H can be
 
     @property
     def colouring(self) -> Colouring:
@@ -60,7 +61,14 @@ class SeriesPlan:
         count = len(self.fractions)
         composed = [f"composition: {self.composition}, {count} stages of order 2"] if count > 1 else []
         step = "step: implicit, by sweeps over the sites until they change nothing"
-        return [f"bi-realisation: {self.realisation.kind}, symmetric", "generating function: S_1", step, *composed]
+        since = [f"scheme: series, since {self.since}"] if self.since else []
+        return [
+            *since,
+            f"bi-realisation: {self.realisation.kind}, symmetric",
+            "generating function: S_1",
+            step,
+            *composed,
+        ]
 
     def schedule(self) -> Schedule:
         """The stages of a step, as flows of one part."""

@@ -10,7 +10,7 @@ from typing import Any
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import least_sizes, misfits
+from phigen.lattice.building import MisfitError, least_sizes, misfits
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
 from phigen.lattice.kernels import site_kernel
@@ -20,12 +20,10 @@ from phigen.lattice.parts import (
     CellFlow,
     CellSplitting,
     Colouring,
-    NoPartError,
     PartSearch,
     SiteMotion,
-    colourings,
     present,
-    split_cell,
+    splittings,
     summands_of,
 )
 from phigen.lattice.series import SeriesPlan, equation, plan_series
@@ -125,7 +123,8 @@ def plan_sweeps(
         if scheme == "splitting":
             raise
         try:
-            return plan_series(cell, host, order, composition, spec)
+            found = plan_series(cell, host, order, composition, spec)
+            return replace(found, since=unsplit.diagnostics[0].message) if isinstance(unsplit, MisfitError) else found
         except SpecError as error:
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
 
@@ -134,8 +133,7 @@ def _plan_splitting(
     cell: Cell, host: Host, order: int, composition: str, spec: Spec | None, scheme: str
 ) -> SplittingPlan:
     search = GraphSearch if cell.relation == GRAPH else PartSearch
-    parts = split_cell(cell, host.locations.get(("hamiltonian",)), search)
-    parts, forced = _with_forces(cell, parts, search, host, spec, scheme)
+    parts, forced = _coloured(cell, search, host, spec, scheme)
     noise = tuple(noise_flows(cell, parts.colouring, search, host))
     flows = (*parts.flows, *forced)
     choice = planned(host, Splitting(flows), order, composition, lambda: () if cell.forces else _kicks(cell, parts))
@@ -148,28 +146,34 @@ def _plan_splitting(
     return SplittingPlan(parts, choice, noise)
 
 
-def _with_forces(
-    cell: Cell, parts: CellSplitting, search: type[PartSearch], host: Host, spec: Spec | None, scheme: str
+def _coloured(
+    cell: Cell, search: type[PartSearch], host: Host, spec: Spec | None, scheme: str
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]]:
-    """The parts of H and of the forces, with more colours where damping needs them: such as all runs have sizes for.
+    """The parts of H and of the forces, by the fewest colours such as all runs have sizes for.
 
-    Where there are none, the scheme ``splitting`` has others, and the runs are refused.
+    Where there are none, the scheme ``splitting`` has the fewest of all, with which the runs are refused.
     """
-    try:
-        return parts, force_flows(cell, parts.colouring, host)
-    except SpecError as refused:
-        found = None
-        for colouring in colourings(cell) if cell.forces.damping is not None else ():
-            try:
-                made = search(cell, colouring).splitting(), force_flows(cell, colouring, host)
-            except (SpecError, NoPartError):
-                continue
-            if not spec or not misfits(spec, cell.axes, colouring.periods(cell.boundary)):
-                return made
-            found = found or made
-        if found is None or scheme == "auto":
-            raise refused
-        return found
+    best: tuple[CellSplitting, tuple[CellFlow, ...]] | None = None
+    misfit: list[Diagnostic] = []
+    refused: SpecError | None = None
+    for parts in splittings(cell, host.locations.get(("hamiltonian",)), search):
+        try:
+            made = parts, force_flows(cell, parts.colouring, host)
+        except SpecError as error:
+            if cell.forces.damping is None:  # the flows of other forces are the same whatever the colours
+                raise
+            refused = refused or error
+            continue
+        wrong = misfits(spec, cell.axes, parts.colouring.periods(cell.boundary)) if spec else []
+        if not wrong:
+            return made
+        best, misfit = best or made, misfit or wrong
+    if best is None:
+        assert refused is not None
+        raise refused
+    if scheme == "auto":
+        raise MisfitError(misfit)
+    return best
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:

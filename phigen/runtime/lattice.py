@@ -512,9 +512,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             if size < least:
                 raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
             if size % period:
-                raise ValueError(
-                    f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
-                )
+                message = f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
+                raise ValueError(f"{message}, and a solver compiled with scheme='series' takes every size")
         if not np.isfinite(found).all():
             place = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
             where = ", ".join(map(str, place[1:]))

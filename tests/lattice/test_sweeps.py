@@ -520,8 +520,30 @@ def test_wrong_arguments_are_told(x: np.ndarray, more: dict[str, Any], error: ty
 
 
 def test_odd_sizes_do_not_fit_two_colours() -> None:
-    with pytest.raises(ValueError, match="multiples of 2"):
+    with pytest.raises(ValueError, match="multiples of 2, and a solver compiled with scheme='series' takes every size"):
         solver("volterra").integrate(np.ones((1, 7)), 0.1, 1)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "scheme", "step"),
+    [
+        ([8], "auto", "sites of 2 colours"),
+        ([9], "auto", "sites of 3 colours"),
+        ([9, 6], "auto", "sites of 3 colours"),
+        (
+            [8, 9],
+            "auto",
+            "scheme: series, since sizes: 9 along i is no multiple of 2, as the colours of the splitting need",
+        ),
+        ([9], "splitting", "sites of 3 colours"),
+    ],
+)
+def test_colours_are_such_as_all_runs_have_sizes_for(sizes: list[int], scheme: str, step: str) -> None:
+    runs = "".join(f"  r{n}: {{sizes: [{n}], initial: {{x: 1 + i/9}}, step: 0.1, steps: 1}}\n" for n in sizes)
+    text = f"lattice: {{axes: [i], boundary: periodic}}\nscheme: {scheme}\ncoordinates: [x]\nhamiltonian: x\n"
+    found = compile_text(f'{text}poisson: {{brackets: {{x: {{"x[i+1]": "x*x[i+1]"}}}}}}\nruns:\n{runs}')
+    assert any(fact.endswith(step) for fact in found.program.about.facts)
+    assert {s.verdict for group in lattices.sweeps(found).values() for s in group} == {PROVED}
 
 
 @pytest.mark.parametrize(
@@ -535,7 +557,7 @@ def test_odd_sizes_do_not_fit_two_colours() -> None:
          'hamiltonian: "a*b[i+1]"', "which couple neighbours"),
         ('coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nscheme: series\norder: 12\n'
          'hamiltonian: "p**2/2 + q*q[i+1]"', "the orders 2, 4, 4, 6, 6, 8, 8, 10, not 12"),
-        ('coordinates: [x]\npoisson: {brackets: {x: {"x[i+1]": "x*x[i+1]"}}}\nhamiltonian: x\n'
+        ('scheme: splitting\ncoordinates: [x]\npoisson: {brackets: {x: {"x[i+1]": "x*x[i+1]"}}}\nhamiltonian: x\n'
          'runs: {odd: {sizes: [7], initial: {x: 1}, step: 0.1, steps: 1}}',
          "(?s)7 along i is no multiple of 2.*for example 6"),
     ],
