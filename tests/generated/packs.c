@@ -126,7 +126,6 @@ static void begin(double h, size_t steps)
     all = (F(members)){ .x = x, .members = F(GROUP), .steps = steps, .h = &step, .status = status };
     memset(&group, 0, sizeof group);
     group.packs = F(PACK_COUNT);
-    F(group_share)(&group, 0);
     for (int m = 0; m < F(GROUP); ++m) EXPECT(F(group_join)(&group, m, &all, 0) == F(OK));
 }
 

@@ -11,6 +11,7 @@ from support import COMMAND, SPECIES, TARGETS, compile_text, compiled, run, sett
 from phigen.compiler import emit
 from phigen.errors import StepError
 from phigen.scheme.steps import Explicit, Splitting
+from phigen.targets.c import kernels
 
 EXERCISE = Path(__file__).with_name("packs.c")
 
@@ -54,6 +55,15 @@ def exercise(compilation, folder, optimisation, ulps, far):
 def test_members_of_splittings_equal_single_trajectories_bit_for_bit(name, tmp_path):
     """Where arguments are small and products are not fused; else to round-off."""
     exercise(compiled(name, 4, "splitting"), tmp_path, "-O0", 0, FAR[name])
+
+
+def test_flows_that_are_printed_in_parts_do_the_same(tmp_path, monkeypatch):
+    """Parts are functions apart, which read the coefficients of every lane."""
+    monkeypatch.setattr(kernels, "LONGEST_FUNCTION", 2)
+    compilation = compiled("henon_heiles", 4, "splitting")
+    (text,) = emit(compilation.program, "c", COMMAND, single_file=True).values()
+    assert "_change2_lanes_part2(coef, state, change, work);" in text
+    exercise(compilation, tmp_path, "-O0", 0, 1)
 
 
 @pytest.mark.parametrize("name", slow_but(["kepler"], ["spin_chain5", "kepler"]))
@@ -170,18 +180,24 @@ VECTORS = list(product(["gcc", "clang"], ["henon_heiles", "spin_chain5", "volter
 
 @pytest.mark.parametrize(("compiler", "name"), slow_but([v for v in VECTORS if v[1] == "henon_heiles"], VECTORS))
 def test_steps_of_packs_become_vector_instructions(name, compiler, tmp_path):
-    """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013."""
+    """All of their arithmetic, by both compilers, with no more than -O2 and the instructions of 2013; coefficients that
+    members share are read as one number for all lanes."""
     write(tmp_path, emit(compiled(name, 4, "splitting").program, "c", COMMAND, single_file=True))
     flags = ["-std=c99", "-O2", "-march=haswell", "-fno-math-errno", "-S"]
     run([tool(compiler), *flags, f"{name}.c", "-o", "packs.s"], tmp_path)
-    vector, scalar, function = 0, 0, ""
+    vector, scalar, spread, function = 0, 0, 0, ""
+    steps = re.compile(r".*_(?:lanes|group_(?:run|steps|advance))")
     beside = ("_group_run", "_far_lanes")  # single steps may be part of the one; the other calls libm lane by lane
     for line in (tmp_path / "packs.s").read_text().splitlines():
         label = re.match(r"(\w[\w.]*):", line)
         function = label[1] if label else function
         arithmetic = re.match(r"\s+v(?:add|sub|mul|fn?m(?:add|sub)\d+)([ps]d)\s", line)
-        if arithmetic and function.endswith(("_lanes", "_group_run")):
+        if not steps.fullmatch(function):
+            continue
+        spread += bool(re.match(r"\s+vbroadcastsd\s+\S*\(%(?!rip)", line))
+        if arithmetic:
             vector += arithmetic[1] == "pd"
             scalar += arithmetic[1] == "sd" and not function.endswith(beside)
     assert vector > 40
     assert scalar == 0
+    assert spread > 4  # clang spreads two of a member that joins

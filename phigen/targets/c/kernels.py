@@ -44,7 +44,8 @@ SHARED_LINE = 105
 class Form:
     """How a kernel is printed: under which name; ``exported``, where NULL stands for the default parameters;
     ``returning`` its only value; at one point or in ``lanes``; at a ``single`` lane; without zeros if ``sparse``; what
-    it calls; which arrays all lanes share; how large its workspace is, if it is a part."""
+    it calls; which arrays all lanes share, and of which they share the first lane where the argument ``own`` is 0; how
+    large its workspace is, if it is a part."""
 
     name: str
     exported: bool = False
@@ -54,6 +55,7 @@ class Form:
     sparse: bool = False
     functions: Mapping[str, str] = field(default_factory=lambda: FUNCTIONS)
     shared: frozenset[str] = frozenset()
+    alike: frozenset[str] = frozenset()
     workspace: int = 0
 
     def number(self, program: Program, array: str) -> str:
@@ -62,7 +64,9 @@ class Form:
 
     def lane(self, array: str) -> str:
         """The inner index of an array."""
-        return "[lane]" if self.lanes and array not in self.shared else ""
+        if not self.lanes or array in self.shared:
+            return ""
+        return "[own * lane]" if array in self.alike else "[lane]"
 
 
 def function(
@@ -76,19 +80,22 @@ def function(
     single: bool = False,
     sparse: bool = False,
     shared: Sequence[str] = (),
+    alike: Sequence[str] = (),
     functions: Mapping[str, str] | None = None,
 ) -> str:
     """The C source of a kernel: one function, or a chain of static ones that share a workspace.
 
     With ``lanes`` the kernel is evaluated at several points: each value becomes an array over them, but for the inputs
-    that are ``shared``. A ``single`` one is evaluated at one of these points, the argument ``lane``, and its outputs
-    are numbers. What is always zero is not stored if ``sparse``. ``functions`` are the names of those that it calls.
+    that are ``shared``. Of those ``alike`` all lanes read the first where the argument ``own`` is 0; compilers put such
+    a kernel in the place of its calls, where that is known. A ``single`` one is evaluated at one of these points, the
+    argument ``lane``, and its outputs are numbers. What is always zero is not stored if ``sparse``. ``functions`` are
+    the names of those that it calls.
     """
     if functions is None:
         functions = lane_calls(program) if lanes else FUNCTIONS
     own = f"{program.name}_{name or kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
     plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
-    form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays))
+    form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays), frozenset(alike))
     where = f" in {'one lane' if single else 'all lanes'}" if lanes else ""
     called = f"{program.name}_{name or kernel.name}{where}"
     code = lower(kernel)
@@ -102,9 +109,11 @@ def function(
     texts = []
     for k, piece in enumerate(pieces, 1):
         part = replace(form, name=f"{own}_part{k}", workspace=workspace, exported=False, returning=False)
+        part = replace(part, alike=frozenset())
         lines = [*_comment(f"{called}, part {k} of {len(pieces)}."), _signature(program, kernel, part) + "\n{"]
         texts.append("\n".join([*lines, *_body(program, kernel, part, piece), "}\n"]))
     arguments = ", ".join([*kernel.inputs, *(["lane"] if single else []), *(o.name for o in kernel.outputs), "work"])
+    head += ["    (void)own; /* parts read every lane */"] if alike else []
     head.append(f"    {form.number(program, 'work')} work[{workspace}];")
     if exported:
         arguments = arguments.replace(f", {kernel.outputs[0].name}, work", ", value, work")
@@ -162,6 +171,7 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     # restrict: the outputs never overlap the inputs of our own calls; callers of the API get no such duty.
     qualifier = "" if form.exported else "restrict "
     arguments += ["int lane"] if form.single else []
+    arguments += ["int own"] if form.alike else []
     for o in () if form.returning else kernel.outputs:
         # The caller of NAME_casimirs sizes the array by NAME_CASIMIRS, which may be 0.
         length = "" if form.exported and kernel.name == "casimirs" else f"{qualifier}{max(1, len(o.values))}"
@@ -169,11 +179,12 @@ def _signature(program: Program, kernel: Kernel, form: Form) -> str:
     if form.workspace:
         arguments.append(f"{form.number(program, 'work')} work[restrict {form.workspace}]")
     linkage = f"{program.name}_APART static " if form.workspace else "" if form.exported else "static "
+    linkage = f"{program.name}_IN_PLACE static inline " if form.alike else linkage
     return f"{linkage}{'double' if form.returning else 'void'} {form.name}({', '.join(arguments)})"
 
 
 def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]:
-    arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work", "lane"]
+    arrays = [*kernel.inputs, *(o.name for o in kernel.outputs), "work", "lane", *(["own"] if form.alike else [])]
     calls = {f: f"{program.name}_{f}" for f in elementary.FUNCTIONS} | dict(form.functions)
     called = re.findall(r"[A-Za-z_]\w*", " ".join(calls.values()))
     scope = Scope(C_RESERVED | {*arrays, *called})
@@ -192,6 +203,8 @@ def _body(program: Program, kernel: Kernel, form: Form, code: Code) -> list[str]
     unused += [o.name for o in kernel.outputs if o.name not in written]
     if form.workspace and not any("work[" in line for line in lines):
         unused.append("work")
+    if form.alike and form.alike.isdisjoint(touched):
+        unused.append("own")
     if form.returning:
         lines = [line.replace(f"{kernel.outputs[0].name}[0] =", "return", 1) for line in lines]
     head = [f"    {', '.join(f'(void){u}' for u in unused)};"] if unused else []

@@ -51,7 +51,7 @@ def printed(program: Program, lanes: Lanes) -> list[str]:
 
 def _packs(program: Program, packs: Packs) -> list[str]:
     if not isinstance(program.step, Splitting):
-        return [function(program, kernel, lanes=True) for kernel in packs.kernels]
+        return [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
     short = {f: f"{program.name}_{f}_near" for f in NEAR_FUNCTIONS}
     found = functions.near(program, packs.near)
     found += splitting.in_lanes(program, program.step, "", {**lane_calls(program), **short})

@@ -35,7 +35,7 @@ def printed(program: Program, step: Splitting) -> str:
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
     passed = "x, moved, start" + ", element" * bool(program.attitude)
     kept = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
-    found.append(_steps(program, step, "", "inline ", arguments + more + kept, passed, kept=bool(kept)))
+    found.append(_steps(program, step, "", "static inline ", arguments + more + kept, passed, kept=bool(kept)))
     return "\n".join(found)
 
 
@@ -45,10 +45,11 @@ def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[st
     for k, flow in enumerate(step.flows, 1):
         kernel, values = _flow(program, flow, k)
         kernel = replace(kernel, name=kernel.name + form)
-        found.append(function(program, kernel, lanes=True, functions=functions))
+        found.append(function(program, kernel, lanes=True, alike=["coef"], functions=functions))
         found.append(render("c", "flow.c", {**values, "form": f"{form}_lanes"}))
-    arguments = f"int row, {program.name}_pack *pack, int packs"
-    return [*found, _steps(program, step, f"{form}_lanes", "", arguments, "pack, packs")]
+    arguments = f"int row, int own, {program.name}_group *group"
+    linkage = f"{program.name}_IN_PLACE static inline "
+    return [*found, _steps(program, step, f"{form}_lanes", linkage, arguments, "own, group")]
 
 
 def tangent(program: Program, step: Splitting) -> str:

@@ -37,5 +37,14 @@ typedef double phi_lanes[PHI_LANES];
 #define PHI_EACH_LANE
 #endif
 
+#if PHI_PACKS
+/* Before a function that compilers put in the place of its calls, one for each value of a constant argument. */
+#if defined(__GNUC__)
+#define PHI_IN_PLACE __attribute__((always_inline))
+#else
+#define PHI_IN_PLACE
+#endif
+
+#endif
 #include "lane_functions.c"
 #endif

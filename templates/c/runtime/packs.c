@@ -18,11 +18,24 @@ enum {
 /* Members of an ensemble, one in each lane. */
 typedef struct {
     phi_lanes x[PHI_DIM], carry[PHI_DIM];
-    phi_lanes *coef[PHI_STAGES]; /* of the members, or of all packs */
 #if PHI_SPLITTING
     phi_lanes start[PHI_DIM]; /* x where a step began; in it, carry is moved */
 #endif
 } phi_pack;
+
+/* Members of an ensemble, in packs. */
+typedef struct {
+    phi_pack pack[PHI_PACK_COUNT];
+    phi_lanes coef[PHI_PACK_COUNT][PHI_STAGES][PHI_COEFFICIENTS];
+    int packs;    /* in use */
+    int own;      /* whether each member has coefficients of its own */
+    int prepared; /* whether a member has brought coefficients that all have */
+#if PHI_FAR
+    int far; /* whether arguments of functions are too large for polynomials */
+#endif
+    int active[PHI_GROUP];       /* whether there is such a member, and it has not left */
+    size_t steps_left[PHI_GROUP]; /* that it has still to make */
+} phi_group;
 
 #if PHI_SPLITTING
 /* phi_add for one coordinate in all lanes. */
@@ -53,10 +66,10 @@ static inline void phi_settle_lanes(double x[restrict PHI_LANES], double carry[r
 
 #if PHI_EXPLICIT
 /* phi_stage for the members of a pack; the sums are those of phi_advance. */
-static inline void phi_stage_lanes(phi_lanes *coef, phi_pack *pack)
+PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int own, phi_pack *pack)
 {
     phi_lanes increment[PHI_DIM];
-    phi_explicit_lanes(coef, pack->x, increment);
+    phi_explicit_lanes(coef, pack->x, own, increment);
     for (int i = 0; i < PHI_DIM; ++i) {
         double *x = pack->x[i], *carry = pack->carry[i];
         PHI_EACH_LANE
@@ -69,53 +82,54 @@ static inline void phi_stage_lanes(phi_lanes *coef, phi_pack *pack)
     }
 }
 
-/* Steps of some packs: each stage for all of them. */
-static void phi_steps_lanes(phi_pack *pack, int packs, int steps)
+/* Steps of a group: each stage for all packs. Where own is 0, all members have the coefficients of the first lane. */
+PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step)
         for (int stage = 0; stage < PHI_STAGES; ++stage)
-            for (int k = 0; k < packs; ++k) phi_stage_lanes(pack[k].coef[stage], &pack[k]);
+            for (int k = 0; k < group->packs; ++k) phi_stage_lanes(group->coef[own * k][stage], own, &group->pack[k]);
 }
 
 #else
-/* Steps of some packs: as in phi_stages, each flow for all of them. */
-static void phi_steps_lanes(phi_pack *pack, int packs, int steps)
+/* Before the flows of a step. */
+static void phi_begin_lanes(phi_group *group)
+{
+    for (int k = 0; k < group->packs; ++k) memcpy(group->pack[k].start, group->pack[k].x, sizeof group->pack[k].x);
+}
+
+/* After them. */
+static void phi_end_lanes(phi_group *group)
+{
+    for (int k = 0; k < group->packs; ++k) {
+        phi_pack *pack = &group->pack[k];
+        for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack->x[i], pack->carry[i], pack->start[i]);
+    }
+}
+
+/* Steps of a group: as in phi_stages, each flow for all packs. Where own is 0, all members have the coefficients of the
+   first lane. */
+PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {
-        for (int k = 0; k < packs; ++k) memcpy(pack[k].start, pack[k].x, sizeof pack[k].x);
-        phi_flows_lanes(0, pack, packs);
-        for (int k = 0; k < packs; ++k)
-            for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack[k].x[i], pack[k].carry[i], pack[k].start[i]);
+        phi_begin_lanes(group);
+        phi_flows_lanes(0, own, group);
+        phi_end_lanes(group);
     }
 }
 
 #endif
 #if PHI_FAR
 /* The same where arguments of functions are too large for polynomials. */
-static void phi_steps_far_lanes(phi_pack *pack, int packs, int steps)
+PHI_APART static void phi_steps_far_lanes(phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step) {
-        for (int k = 0; k < packs; ++k) memcpy(pack[k].start, pack[k].x, sizeof pack[k].x);
-        phi_flows_far_lanes(0, pack, packs);
-        for (int k = 0; k < packs; ++k)
-            for (int i = 0; i < PHI_DIM; ++i) phi_settle_lanes(pack[k].x[i], pack[k].carry[i], pack[k].start[i]);
+        phi_begin_lanes(group);
+        phi_flows_far_lanes(0, 1, group); /* which is right for all */
+        phi_end_lanes(group);
     }
 }
 
 #endif
-/* Members of an ensemble, in packs. */
-typedef struct {
-    phi_pack pack[PHI_PACK_COUNT];
-    phi_lanes coef[PHI_PACK_COUNT][PHI_STAGES][PHI_COEFFICIENTS]; /* only the first is used where all have the same */
-    int packs;    /* in use */
-    int prepared; /* whether a member has brought coefficients that all have */
-#if PHI_FAR
-    int far; /* whether arguments of functions are too large for polynomials */
-#endif
-    int active[PHI_GROUP];       /* whether there is such a member, and it has not left */
-    size_t steps_left[PHI_GROUP]; /* that it has still to make */
-} phi_group;
-
 /* How many active members have values that are not finite, and which. */
 static int phi_group_lost(const phi_group *group, int lost[PHI_GROUP])
 {
@@ -138,6 +152,13 @@ static void phi_pack_copy(phi_pack *to, const phi_pack *from, int lane)
     }
 }
 
+/* Some steps of all members, by short ways. */
+static void phi_group_advance(phi_group *group, int steps)
+{
+    if (group->own) phi_steps_lanes(1, group, steps);
+    else phi_steps_lanes(0, group, steps);
+}
+
 /* Some steps of all members. One whose values are not finite then leaves, with its state before them. How many remain. */
 static int phi_group_steps(phi_group *group, int steps)
 {
@@ -145,14 +166,14 @@ static int phi_group_steps(phi_group *group, int steps)
     int lost[PHI_GROUP], active = 0;
     memcpy(before, group->pack, sizeof before);
 #if PHI_FAR
-    if (!group->far) phi_steps_lanes(group->pack, group->packs, steps);
+    if (!group->far) phi_group_advance(group, steps);
     if (group->far || phi_group_lost(group, lost) > 0) {
         memcpy(group->pack, before, sizeof before);
-        phi_steps_far_lanes(group->pack, group->packs, steps);
+        phi_steps_far_lanes(group, steps);
         group->far = phi_group_lost(group, lost) == 0;
     }
 #else
-    phi_steps_lanes(group->pack, group->packs, steps);
+    phi_group_advance(group, steps);
     phi_group_lost(group, lost);
 #endif
     for (int m = 0; m < PHI_GROUP; ++m) {
@@ -165,20 +186,14 @@ static int phi_group_steps(phi_group *group, int steps)
     return active;
 }
 
-/* Where packs have their coefficients: each its own, or all those of the first. */
-static void phi_group_share(phi_group *group, size_t own)
-{
-    for (int k = 0; k < PHI_PACK_COUNT; ++k)
-        for (int stage = 0; stage < PHI_STAGES; ++stage) group->pack[k].coef[stage] = group->coef[own ? k : 0][stage];
-}
-
-/* Put a member into its lane, and its coefficients there; if all have the same, the first brings them to all lanes. */
+/* Put a member into its lane, and its coefficients there; if all have the same, the first brings them to all. */
 static phi_status phi_group_join(phi_group *group, int m, const phi_members *all, size_t first)
 {
     phi_solver s;
     double x[PHI_DIM];
     phi_pack *pack = &group->pack[m / PHI_LANES];
-    const int lane = m % PHI_LANES, from = all->own ? lane : 0, to = all->own ? lane + 1 : PHI_LANES;
+    const int lane = m % PHI_LANES;
+    const int from = all->own ? m : 0, to = all->own ? m + 1 : PHI_GROUP;
     phi_status status = PHI_OK;
     if (group->prepared) {
         for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + first + (size_t)m];
@@ -192,7 +207,7 @@ static phi_status phi_group_join(phi_group *group, int m, const phi_members *all
     if (status != PHI_OK || group->prepared) return status;
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         for (int k = 0; k < PHI_COEFFICIENTS; ++k)
-            for (int j = from; j < to; ++j) pack->coef[stage][k][j] = s.coef[stage][k];
+            for (int j = from; j < to; ++j) group->coef[j / PHI_LANES][stage][k][j % PHI_LANES] = s.coef[stage][k];
     group->prepared = !all->own;
     return PHI_OK;
 }
@@ -236,7 +251,7 @@ PHI_APART static phi_status phi_group_run(const phi_members *all, size_t first)
     const int count = all->members - first < PHI_GROUP ? (int)(all->members - first) : PHI_GROUP;
     memset(&group, 0, sizeof group);
     group.packs = (count + PHI_LANES - 1) / PHI_LANES;
-    phi_group_share(&group, all->own);
+    group.own = (int)all->own;
     for (int m = 0; m < count; ++m) begun[m] = phi_group_join(&group, m, all, first);
     int active = count > 1; /* one alone is quicker without lanes */
     for (size_t done = 0; done < all->steps && active > 0;) {
