@@ -130,10 +130,10 @@ static void phi_invert_lanes(phi_lanes matrix[4], phi_lanes slope[4], phi_lanes 
 
 #endif
 #if PHI_EXPLICIT
-static void phi_explicit_lanes(phi_lanes coef[], phi_lanes state[2], phi_lanes increment[2])
+static void phi_explicit_lanes(phi_lanes coef[], phi_lanes state[2], int own, phi_lanes increment[2])
 {
     for (int lane = 0; lane < PHI_LANES; ++lane) {
-        const double x[2] = { state[0][lane], state[1][lane] }, c[2] = { coef[0][lane], coef[1][lane] };
+        const double x[2] = { state[0][lane], state[1][lane] }, c[2] = { coef[0][own * lane], coef[1][own * lane] };
         double change[2];
         phi_explicit(c, x, change);
         for (int i = 0; i < 2; ++i) increment[i][lane] = change[i];
@@ -142,14 +142,14 @@ static void phi_explicit_lanes(phi_lanes coef[], phi_lanes state[2], phi_lanes i
 
 #endif
 #if PHI_SPLITTING
-static void phi_flows_lanes(int row, phi_pack *pack, int packs)
+static void phi_flows_lanes(int row, int own, phi_group *group)
 {
-    for (int k = 0; k < 3 * packs; ++k) {
-        phi_pack *at = &pack[k / 3];
-        phi_lanes change, *coef = at->coef[0] + row * PHI_ROW;
+    for (int k = 0; k < 3 * group->packs; ++k) {
+        phi_pack *at = &group->pack[k / 3];
+        phi_lanes change, *coef = group->coef[own * (k / 3)][0] + row * PHI_ROW;
         const int kick = k % 3 == 1;
         for (int lane = 0; lane < PHI_LANES; ++lane)
-            change[lane] = kick ? -coef[PHI_ROW + 1][lane] * sin(at->x[0][lane]) : coef[0][lane] * at->x[1][lane];
+            change[lane] = kick ? -coef[PHI_ROW + 1][own * lane] * sin(at->x[0][lane]) : coef[0][own * lane] * at->x[1][lane];
         phi_add_lanes(at->x[kick], at->carry[kick], at->start[kick], change);
     }
 }
