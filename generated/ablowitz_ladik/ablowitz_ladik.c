@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a0d6284080e92a914e08e2e094d7d39903033199132685c6630164d05877c04b
+ * body-sha256: 70c9a8e6bd0ee550ee64bc0fe40a99a78c85908abca0b1c09ed4cc1028d2c641
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -74,10 +74,11 @@ static void ablowitz_ladik_prepare(const ablowitz_ladik_params *params, double h
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see ablowitz_ladik_solver */
-    ptrdiff_t length; /* sites of a row */
+    const ablowitz_ladik_solver *s;
+    double *const *x;   /* see ablowitz_ladik_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } ablowitz_ladik_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -101,11 +102,15 @@ static inline void ablowitz_ladik_ends(double *row, ptrdiff_t length, ptrdiff_t 
         for (ptrdiff_t k = 1; k <= ablowitz_ladik_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void ablowitz_ladik_locate(const ablowitz_ladik_solver *s, ablowitz_ladik_row *row)
+/* The whole row. */
+static inline ablowitz_ladik_row ablowitz_ladik_row_of(const ablowitz_ladik_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    ablowitz_ladik_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { ablowitz_ladik_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -116,19 +121,13 @@ static size_t ablowitz_ladik_units(const ablowitz_ladik_solver *s)
     return s->length < 2 * ablowitz_ladik_PIECE ? 1 : (size_t)s->length / ablowitz_ladik_PIECE;
 }
 
-typedef struct {
-    ablowitz_ladik_row row;
-    ptrdiff_t from, to;
-} ablowitz_ladik_piece;
-
-/* The piece of that number, or the row. */
-static inline ablowitz_ladik_piece ablowitz_ladik_piece_of(const ablowitz_ladik_solver *s, size_t unit)
+/* The piece of that number. */
+static inline ablowitz_ladik_row ablowitz_ladik_piece_of(const ablowitz_ladik_solver *s, size_t unit)
 {
-    ablowitz_ladik_piece piece;
-    ablowitz_ladik_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * ablowitz_ladik_PIECE;
-    piece.to = unit == ablowitz_ladik_units(s) - 1 ? s->length : piece.from + ablowitz_ladik_PIECE;
-    return piece;
+    ablowitz_ladik_row row = ablowitz_ladik_row_of(s);
+    row.from = (ptrdiff_t)unit * ablowitz_ladik_PIECE;
+    if (unit + 1 < ablowitz_ladik_units(s)) row.to = row.from + ablowitz_ladik_PIECE;
+    return row;
 }
 
 /* cos(sqrt(s)), cosh(sqrt(-s)) for negative s: a polynomial where s is small. */
@@ -163,14 +162,13 @@ static inline double ablowitz_ladik_sinroot(double s)
 }
 
 /* the flow of H_1 = sum of x*x[i+1]: y moved by a Riccati equation */
-static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladik_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladik_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
     const double *restrict x_row = row->x[0];
     double *y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
         const double t1 = x_row[i + 1] + x_row[i - 1];
         const double t2 = x * x;
@@ -183,13 +181,12 @@ static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladi
 }
 
 /* the flow of H_2 = sum of -log(y**2 + (1 + x**2)): x, y turned */
-static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladik_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladik_row *row)
 {
     const double c2 = coef[2], c3 = coef[3];
     double *x_row = row->x[0], *y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
         const double change0 = -(c3 * y + c2 * x);
         const double change1 = c3 * x - c2 * y;
@@ -199,14 +196,13 @@ static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladi
 }
 
 /* the flow of H_3 = sum of y*y[i+1]: x moved by a Riccati equation */
-static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladik_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladik_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
     double *x_row = row->x[0];
     const double *restrict y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
         const double t1 = y * y;
         const double t2 = y_row[i + 1] + y_row[i - 1];
@@ -222,50 +218,47 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
 static void ablowitz_ladik_sweep_piece(const ablowitz_ladik_solver *s, int part, const double *coef,
     size_t unit)
 {
-    const ablowitz_ladik_piece at = ablowitz_ladik_piece_of(s, unit);
+    const ablowitz_ladik_row row = ablowitz_ladik_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        ablowitz_ladik_sweep1(coef, &at.row, at.from, at.to);
-        ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
+        ablowitz_ladik_sweep1(coef, &row);
+        ablowitz_ladik_ends(s->x[1], s->length, row.from, row.to);
         break;
     case 2: /* H_2 */
-        ablowitz_ladik_sweep2(coef, &at.row, at.from, at.to);
-        ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
-        ablowitz_ladik_ends(s->x[1], s->length, at.from, at.to);
+        ablowitz_ladik_sweep2(coef, &row);
+        ablowitz_ladik_ends(s->x[0], s->length, row.from, row.to);
+        ablowitz_ladik_ends(s->x[1], s->length, row.from, row.to);
         break;
     default: /* H_3 */
-        ablowitz_ladik_sweep3(coef, &at.row, at.from, at.to);
-        ablowitz_ladik_ends(s->x[0], s->length, at.from, at.to);
+        ablowitz_ladik_sweep3(coef, &row);
+        ablowitz_ladik_ends(s->x[0], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void ablowitz_ladik_energy_row(const ablowitz_ladik_params *params, const ablowitz_ladik_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void ablowitz_ladik_energy_row(const ablowitz_ladik_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
-        out[i - from] = x * x_row[i + 1] + y * y_row[i + 1] - log(y * y + (1.0 + x * x));
+        out[i - row->from] = x * x_row[i + 1] + y * y_row[i + 1] - log(y * y + (1.0 + x * x));
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_params *params,
-    const ablowitz_ladik_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_row *row, double *restrict out)
 {
-    (void)params;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     ablowitz_ladik_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
         const double t1 = y * y + (1.0 + x * x);
         const double t2 = 1.0 / t1;
-        out[i - from] = t1 * (y_row[i + 1] + y_row[i - 1] - 2.0 * (y * t2));
-        out[(ptrdiff_t)apart + i - from] = -(t1 * (x_row[i + 1] + x_row[i - 1] - 2.0 * (x * t2)));
+        out[i - row->from] = t1 * (y_row[i + 1] + y_row[i - 1] - 2.0 * (y * t2));
+        out[apart + i - row->from] = -(t1 * (x_row[i + 1] + x_row[i - 1] - 2.0 * (x * t2)));
     }
 }
 
@@ -482,13 +475,12 @@ ablowitz_ladik_status ablowitz_ladik_resume(ablowitz_ladik_solver *s, double h, 
 double ablowitz_ladik_hamiltonian(const ablowitz_ladik_solver *s)
 {
     double density[ablowitz_ladik_BUFFER], sum = 0.0, rest = 0.0;
-    ablowitz_ladik_row row;
-    ablowitz_ladik_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += ablowitz_ladik_BUFFER) {
-        const ptrdiff_t to = s->length - from > ablowitz_ladik_BUFFER ? from + ablowitz_ladik_BUFFER
-            : s->length;
-        ablowitz_ladik_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    ablowitz_ladik_row row = ablowitz_ladik_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > ablowitz_ladik_BUFFER ? row.from + ablowitz_ladik_BUFFER : s->length;
+        ablowitz_ladik_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -498,14 +490,11 @@ double ablowitz_ladik_hamiltonian(const ablowitz_ladik_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void ablowitz_ladik_kernel(const ablowitz_ladik_params *, const ablowitz_ladik_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void ablowitz_ladik_fill(const ablowitz_ladik_solver *s, ablowitz_ladik_kernel *kernel, double *out)
+static void ablowitz_ladik_fill(const ablowitz_ladik_solver *s, void kernel(const ablowitz_ladik_row *,
+    double *restrict), double *out)
 {
-    ablowitz_ladik_row row;
-    ablowitz_ladik_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const ablowitz_ladik_row row = ablowitz_ladik_row_of(s);
+    kernel(&row, out);
 }
 
 void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)

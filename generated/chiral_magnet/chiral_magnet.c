@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e9adc1c273ce8ddd90cb8f94954396e0cc420349eb3f4f32a92432544155f711
+ * body-sha256: b9098b68902ae60c37cd169909637ef59a99002837fbab7aee079714d325b2c2
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -75,17 +75,15 @@ static void chiral_magnet_prepare(const chiral_magnet_params *params, double h, 
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
+    const chiral_magnet_solver *s;
     double *const *x;        /* see chiral_magnet_solver */
-    ptrdiff_t length;        /* sites of a row */
-    double *const *gathered; /* see chiral_magnet_solver */
-    const int *bonds, *middle, *other;
-    double *const *at_bonds;
-    double side; /* 1, or -1 where a loop is told of bonds as if they ran the other way */
-    const int *colours;
-    int chosen; /* the colour that a part of H belongs to */
-    int across; /* whether it is that of the other ends of bonds, where a loop is told */
+    ptrdiff_t from, to;      /* its sites, to not among them */
+    double *const *at_bonds; /* see chiral_magnet_solver */
+    double side;             /* 1, or -1 where a loop is told of bonds as if they ran the other way */
+    int chosen;              /* the colour that a part of H belongs to */
+    int across;              /* whether it is that of the other ends of bonds, where a loop is told */
 } chiral_magnet_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -99,20 +97,19 @@ typedef struct {
 #define chiral_magnet_EACH_SITE
 #endif
 
-/* What kernels are told of a row. */
-static inline void chiral_magnet_locate(const chiral_magnet_solver *s, chiral_magnet_row *row)
+/* The whole row. */
+static inline chiral_magnet_row chiral_magnet_row_of(const chiral_magnet_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->gathered = s->gathered;
-    row->bonds = s->bonds;
-    row->middle = s->middle;
-    row->other = s->other;
-    row->at_bonds = s->at_bonds;
-    row->side = 1.0;
-    row->colours = s->colours;
-    row->chosen = 0;
-    row->across = 0;
+    chiral_magnet_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    row.at_bonds = s->at_bonds;
+    row.side = 1.0;
+    row.chosen = 0;
+    row.across = 0;
+    return row;
 }
 
 enum { chiral_magnet_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
@@ -123,19 +120,13 @@ static size_t chiral_magnet_units(const chiral_magnet_solver *s)
     return s->length < 2 * chiral_magnet_PIECE ? 1 : (size_t)s->length / chiral_magnet_PIECE;
 }
 
-typedef struct {
-    chiral_magnet_row row;
-    ptrdiff_t from, to;
-} chiral_magnet_piece;
-
-/* The piece of that number, or the row. */
-static inline chiral_magnet_piece chiral_magnet_piece_of(const chiral_magnet_solver *s, size_t unit)
+/* The piece of that number. */
+static inline chiral_magnet_row chiral_magnet_piece_of(const chiral_magnet_solver *s, size_t unit)
 {
-    chiral_magnet_piece piece;
-    chiral_magnet_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * chiral_magnet_PIECE;
-    piece.to = unit == chiral_magnet_units(s) - 1 ? s->length : piece.from + chiral_magnet_PIECE;
-    return piece;
+    chiral_magnet_row row = chiral_magnet_row_of(s);
+    row.from = (ptrdiff_t)unit * chiral_magnet_PIECE;
+    if (unit + 1 < chiral_magnet_units(s)) row.to = row.from + chiral_magnet_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -178,21 +169,20 @@ static inline double chiral_magnet_sin_lane(double u) { return chiral_magnet_tur
       other parameters at bonds, the other way
    what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, z, x, with
       other parameters at bonds, across bonds */
-static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row)
 {
     const double c1 = coef[1];
     const double *restrict y_row = row->x[1];
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            if (row->colours[row->across ? row->other[k] : i] != row->chosen) continue;
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? row->side : -row->side;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            if (row->s->colours[row->across ? row->s->other[k] : i] != row->chosen) continue;
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? row->side : -row->side;
             const double y_b_ = y_row[j], Dx = side * row->at_bonds[0][k];
             sum0 += -(y_b_ * (Dx * c1));
         }
-        row->gathered[0][i] = sum0;
+        row->s->gathered[0][i] = sum0;
     }
 }
 
@@ -204,15 +194,14 @@ static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magn
    the flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): x, y turned
    the flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): y, z turned, where x, y, z stand for its
       y, z, x */
-static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magnet_row *row)
 {
     const double c0 = coef[0];
     double *x_row = row->x[0], *y_row = row->x[1];
     chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
-        const double t1 = c0 * row->gathered[0][i];
+        const double t1 = c0 * row->s->gathered[0][i];
         const double t2 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
         const double t3 = chiral_magnet_sin_lane(t1);
         const double change0 = -(x * t2 + y * t3);
@@ -225,33 +214,31 @@ static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magn
 /* what all other sites b add to the forces of H_2 at a site a
    what all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, z, x
    what all other sites b add to the forces of H_4 at a site a, where x, y, z stand for its z, x, y */
-static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet_row *row)
 {
     const double c2 = coef[2];
     const double *restrict x_row = row->x[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
             const double x_b_ = x_row[j];
             sum0 += -(c2 * x_b_);
         }
-        row->gathered[0][i] = sum0;
+        row->s->gathered[0][i] = sum0;
     }
 }
 
 /* the flow of H_4 = sum of -(J*(z[a]*z[b]) + (B*z + K*z**2)): x, y turned */
-static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_row *row)
 {
     const double c0 = coef[0], c3 = coef[3], c4 = coef[4];
     double *x_row = row->x[0], *y_row = row->x[1];
     const double *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double t1 = c0 * (row->gathered[0][i] + (c3 * z - c4));
+        const double t1 = c0 * (row->s->gathered[0][i] + (c3 * z - c4));
         const double t2 = (2.0 * chiral_magnet_sin_lane(0.5 * (t1)) * chiral_magnet_sin_lane(0.5 * (t1)));
         const double t3 = chiral_magnet_sin_lane(t1);
         const double change0 = -(x * t2 + y * t3);
@@ -271,64 +258,63 @@ static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, c
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1] };
     double *const Dy_Dx[] = { s->at_bonds[1], s->at_bonds[0] };
-    chiral_magnet_piece at = chiral_magnet_piece_of(s, unit);
+    chiral_magnet_row row = chiral_magnet_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        at.row.chosen = colour;
-        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-        at.row.side = -1.0;
-        at.row.across = 1;
-        at.row.x = y_z_x;
-        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
-        at.row.x = z_x_y;
-        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        row.chosen = colour;
+        chiral_magnet_gather1_0(coef, &row);
+        chiral_magnet_sweep_x_y(coef, &row);
+        row.side = -1.0;
+        row.across = 1;
+        row.x = y_z_x;
+        chiral_magnet_gather1_0(coef, &row);
+        row.x = z_x_y;
+        chiral_magnet_sweep_x_y(coef, &row);
         break;
     case 2: /* H_2 */
-        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-        at.row.x = y_z_x;
-        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        chiral_magnet_gather2(coef, &row);
+        row.x = y_z_x;
+        chiral_magnet_sweep_x_y(coef, &row);
         break;
     case 3: /* H_3 */
-        at.row.x = y_z_x;
-        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-        at.row.x = z_x_y;
-        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        row.x = y_z_x;
+        chiral_magnet_gather2(coef, &row);
+        row.x = z_x_y;
+        chiral_magnet_sweep_x_y(coef, &row);
         break;
     case 4: /* H_4 */
-        at.row.x = z_x_y;
-        chiral_magnet_gather2(coef, &at.row, at.from, at.to);
-        at.row.x = s->x;
-        chiral_magnet_sweep4(coef, &at.row, at.from, at.to);
+        row.x = z_x_y;
+        chiral_magnet_gather2(coef, &row);
+        row.x = s->x;
+        chiral_magnet_sweep4(coef, &row);
         break;
     default: /* H_5 */
-        at.row.chosen = colour;
-        at.row.at_bonds = Dy_Dx;
-        at.row.side = -1.0;
-        at.row.x = z_x_y;
-        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
-        at.row.x = s->x;
-        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
-        at.row.side = 1.0;
-        at.row.across = 1;
-        at.row.x = y_z_x;
-        chiral_magnet_gather1_0(coef, &at.row, at.from, at.to);
-        chiral_magnet_sweep_x_y(coef, &at.row, at.from, at.to);
+        row.chosen = colour;
+        row.at_bonds = Dy_Dx;
+        row.side = -1.0;
+        row.x = z_x_y;
+        chiral_magnet_gather1_0(coef, &row);
+        row.x = s->x;
+        chiral_magnet_sweep_x_y(coef, &row);
+        row.side = 1.0;
+        row.across = 1;
+        row.x = y_z_x;
+        chiral_magnet_gather1_0(coef, &row);
+        chiral_magnet_sweep_x_y(coef, &row);
         break;
     }
 }
 
 /* what a site b adds to the forces at a site a */
-static inline void chiral_magnet_bond_forces(const chiral_magnet_params *params, const chiral_magnet_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void chiral_magnet_bond_forces(const chiral_magnet_row *row)
 {
-    const double J = params->J, D = params->D;
+    const double J = row->s->params.J, D = row->s->params.D;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? row->side : -row->side;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? row->side : -row->side;
             const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = side * row->at_bonds[0][k],
                 Dy = side * row->at_bonds[1][k];
             const double t1 = D * Dy;
@@ -337,76 +323,71 @@ static inline void chiral_magnet_bond_forces(const chiral_magnet_params *params,
             sum1 += z_b_ * t2 - J * y_b_;
             sum2 += x_b_ * t1 - J * z_b_ - y_b_ * t2;
         }
-        row->gathered[0][i] = sum0;
-        row->gathered[1][i] = sum1;
-        row->gathered[2][i] = sum2;
+        row->s->gathered[0][i] = sum0;
+        row->s->gathered[1][i] = sum1;
+        row->s->gathered[2][i] = sum2;
     }
 }
 
 /* the energy of a bond */
-static inline void chiral_magnet_bond_energy(const chiral_magnet_params *params, const chiral_magnet_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void chiral_magnet_bond_energy(const chiral_magnet_row *row)
 {
-    const double J = params->J, D = params->D;
+    const double J = row->s->params.J, D = row->s->params.D;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? row->side : -row->side;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? row->side : -row->side;
             const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = side * row->at_bonds[0][k],
                 Dy = side * row->at_bonds[1][k];
             const double t1 = D * (Dx * (y_a_ * z_b_ - y_b_ * z_a_) + Dy * (x_b_ * z_a_ - x_a_ * z_b_))
                 - J * (z_a_ * z_b_ + (x_a_ * x_b_ + y_a_ * y_b_));
             sum0 += t1;
         }
-        row->gathered[0][i] = sum0;
+        row->s->gathered[0][i] = sum0;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void chiral_magnet_energy_row(const chiral_magnet_params *params, const chiral_magnet_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void chiral_magnet_energy_row(const chiral_magnet_row *row, double *restrict out)
 {
-    (void)apart;
-    chiral_magnet_bond_energy(params, row, from, to);
-    const double K = params->K, B = params->B;
+    chiral_magnet_bond_energy(row);
+    const double K = row->s->params.K, B = row->s->params.B;
     const double *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double z = z_row[i];
-        out[i - from] = -(B * z + K * (z * z)) + 0.5 * row->gathered[0][i];
+        out[i - row->from] = -(B * z + K * (z * z)) + 0.5 * row->s->gathered[0][i];
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void chiral_magnet_casimirs_row(const chiral_magnet_params *params, const chiral_magnet_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void chiral_magnet_casimirs_row(const chiral_magnet_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = z * z + (x * x + y * y);
+        out[i - row->from] = z * z + (x * x + y * y);
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void chiral_magnet_vector_field_row(const chiral_magnet_params *params, const chiral_magnet_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void chiral_magnet_vector_field_row(const chiral_magnet_row *row, double *restrict out)
 {
-    chiral_magnet_bond_forces(params, row, from, to);
-    const double K = params->K, B = params->B;
+    chiral_magnet_bond_forces(row);
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double K = row->s->params.K, B = row->s->params.B;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     chiral_magnet_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double t1 = row->gathered[2][i] + ((-2.0) * (K * z) - B);
-        out[i - from] = row->gathered[1][i] * z - y * t1;
-        out[(ptrdiff_t)apart + i - from] = x * t1 - row->gathered[0][i] * z;
-        out[2 * (ptrdiff_t)apart + i - from] = row->gathered[0][i] * y - row->gathered[1][i] * x;
+        const double t1 = row->s->gathered[2][i] + ((-2.0) * (K * z) - B);
+        out[i - row->from] = row->s->gathered[1][i] * z - y * t1;
+        out[apart + i - row->from] = x * t1 - row->s->gathered[0][i] * z;
+        out[2 * apart + i - row->from] = row->s->gathered[0][i] * y - row->s->gathered[1][i] * x;
     }
 }
 
@@ -732,13 +713,12 @@ chiral_magnet_status chiral_magnet_resume(chiral_magnet_solver *s, double h, con
 double chiral_magnet_hamiltonian(const chiral_magnet_solver *s)
 {
     double density[chiral_magnet_BUFFER], sum = 0.0, rest = 0.0;
-    chiral_magnet_row row;
-    chiral_magnet_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += chiral_magnet_BUFFER) {
-        const ptrdiff_t to = s->length - from > chiral_magnet_BUFFER ? from + chiral_magnet_BUFFER
-            : s->length;
-        chiral_magnet_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    chiral_magnet_row row = chiral_magnet_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > chiral_magnet_BUFFER ? row.from + chiral_magnet_BUFFER : s->length;
+        chiral_magnet_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -748,14 +728,11 @@ double chiral_magnet_hamiltonian(const chiral_magnet_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void chiral_magnet_kernel(const chiral_magnet_params *, const chiral_magnet_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void chiral_magnet_fill(const chiral_magnet_solver *s, chiral_magnet_kernel *kernel, double *out)
+static void chiral_magnet_fill(const chiral_magnet_solver *s, void kernel(const chiral_magnet_row *,
+    double *restrict), double *out)
 {
-    chiral_magnet_row row;
-    chiral_magnet_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const chiral_magnet_row row = chiral_magnet_row_of(s);
+    kernel(&row, out);
 }
 
 void chiral_magnet_density(const chiral_magnet_solver *s, double *out)

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2da96c03fcccd2827d4f743da9d98f4c4fb3b3ea1a799230d66372b682a711fd
+ * body-sha256: 1ca2298264be2f9def112e77fec2ecfb67553256425f6d3ce49a182c980172c2
  */
 #include "dnls.h"
 #include <float.h>
@@ -70,10 +70,11 @@ static void dnls_prepare(const dnls_params *params, double h, double coef[restri
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see dnls_solver */
-    ptrdiff_t length; /* sites of a row */
+    const dnls_solver *s;
+    double *const *x;   /* see dnls_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } dnls_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -97,11 +98,15 @@ static inline void dnls_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= dnls_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void dnls_locate(const dnls_solver *s, dnls_row *row)
+/* The whole row. */
+static inline dnls_row dnls_row_of(const dnls_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    dnls_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { dnls_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -112,19 +117,13 @@ static size_t dnls_units(const dnls_solver *s)
     return s->length < 2 * dnls_PIECE ? 1 : (size_t)s->length / dnls_PIECE;
 }
 
-typedef struct {
-    dnls_row row;
-    ptrdiff_t from, to;
-} dnls_piece;
-
-/* The piece of that number, or the row. */
-static inline dnls_piece dnls_piece_of(const dnls_solver *s, size_t unit)
+/* The piece of that number. */
+static inline dnls_row dnls_piece_of(const dnls_solver *s, size_t unit)
 {
-    dnls_piece piece;
-    dnls_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * dnls_PIECE;
-    piece.to = unit == dnls_units(s) - 1 ? s->length : piece.from + dnls_PIECE;
-    return piece;
+    dnls_row row = dnls_row_of(s);
+    row.from = (ptrdiff_t)unit * dnls_PIECE;
+    if (unit + 1 < dnls_units(s)) row.to = row.from + dnls_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -161,36 +160,36 @@ static inline double dnls_turned_sin(double u, double offset)
 static inline double dnls_sin_lane(double u) { return dnls_turned_sin(u, 0.0); }
 
 /* the flow of H_1 = sum of -p*p[i+1]: q shifted */
-static inline void dnls_sweep1(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void dnls_sweep1(const double *coef, const dnls_row *row)
 {
     const double c0 = coef[0];
     const double *restrict p_row = row->x[1];
     double *q_row = row->x[0];
     dnls_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         q_row[i] += -(c0 * (p_row[i + 1] + p_row[i - 1]));
     }
 }
 
 /* the flow of H_2 = sum of -q*q[i+1]: p shifted */
-static inline void dnls_sweep2(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void dnls_sweep2(const double *coef, const dnls_row *row)
 {
     const double c0 = coef[0];
     const double *restrict q_row = row->x[0];
     double *p_row = row->x[1];
     dnls_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         p_row[i] += c0 * (q_row[i + 1] + q_row[i - 1]);
     }
 }
 
 /* the flow of H_3 = sum of 1/8*(beta*(p**2 + q**2)**2): q, p turned */
-static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void dnls_sweep3(const double *coef, const dnls_row *row)
 {
     const double c1 = coef[1];
     double *p_row = row->x[1], *q_row = row->x[0];
     dnls_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = c1 * (p * p + q * q);
         const double t2 = dnls_sin_lane(t1);
@@ -205,51 +204,49 @@ static inline void dnls_sweep3(const double *coef, const dnls_row *row, ptrdiff_
 /* The flow of a part of H, for a piece of a row. */
 static void dnls_sweep_piece(const dnls_solver *s, int part, const double *coef, size_t unit)
 {
-    const dnls_piece at = dnls_piece_of(s, unit);
+    const dnls_row row = dnls_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        dnls_sweep1(coef, &at.row, at.from, at.to);
-        dnls_ends(s->x[0], s->length, at.from, at.to);
+        dnls_sweep1(coef, &row);
+        dnls_ends(s->x[0], s->length, row.from, row.to);
         break;
     case 2: /* H_2 */
-        dnls_sweep2(coef, &at.row, at.from, at.to);
-        dnls_ends(s->x[1], s->length, at.from, at.to);
+        dnls_sweep2(coef, &row);
+        dnls_ends(s->x[1], s->length, row.from, row.to);
         break;
     default: /* H_3 */
-        dnls_sweep3(coef, &at.row, at.from, at.to);
-        dnls_ends(s->x[0], s->length, at.from, at.to);
-        dnls_ends(s->x[1], s->length, at.from, at.to);
+        dnls_sweep3(coef, &row);
+        dnls_ends(s->x[0], s->length, row.from, row.to);
+        dnls_ends(s->x[1], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void dnls_energy_row(const dnls_params *params, const dnls_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void dnls_energy_row(const dnls_row *row, double *restrict out)
 {
-    (void)apart;
-    const double beta = params->beta;
+    const double beta = row->s->params.beta;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = p * p + q * q;
-        out[i - from] = 0.125 * (beta * (t1 * t1)) - q * q_row[i + 1] - p * p_row[i + 1];
+        out[i - row->from] = 0.125 * (beta * (t1 * t1)) - q * q_row[i + 1] - p * p_row[i + 1];
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void dnls_vector_field_row(const dnls_params *params, const dnls_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void dnls_vector_field_row(const dnls_row *row, double *restrict out)
 {
-    const double beta = params->beta;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double beta = row->s->params.beta;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = beta * (p * p + q * q);
-        out[i - from] = 0.5 * (p * t1) - p_row[i + 1] - p_row[i - 1];
-        out[(ptrdiff_t)apart + i - from] = q_row[i - 1] - (0.5 * (q * t1) - q_row[i + 1]);
+        out[i - row->from] = 0.5 * (p * t1) - p_row[i + 1] - p_row[i - 1];
+        out[apart + i - row->from] = q_row[i - 1] - (0.5 * (q * t1) - q_row[i + 1]);
     }
 }
 
@@ -455,12 +452,12 @@ dnls_status dnls_resume(dnls_solver *s, double h, const double *x, size_t far)
 double dnls_hamiltonian(const dnls_solver *s)
 {
     double density[dnls_BUFFER], sum = 0.0, rest = 0.0;
-    dnls_row row;
-    dnls_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += dnls_BUFFER) {
-        const ptrdiff_t to = s->length - from > dnls_BUFFER ? from + dnls_BUFFER : s->length;
-        dnls_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    dnls_row row = dnls_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > dnls_BUFFER ? row.from + dnls_BUFFER : s->length;
+        dnls_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -470,14 +467,10 @@ double dnls_hamiltonian(const dnls_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void dnls_kernel(const dnls_params *, const dnls_row *, ptrdiff_t, ptrdiff_t, double *restrict,
-    size_t);
-
-static void dnls_fill(const dnls_solver *s, dnls_kernel *kernel, double *out)
+static void dnls_fill(const dnls_solver *s, void kernel(const dnls_row *, double *restrict), double *out)
 {
-    dnls_row row;
-    dnls_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const dnls_row row = dnls_row_of(s);
+    kernel(&row, out);
 }
 
 void dnls_density(const dnls_solver *s, double *out) { dnls_fill(s, dnls_energy_row, out); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4de0ade53d61221b1c1a64e6752f12639015dce07b8aa325966ebf1be049ea7a
+ * body-sha256: bc904f8ed364052196de8405bb39b44f312b8f5d461c4a7dfcc0557b0d30454b
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -73,10 +73,11 @@ static void dnls_disorder_prepare(const dnls_disorder_params *params, double h, 
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see dnls_disorder_solver */
-    ptrdiff_t length; /* sites of a row */
+    const dnls_disorder_solver *s;
+    double *const *x;   /* see dnls_disorder_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } dnls_disorder_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -101,11 +102,15 @@ static inline void dnls_disorder_ends(double *row, ptrdiff_t length, ptrdiff_t f
     }
 }
 
-/* What kernels are told of a row. */
-static inline void dnls_disorder_locate(const dnls_disorder_solver *s, dnls_disorder_row *row)
+/* The whole row. */
+static inline dnls_disorder_row dnls_disorder_row_of(const dnls_disorder_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    dnls_disorder_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { dnls_disorder_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -116,19 +121,13 @@ static size_t dnls_disorder_units(const dnls_disorder_solver *s)
     return s->length < 2 * dnls_disorder_PIECE ? 1 : (size_t)s->length / dnls_disorder_PIECE;
 }
 
-typedef struct {
-    dnls_disorder_row row;
-    ptrdiff_t from, to;
-} dnls_disorder_piece;
-
-/* The piece of that number, or the row. */
-static inline dnls_disorder_piece dnls_disorder_piece_of(const dnls_disorder_solver *s, size_t unit)
+/* The piece of that number. */
+static inline dnls_disorder_row dnls_disorder_piece_of(const dnls_disorder_solver *s, size_t unit)
 {
-    dnls_disorder_piece piece;
-    dnls_disorder_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * dnls_disorder_PIECE;
-    piece.to = unit == dnls_disorder_units(s) - 1 ? s->length : piece.from + dnls_disorder_PIECE;
-    return piece;
+    dnls_disorder_row row = dnls_disorder_row_of(s);
+    row.from = (ptrdiff_t)unit * dnls_disorder_PIECE;
+    if (unit + 1 < dnls_disorder_units(s)) row.to = row.from + dnls_disorder_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -165,44 +164,41 @@ static inline double dnls_disorder_turned_sin(double u, double offset)
 static inline double dnls_disorder_sin_lane(double u) { return dnls_disorder_turned_sin(u, 0.0); }
 
 /* the flow of H_1 = sum of -p*p[i+1]: q shifted */
-static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_row *row)
 {
     const double c0 = coef[0];
     const double *restrict p_row = row->x[1];
     double *q_row = row->x[0];
     dnls_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         q_row[i] += -(c0 * (p_row[i - 1] * w1 + p_row[i + 1] * w0));
     }
 }
 
 /* the flow of H_2 = sum of -q*q[i+1]: p shifted */
-static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_row *row)
 {
     const double c0 = coef[0];
     const double *restrict q_row = row->x[0];
     double *p_row = row->x[1];
     dnls_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         p_row[i] += c0 * (w0 * q_row[i + 1] + w1 * q_row[i - 1]);
     }
 }
 
 /* the flow of H_3 = sum of 1/2*(e*(p**2 + q**2)) + 1/8*(beta*(p**2 + q**2)**2): q, p turned */
-static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
     const double *restrict e_row = row->x[2];
     double *p_row = row->x[1], *q_row = row->x[0];
     dnls_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double e = e_row[i], p = p_row[i], q = q_row[i];
         const double t1 = c0 * (c1 * (p * p) + (e + c1 * (q * q)));
         const double t2 = dnls_disorder_sin_lane(t1);
@@ -218,52 +214,50 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
 static void dnls_disorder_sweep_piece(const dnls_disorder_solver *s, int part, const double *coef,
     size_t unit)
 {
-    const dnls_disorder_piece at = dnls_disorder_piece_of(s, unit);
+    const dnls_disorder_row row = dnls_disorder_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        dnls_disorder_sweep1(coef, &at.row, at.from, at.to);
+        dnls_disorder_sweep1(coef, &row);
         break;
     case 2: /* H_2 */
-        dnls_disorder_sweep2(coef, &at.row, at.from, at.to);
+        dnls_disorder_sweep2(coef, &row);
         break;
     default: /* H_3 */
-        dnls_disorder_sweep3(coef, &at.row, at.from, at.to);
+        dnls_disorder_sweep3(coef, &row);
         break;
     }
-    for (int k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_ends(s->x[k], s->length, at.from, at.to);
+    for (int k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_ends(s->x[k], s->length, row.from, row.to);
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void dnls_disorder_energy_row(const dnls_disorder_params *params, const dnls_disorder_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void dnls_disorder_energy_row(const dnls_disorder_row *row, double *restrict out)
 {
-    (void)apart;
-    const double beta = params->beta;
+    const double beta = row->s->params.beta;
     const double *restrict e_row = row->x[2], *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double e = e_row[i], p = p_row[i], q = q_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double t1 = p * p + q * q;
-        out[i - from] = 0.5 * (e * t1) + 0.125 * (beta * (t1 * t1)) - (w0 * (p * p_row[i + 1])
+        out[i - row->from] = 0.5 * (e * t1) + 0.125 * (beta * (t1 * t1)) - (w0 * (p * p_row[i + 1])
             + w0 * (q * q_row[i + 1]));
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void dnls_disorder_vector_field_row(const dnls_disorder_params *params, const dnls_disorder_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void dnls_disorder_vector_field_row(const dnls_disorder_row *row, double *restrict out)
 {
-    const double beta = params->beta;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double beta = row->s->params.beta;
     const double *restrict e_row = row->x[2], *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     dnls_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double e = e_row[i], p = p_row[i], q = q_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = beta * (p * p + q * q);
-        out[i - from] = e * p + 0.5 * (p * t1) - (p_row[i - 1] * w1 + p_row[i + 1] * w0);
-        out[(ptrdiff_t)apart + i - from] = w0 * q_row[i + 1] + w1 * q_row[i - 1] - (e * q + 0.5 * (q * t1));
+        out[i - row->from] = e * p + 0.5 * (p * t1) - (p_row[i - 1] * w1 + p_row[i + 1] * w0);
+        out[apart + i - row->from] = w0 * q_row[i + 1] + w1 * q_row[i - 1] - (e * q + 0.5 * (q * t1));
     }
 }
 
@@ -496,13 +490,12 @@ dnls_disorder_status dnls_disorder_resume(dnls_disorder_solver *s, double h, con
 double dnls_disorder_hamiltonian(const dnls_disorder_solver *s)
 {
     double density[dnls_disorder_BUFFER], sum = 0.0, rest = 0.0;
-    dnls_disorder_row row;
-    dnls_disorder_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += dnls_disorder_BUFFER) {
-        const ptrdiff_t to = s->length - from > dnls_disorder_BUFFER ? from + dnls_disorder_BUFFER
-            : s->length;
-        dnls_disorder_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    dnls_disorder_row row = dnls_disorder_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > dnls_disorder_BUFFER ? row.from + dnls_disorder_BUFFER : s->length;
+        dnls_disorder_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -512,14 +505,11 @@ double dnls_disorder_hamiltonian(const dnls_disorder_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void dnls_disorder_kernel(const dnls_disorder_params *, const dnls_disorder_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void dnls_disorder_fill(const dnls_disorder_solver *s, dnls_disorder_kernel *kernel, double *out)
+static void dnls_disorder_fill(const dnls_disorder_solver *s, void kernel(const dnls_disorder_row *,
+    double *restrict), double *out)
 {
-    dnls_disorder_row row;
-    dnls_disorder_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const dnls_disorder_row row = dnls_disorder_row_of(s);
+    kernel(&row, out);
 }
 
 void dnls_disorder_density(const dnls_disorder_solver *s, double *out)

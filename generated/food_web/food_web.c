@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 95ad8b1cc64245084dad95765d73194a877afe9536ad5412427a7c6ab0d3a407
+ * body-sha256: 04d6646fc064bce19c26a4ced5ffdc26727d678fce50de60c5cb47b57e8598c3
  */
 #include "food_web.h"
 #include <float.h>
@@ -77,16 +77,14 @@ static void food_web_prepare(const food_web_params *params, double h, double coe
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
+    const food_web_solver *s;
     double *const *x;        /* see food_web_solver */
-    ptrdiff_t length;        /* sites of a row */
-    double *const *gathered; /* see food_web_solver */
-    const int *bonds, *middle, *other;
-    double *const *at_bonds;
-    double side; /* 1, or -1 where a loop is told of bonds as if they ran the other way */
-    const int *colours;
-    int chosen; /* the colour that a part of H belongs to */
+    ptrdiff_t from, to;      /* its sites, to not among them */
+    double *const *at_bonds; /* see food_web_solver */
+    double side;             /* 1, or -1 where a loop is told of bonds as if they ran the other way */
+    int chosen;              /* the colour that a part of H belongs to */
 } food_web_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -100,19 +98,18 @@ typedef struct {
 #define food_web_EACH_SITE
 #endif
 
-/* What kernels are told of a row. */
-static inline void food_web_locate(const food_web_solver *s, food_web_row *row)
+/* The whole row. */
+static inline food_web_row food_web_row_of(const food_web_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->gathered = s->gathered;
-    row->bonds = s->bonds;
-    row->middle = s->middle;
-    row->other = s->other;
-    row->at_bonds = s->at_bonds;
-    row->side = 1.0;
-    row->colours = s->colours;
-    row->chosen = 0;
+    food_web_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    row.at_bonds = s->at_bonds;
+    row.side = 1.0;
+    row.chosen = 0;
+    return row;
 }
 
 enum { food_web_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
@@ -123,19 +120,13 @@ static size_t food_web_units(const food_web_solver *s)
     return s->length < 2 * food_web_PIECE ? 1 : (size_t)s->length / food_web_PIECE;
 }
 
-typedef struct {
-    food_web_row row;
-    ptrdiff_t from, to;
-} food_web_piece;
-
-/* The piece of that number, or the row. */
-static inline food_web_piece food_web_piece_of(const food_web_solver *s, size_t unit)
+/* The piece of that number. */
+static inline food_web_row food_web_piece_of(const food_web_solver *s, size_t unit)
 {
-    food_web_piece piece;
-    food_web_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * food_web_PIECE;
-    piece.to = unit == food_web_units(s) - 1 ? s->length : piece.from + food_web_PIECE;
-    return piece;
+    food_web_row row = food_web_row_of(s);
+    row.from = (ptrdiff_t)unit * food_web_PIECE;
+    if (unit + 1 < food_web_units(s)) row.to = row.from + food_web_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -175,32 +166,32 @@ static inline double food_web_expm1_lane(double u)
 }
 
 /* what all other sites b add to the forces of H_1 at a site a */
-static inline void food_web_gather1(const double *coef, const food_web_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void food_web_gather1(const double *coef, const food_web_row *row)
 {
     (void)coef;
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            if (row->colours[row->other[k]] != row->chosen) continue;
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? row->side : -row->side;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            if (row->s->colours[row->s->other[k]] != row->chosen) continue;
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? row->side : -row->side;
             const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
             sum0 += A * x_b_ * (1.0 - k_b_ / x_b_);
         }
-        row->gathered[0][i] = sum0;
+        row->s->gathered[0][i] = sum0;
     }
 }
 
 /* the flow of H_1 = sum of x - k*log(x): x scaled */
-static inline void food_web_sweep1(const double *coef, const food_web_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void food_web_sweep1(const double *coef, const food_web_row *row)
 {
     const double c0 = coef[0];
     double *x_row = row->x[0];
     food_web_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i];
-        x_row[i] = x + x * food_web_expm1_lane(c0 * row->gathered[0][i]);
+        x_row[i] = x + x * food_web_expm1_lane(c0 * row->s->gathered[0][i]);
     }
 }
 
@@ -209,53 +200,47 @@ static void food_web_sweep_piece(const food_web_solver *s, int flow, const doubl
 {
     int part = 1, colour = flow;
     for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
-    food_web_piece at = food_web_piece_of(s, unit);
-    at.row.chosen = colour;
-    food_web_gather1(coef, &at.row, at.from, at.to);
-    food_web_sweep1(coef, &at.row, at.from, at.to);
+    food_web_row row = food_web_piece_of(s, unit);
+    row.chosen = colour;
+    food_web_gather1(coef, &row);
+    food_web_sweep1(coef, &row);
 }
 
 /* what a site b adds to the forces at a site a */
-static inline void food_web_bond_forces(const food_web_params *params, const food_web_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void food_web_bond_forces(const food_web_row *row)
 {
-    (void)params;
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x_a_ = x_row[i];
         double sum0 = 0.0;
-        for (ptrdiff_t k = row->bonds[i]; k < row->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->other[k];
-            const double side = k < row->middle[i] ? row->side : -row->side;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? row->side : -row->side;
             const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
             sum0 += x_b_ * (A * x_a_) * (1.0 - k_b_ / x_b_);
         }
-        row->gathered[0][i] = sum0;
+        row->s->gathered[0][i] = sum0;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void food_web_energy_row(const food_web_params *params, const food_web_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void food_web_energy_row(const food_web_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     food_web_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double k_ = k_row[i], x = x_row[i];
-        out[i - from] = x - k_ * log(x);
+        out[i - row->from] = x - k_ * log(x);
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void food_web_vector_field_row(const food_web_params *params, const food_web_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void food_web_vector_field_row(const food_web_row *row, double *restrict out)
 {
-    (void)apart;
-    food_web_bond_forces(params, row, from, to);
+    food_web_bond_forces(row);
     food_web_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        out[i - from] = row->gathered[0][i];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
+        out[i - row->from] = row->s->gathered[0][i];
     }
 }
 
@@ -585,12 +570,12 @@ food_web_status food_web_resume(food_web_solver *s, double h, const double *x, s
 double food_web_hamiltonian(const food_web_solver *s)
 {
     double density[food_web_BUFFER], sum = 0.0, rest = 0.0;
-    food_web_row row;
-    food_web_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += food_web_BUFFER) {
-        const ptrdiff_t to = s->length - from > food_web_BUFFER ? from + food_web_BUFFER : s->length;
-        food_web_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    food_web_row row = food_web_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > food_web_BUFFER ? row.from + food_web_BUFFER : s->length;
+        food_web_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -600,14 +585,11 @@ double food_web_hamiltonian(const food_web_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void food_web_kernel(const food_web_params *, const food_web_row *, ptrdiff_t, ptrdiff_t,
-    double *restrict, size_t);
-
-static void food_web_fill(const food_web_solver *s, food_web_kernel *kernel, double *out)
+static void food_web_fill(const food_web_solver *s, void kernel(const food_web_row *, double *restrict),
+    double *out)
 {
-    food_web_row row;
-    food_web_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const food_web_row row = food_web_row_of(s);
+    kernel(&row, out);
 }
 
 void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }

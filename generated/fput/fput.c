@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 468567692f0a1e5bb48f7a83b516f88fe236783a607e360b89c754a8ee15f7a0
+ * body-sha256: d96ce96074efb53b1ad96190304dd30aa99e1fa02510b869cb4263790a4a13ee
  */
 #include "fput.h"
 #include <float.h>
@@ -74,10 +74,11 @@ static void fput_prepare(const fput_params *params, double h, double coef[restri
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see fput_solver */
-    ptrdiff_t length; /* sites of a row */
+    const fput_solver *s;
+    double *const *x;   /* see fput_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } fput_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -101,11 +102,15 @@ static inline void fput_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= fput_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void fput_locate(const fput_solver *s, fput_row *row)
+/* The whole row. */
+static inline fput_row fput_row_of(const fput_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    fput_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { fput_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -116,32 +121,26 @@ static size_t fput_units(const fput_solver *s)
     return s->length < 2 * fput_PIECE ? 1 : (size_t)s->length / fput_PIECE;
 }
 
-typedef struct {
-    fput_row row;
-    ptrdiff_t from, to;
-} fput_piece;
-
-/* The piece of that number, or the row. */
-static inline fput_piece fput_piece_of(const fput_solver *s, size_t unit)
+/* The piece of that number. */
+static inline fput_row fput_piece_of(const fput_solver *s, size_t unit)
 {
-    fput_piece piece;
-    fput_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * fput_PIECE;
-    piece.to = unit == fput_units(s) - 1 ? s->length : piece.from + fput_PIECE;
-    if (piece.from < s->from) piece.from = s->from;
-    if (piece.to > s->to) piece.to = s->to;
-    return piece;
+    fput_row row = fput_row_of(s);
+    row.from = (ptrdiff_t)unit * fput_PIECE;
+    if (unit + 1 < fput_units(s)) row.to = row.from + fput_PIECE;
+    if (row.from < s->from) row.from = s->from;
+    if (row.to > s->to) row.to = s->to;
+    return row;
 }
 
 /* the flow of H_1 = sum of 1/3*(alpha*(q[i+1] - q)**3) + (1/2*(q[i+1] - q)**2 + 1/4*(beta*(q[i+1] - q)**4)):
       p shifted */
-static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void fput_sweep1(const double *coef, const fput_row *row)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
     const double *restrict q_row = row->x[0];
     double *p_row = row->x[1];
     fput_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double q = q_row[i];
         const double t1 = q - q_row[i - 1];
         const double t2 = t1 * t1;
@@ -152,13 +151,13 @@ static inline void fput_sweep1(const double *coef, const fput_row *row, ptrdiff_
 }
 
 /* the flow of H_2 = sum of 1/2*p**2: q shifted */
-static inline void fput_sweep2(const double *coef, const fput_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void fput_sweep2(const double *coef, const fput_row *row)
 {
     const double c3 = coef[3];
     const double *restrict p_row = row->x[1];
     double *q_row = row->x[0];
     fput_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i];
         q_row[i] += c3 * p;
     }
@@ -170,55 +169,53 @@ static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, 
     switch (part) {
     case 1: /* H_1 */
         for (size_t unit = first; unit < end; ++unit) {
-            const fput_piece at = fput_piece_of(s, unit);
-            if (at.from >= at.to) continue;
-            fput_sweep1(coef, &at.row, at.from, at.to);
-            fput_ends(s->x[1], s->length, at.from, at.to);
+            const fput_row row = fput_piece_of(s, unit);
+            if (row.from >= row.to) continue;
+            fput_sweep1(coef, &row);
+            fput_ends(s->x[1], s->length, row.from, row.to);
         }
         break;
     default: /* H_2 */
         for (size_t unit = first; unit < end; ++unit) {
-            const fput_piece at = fput_piece_of(s, unit);
-            if (at.from >= at.to) continue;
-            fput_sweep2(coef, &at.row, at.from, at.to);
-            fput_ends(s->x[0], s->length, at.from, at.to);
+            const fput_row row = fput_piece_of(s, unit);
+            if (row.from >= row.to) continue;
+            fput_sweep2(coef, &row);
+            fput_ends(s->x[0], s->length, row.from, row.to);
         }
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void fput_energy_row(const fput_params *params, const fput_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void fput_energy_row(const fput_row *row, double *restrict out)
 {
-    (void)apart;
-    const double alpha = params->alpha, beta = params->beta;
+    const double alpha = row->s->params.alpha, beta = row->s->params.beta;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     fput_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = q_row[i + 1] - q;
         const double t2 = t1 * t1;
-        out[i - from] = 0.5 * t2 + 1.0 / 3.0 * (alpha * (t1 * t2))
+        out[i - row->from] = 0.5 * t2 + 1.0 / 3.0 * (alpha * (t1 * t2))
             + (0.5 * (p * p) + 0.25 * (beta * (t2 * t2)));
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void fput_vector_field_row(const fput_params *params, const fput_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void fput_vector_field_row(const fput_row *row, double *restrict out)
 {
-    const double alpha = params->alpha, beta = params->beta;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double alpha = row->s->params.alpha, beta = row->s->params.beta;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     fput_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = q - q_row[i - 1];
         const double t2 = t1 * t1;
         const double t3 = q_row[i + 1] - q;
         const double t4 = t3 * t3;
-        out[i - from] = p;
-        out[(ptrdiff_t)apart + i - from] =
+        out[i - row->from] = p;
+        out[apart + i - row->from] =
             -(alpha * t2 - alpha * t4 + (t1 + (q - q_row[i + 1]) + (beta * (t1 * t2) - beta * (t3 * t4))));
     }
 }
@@ -564,12 +561,12 @@ fput_status fput_resume(fput_solver *s, double h, const double *x, size_t far)
 double fput_hamiltonian(const fput_solver *s)
 {
     double density[fput_BUFFER], sum = 0.0, rest = 0.0;
-    fput_row row;
-    fput_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += fput_BUFFER) {
-        const ptrdiff_t to = s->length - from > fput_BUFFER ? from + fput_BUFFER : s->length;
-        fput_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    fput_row row = fput_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > fput_BUFFER ? row.from + fput_BUFFER : s->length;
+        fput_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -579,14 +576,10 @@ double fput_hamiltonian(const fput_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void fput_kernel(const fput_params *, const fput_row *, ptrdiff_t, ptrdiff_t, double *restrict,
-    size_t);
-
-static void fput_fill(const fput_solver *s, fput_kernel *kernel, double *out)
+static void fput_fill(const fput_solver *s, void kernel(const fput_row *, double *restrict), double *out)
 {
-    fput_row row;
-    fput_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const fput_row row = fput_row_of(s);
+    kernel(&row, out);
 }
 
 void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }

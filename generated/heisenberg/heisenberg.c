@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 99de6c8641a672287c58afc036c9fdb1235c055fa679dffc726dd195f927159b
+ * body-sha256: 0ff1baf31b22d7456d7054e70c703ccda914127a764cd0cd6f6cbcb710c79aa6
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -77,11 +77,12 @@ static void heisenberg_prepare(const heisenberg_params *params, double h, double
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
+    const heisenberg_solver *s;
     double *const *x;    /* see heisenberg_solver */
     const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    ptrdiff_t from, to;  /* its sites, to not among them */
 } heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -116,32 +117,28 @@ static inline void heisenberg_place(const heisenberg_solver *s, size_t index,
     }
 }
 
-/* What kernels are told of a row. */
-static inline void heisenberg_locate(const heisenberg_solver *s, size_t index, heisenberg_row *row)
+/* The row of that number, which is worked at in one go. */
+static inline heisenberg_row heisenberg_piece_of(const heisenberg_solver *s, size_t index)
 {
-    row->x = s->x;
-    row->at = s->lines + index * heisenberg_LINES;
-    row->length = s->length;
+    heisenberg_row row;
+    row.s = s;
+    row.x = s->x;
+    row.at = s->lines + index * heisenberg_LINES;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 /* what is worked at in one go */
 static size_t heisenberg_units(const heisenberg_solver *s) { return s->rows; }
 
-typedef struct {
-    heisenberg_row row;
-    ptrdiff_t from, to;
-    ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
-} heisenberg_piece;
-
-/* The piece of that number, or the row. */
-static inline heisenberg_piece heisenberg_piece_of(const heisenberg_solver *s, size_t unit)
+/* The sites from one on, before another: as far as to the end of the last vector of 8, which may lie in the
+   copies beside a row, where these are made anew. */
+static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrdiff_t from, ptrdiff_t to)
 {
-    heisenberg_piece piece;
-    heisenberg_locate(s, unit, &piece.row);
-    piece.from = 0;
-    piece.to = s->length;
-    piece.wide = (s->length + 7) & ~(ptrdiff_t)7;
-    return piece;
+    row->from = from;
+    row->to = to;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -194,8 +191,7 @@ static inline double heisenberg_versin_near(double t)
 }
 
 /* the flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z turned */
-static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
     const double *restrict x_row = row->x[0] + row->at[0];
@@ -205,7 +201,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
         const double t1 =
             c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i] + (x_row[i + 1] + x_row[i - 1])));
@@ -219,8 +215,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
 }
 
 /* the same for large arguments of functions */
-static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
     const double *restrict x_row = row->x[0] + row->at[0];
@@ -230,7 +225,7 @@ static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_ro
     const double *restrict x_row3 = row->x[0] + row->at[3]; /* j + 1 */
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
         const double t1 =
             c0 * (x_row4[i] + x_row1[i] + (x_row3[i] + x_row2[i] + (x_row[i + 1] + x_row[i - 1])));
@@ -244,8 +239,7 @@ static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_ro
 }
 
 /* the flow of H_2 = sum of -(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1]))): x, z turned */
-static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
     double *x_row = row->x[0] + row->at[0], *z_row = row->x[2] + row->at[0];
@@ -255,7 +249,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
         const double t1 =
             c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i] + (y_row[i + 1] + y_row[i - 1])));
@@ -269,8 +263,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
 }
 
 /* the same for large arguments of functions */
-static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
     double *x_row = row->x[0] + row->at[0], *z_row = row->x[2] + row->at[0];
@@ -280,7 +273,7 @@ static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_ro
     const double *restrict y_row3 = row->x[1] + row->at[3]; /* j + 1 */
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
         const double t1 =
             c0 * (y_row4[i] + y_row1[i] + (y_row3[i] + y_row2[i] + (y_row[i + 1] + y_row[i - 1])));
@@ -294,8 +287,7 @@ static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_ro
 }
 
 /* the flow of H_3 = sum of -(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1]))): x, y turned */
-static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
     const double *restrict B_row = row->x[3] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
@@ -305,7 +297,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
         const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1]
             + c1 * (z_row3[i] + z_row[i - 1])));
@@ -319,8 +311,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
 }
 
 /* the same for large arguments of functions */
-static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
     const double *restrict B_row = row->x[3] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
@@ -330,7 +321,7 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
         const double t1 = c2 * (c1 * (z_row1[i] + (z_row4[i] + z_row2[i])) + (B + c1 * z_row[i + 1]
             + c1 * (z_row3[i] + z_row[i - 1])));
@@ -347,10 +338,10 @@ static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_ro
 static void heisenberg_rows1_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep1_far(coef, &at.row, at.from, at.wide);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_row row = heisenberg_piece_of(s, unit);
+        heisenberg_sweep1_far(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_ends(s->x[1] + row.at[0], s->length, 0, s->length);
+        heisenberg_ends(s->x[2] + row.at[0], s->length, 0, s->length);
     }
 }
 
@@ -358,10 +349,10 @@ static void heisenberg_rows1_far(const heisenberg_solver *s, const double *coef,
 static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep1_near(coef, &at.row, at.from, at.wide);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_row row = heisenberg_piece_of(s, unit);
+        heisenberg_sweep1_near(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_ends(s->x[1] + row.at[0], s->length, 0, s->length);
+        heisenberg_ends(s->x[2] + row.at[0], s->length, 0, s->length);
     }
 }
 
@@ -369,10 +360,10 @@ static void heisenberg_rows1_near(const heisenberg_solver *s, const double *coef
 static void heisenberg_rows2_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep2_far(coef, &at.row, at.from, at.wide);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_row row = heisenberg_piece_of(s, unit);
+        heisenberg_sweep2_far(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+        heisenberg_ends(s->x[2] + row.at[0], s->length, 0, s->length);
     }
 }
 
@@ -380,10 +371,10 @@ static void heisenberg_rows2_far(const heisenberg_solver *s, const double *coef,
 static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep2_near(coef, &at.row, at.from, at.wide);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_row row = heisenberg_piece_of(s, unit);
+        heisenberg_sweep2_near(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+        heisenberg_ends(s->x[2] + row.at[0], s->length, 0, s->length);
     }
 }
 
@@ -391,10 +382,10 @@ static void heisenberg_rows2_near(const heisenberg_solver *s, const double *coef
 static void heisenberg_rows3_far(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep3_far(coef, &at.row, at.from, at.wide);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_row row = heisenberg_piece_of(s, unit);
+        heisenberg_sweep3_far(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+        heisenberg_ends(s->x[1] + row.at[0], s->length, 0, s->length);
     }
 }
 
@@ -402,10 +393,10 @@ static void heisenberg_rows3_far(const heisenberg_solver *s, const double *coef,
 static void heisenberg_rows3_near(const heisenberg_solver *s, const double *coef, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end; ++unit) {
-        const heisenberg_piece at = heisenberg_piece_of(s, unit);
-        heisenberg_sweep3_near(coef, &at.row, at.from, at.wide);
-        heisenberg_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_row row = heisenberg_piece_of(s, unit);
+        heisenberg_sweep3_near(coef, heisenberg_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+        heisenberg_ends(s->x[1] + row.at[0], s->length, 0, s->length);
     }
 }
 
@@ -426,12 +417,10 @@ static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const do
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void heisenberg_energy_row(const heisenberg_params *params, const heisenberg_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void heisenberg_energy_row(const heisenberg_row *row, double *restrict out)
 {
-    (void)apart;
-    const double J = params->J;
+    const double J = row->s->params.J;
     const double *restrict B_row = row->x[3] + row->at[0], *restrict x_row = row->x[0] + row->at[0],
         *restrict y_row = row->x[1] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
@@ -441,34 +430,32 @@ static void heisenberg_energy_row(const heisenberg_params *params, const heisenb
     const double *restrict z_row4 = row->x[2] + row->at[4]; /* i + 1 */
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
         const double t1 = J * (z * z_row4[i]) + J * (x * x_row3[i]) + (J * (y * y_row3[i])
             + J * (z * z_row3[i])) + (B * z + J * (z * z_row[i + 1]) + (J * (x * x_row[i + 1])
             + J * (y * y_row[i + 1])));
-        out[i - from] = -(J * (y * y_row4[i]) + J * (x * x_row4[i]) + t1);
+        out[i - row->from] = -(J * (y * y_row4[i]) + J * (x * x_row4[i]) + t1);
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void heisenberg_casimirs_row(const heisenberg_params *params, const heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void heisenberg_casimirs_row(const heisenberg_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
         *restrict z_row = row->x[2] + row->at[0];
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = z * z + (x * x + y * y);
+        out[i - row->from] = z * z + (x * x + y * y);
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void heisenberg_vector_field_row(const heisenberg_params *params, const heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void heisenberg_vector_field_row(const heisenberg_row *row, double *restrict out)
 {
-    const double J = params->J;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double J = row->s->params.J;
     const double *restrict B_row = row->x[3] + row->at[0], *restrict x_row = row->x[0] + row->at[0],
         *restrict y_row = row->x[1] + row->at[0], *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row4 = row->x[0] + row->at[4]; /* i + 1 */
@@ -484,7 +471,7 @@ static void heisenberg_vector_field_row(const heisenberg_params *params, const h
     const double *restrict z_row3 = row->x[2] + row->at[3]; /* j + 1 */
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* j - 1 */
     heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
         const double t1 = J * z_row1[i] + (J * z_row4[i] + J * z_row2[i]) + (B + J * z_row[i + 1]
             + (J * z_row[i - 1] + J * z_row3[i]));
@@ -492,9 +479,9 @@ static void heisenberg_vector_field_row(const heisenberg_params *params, const h
             + (J * y_row2[i] + J * y_row3[i]));
         const double t3 = J * x_row1[i] + J * x_row4[i] + (J * x_row[i + 1] + J * x_row[i - 1]
             + (J * x_row3[i] + J * x_row2[i]));
-        out[i - from] = y * t1 - z * t2;
-        out[(ptrdiff_t)apart + i - from] = z * t3 - x * t1;
-        out[2 * (ptrdiff_t)apart + i - from] = x * t2 - y * t3;
+        out[i - row->from] = y * t1 - z * t2;
+        out[apart + i - row->from] = z * t3 - x * t1;
+        out[2 * apart + i - row->from] = x * t2 - y * t3;
     }
 }
 
@@ -924,13 +911,13 @@ heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double
 double heisenberg_hamiltonian(const heisenberg_solver *s)
 {
     double density[heisenberg_BUFFER], sum = 0.0, rest = 0.0;
-    heisenberg_row row;
     for (size_t r = 0; r < s->rows; ++r) {
-        heisenberg_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += heisenberg_BUFFER) {
-            const ptrdiff_t to = s->length - from > heisenberg_BUFFER ? from + heisenberg_BUFFER : s->length;
-            heisenberg_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+        heisenberg_row row = heisenberg_piece_of(s, r);
+        for (row.to = 0; row.to < s->length;) {
+            row.from = row.to;
+            row.to = s->length - row.from > heisenberg_BUFFER ? row.from + heisenberg_BUFFER : s->length;
+            heisenberg_energy_row(&row, density);
+            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
                 const double total = sum + density[i];
                 rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
                     : (density[i] - total) + sum;
@@ -942,15 +929,12 @@ double heisenberg_hamiltonian(const heisenberg_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void heisenberg_kernel(const heisenberg_params *, const heisenberg_row *, ptrdiff_t, ptrdiff_t,
-    double *restrict, size_t);
-
-static void heisenberg_fill(const heisenberg_solver *s, heisenberg_kernel *kernel, double *out)
+static void heisenberg_fill(const heisenberg_solver *s, void kernel(const heisenberg_row *, double *restrict),
+    double *out)
 {
-    heisenberg_row row;
     for (size_t r = 0; r < s->rows; ++r) {
-        heisenberg_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
+        const heisenberg_row row = heisenberg_piece_of(s, r);
+        kernel(&row, out + r * (size_t)s->length);
     }
 }
 

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f1c96afd0d576bf8fa5e4765d152d8da9e2bb922f05b0e351da761bafce6a1fd
+ * body-sha256: 1677d3c72e51bae561da7e6b782491d8c8da803d8833af1973d8435d0819b0e5
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -83,11 +83,12 @@ static void heisenberg_plane_prepare(const heisenberg_plane_params *params, doub
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
+    const heisenberg_plane_solver *s;
     double *const *x;    /* see heisenberg_plane_solver */
     const ptrdiff_t *at; /* the row itself and those beside it, from the first row on */
-    ptrdiff_t length;    /* sites of a row */
+    ptrdiff_t from, to;  /* its sites, to not among them */
     /* 1 for terms of H that are there as far as the other axes say, else 0 */
     double present[heisenberg_plane_WEIGHTS];
 } heisenberg_plane_row;
@@ -125,13 +126,15 @@ static inline void heisenberg_plane_place(const heisenberg_plane_solver *s, size
     }
 }
 
-/* What kernels are told of a row. */
-static inline void heisenberg_plane_locate(const heisenberg_plane_solver *s, size_t index,
-    heisenberg_plane_row *row)
+/* The row of that number, which is worked at in one go. */
+static inline heisenberg_plane_row heisenberg_plane_piece_of(const heisenberg_plane_solver *s, size_t index)
 {
-    row->x = s->x;
-    row->at = s->lines + index * heisenberg_plane_LINES;
-    row->length = s->length;
+    heisenberg_plane_row row;
+    row.s = s;
+    row.x = s->x;
+    row.at = s->lines + index * heisenberg_plane_LINES;
+    row.from = 0;
+    row.to = s->length;
     ptrdiff_t place[heisenberg_plane_AXES];
     heisenberg_plane_place(s, index, place);
     for (int k = 0; k < heisenberg_plane_WEIGHTS; ++k) {
@@ -139,28 +142,22 @@ static inline void heisenberg_plane_locate(const heisenberg_plane_solver *s, siz
         for (int a = 0; a < heisenberg_plane_AXES - 1; ++a)
             there = there && place[a] + heisenberg_plane_weights[k][a][0] >= 0 &&
                 place[a] + heisenberg_plane_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
-        row->present[k] = there ? 1.0 : 0.0;
+        row.present[k] = there ? 1.0 : 0.0;
     }
+    return row;
 }
 
 /* what is worked at in one go */
 static size_t heisenberg_plane_units(const heisenberg_plane_solver *s) { return s->rows; }
 
-typedef struct {
-    heisenberg_plane_row row;
-    ptrdiff_t from, to;
-    ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
-} heisenberg_plane_piece;
-
-/* The piece of that number, or the row. */
-static inline heisenberg_plane_piece heisenberg_plane_piece_of(const heisenberg_plane_solver *s, size_t unit)
+/* The sites from one on, before another: as far as to the end of the last vector of 8, which may lie in the
+   copies beside a row, where these are made anew. */
+static inline const heisenberg_plane_row *heisenberg_plane_between(heisenberg_plane_row *row, ptrdiff_t from,
+    ptrdiff_t to)
 {
-    heisenberg_plane_piece piece;
-    heisenberg_plane_locate(s, unit, &piece.row);
-    piece.from = 0;
-    piece.to = s->length;
-    piece.wide = (s->length + 7) & ~(ptrdiff_t)7;
-    return piece;
+    row->from = from;
+    row->to = to;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -198,8 +195,7 @@ static inline double heisenberg_plane_sin_lane(double u) { return heisenberg_pla
 
 /* the flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned the flow of H_2 = sum of
    -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned, where x, y, z stand for its y, z, x */
-static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenberg_plane_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenberg_plane_row *row)
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
     const double *restrict x_row = row->x[0] + row->at[0];
@@ -207,9 +203,9 @@ static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenbe
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
     const double *restrict x_row1 = row->x[0] + row->at[1]; /* i - 1 */
     heisenberg_plane_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
         const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
         const double t1 = c0 * (w1 * x_row[i - 1] + w0 * x_row[i + 1] + (w3 * x_row1[i] + w2 * x_row2[i]));
         const double t2 = (2.0 * heisenberg_plane_sin_lane(0.5 * (t1)) * heisenberg_plane_sin_lane(0.5
@@ -223,8 +219,7 @@ static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenbe
 }
 
 /* the flow of H_3 = sum of -(J*(z[i+1]*(delta*z)) + J*(z[j+1]*(delta*z))): x, y turned */
-static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_plane_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_plane_row *row)
 {
     const double c1 = coef[1], w2 = row->present[2], w3 = row->present[3];
     double *x_row = row->x[0] + row->at[0], *y_row = row->x[1] + row->at[0];
@@ -232,9 +227,9 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     heisenberg_plane_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
         const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
         const double t1 = c1 * (w1 * z_row[i - 1] + w0 * z_row[i + 1] + (w3 * z_row1[i] + w2 * z_row2[i]));
         const double t2 = heisenberg_plane_sin_lane(t1);
@@ -252,68 +247,65 @@ static void heisenberg_plane_sweep_piece(const heisenberg_plane_solver *s, int p
     size_t unit)
 {
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
-    heisenberg_plane_piece at = heisenberg_plane_piece_of(s, unit);
+    heisenberg_plane_row row = heisenberg_plane_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
-        heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_plane_sweep_y_z(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_plane_ends(s->x[1] + row.at[0], s->length, 0, s->length);
+        heisenberg_plane_ends(s->x[2] + row.at[0], s->length, 0, s->length);
         break;
     case 2: /* H_2 */
-        at.row.x = y_z_x;
-        heisenberg_plane_sweep_y_z(coef, &at.row, at.from, at.wide);
-        heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_plane_ends(s->x[2] + at.row.at[0], s->length, at.from, at.to);
+        row.x = y_z_x;
+        heisenberg_plane_sweep_y_z(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_plane_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+        heisenberg_plane_ends(s->x[2] + row.at[0], s->length, 0, s->length);
         break;
     default: /* H_3 */
-        heisenberg_plane_sweep3(coef, &at.row, at.from, at.wide);
-        heisenberg_plane_ends(s->x[0] + at.row.at[0], s->length, at.from, at.to);
-        heisenberg_plane_ends(s->x[1] + at.row.at[0], s->length, at.from, at.to);
+        heisenberg_plane_sweep3(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+        heisenberg_plane_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+        heisenberg_plane_ends(s->x[1] + row.at[0], s->length, 0, s->length);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void heisenberg_plane_energy_row(const heisenberg_plane_params *params,
-    const heisenberg_plane_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void heisenberg_plane_energy_row(const heisenberg_plane_row *row, double *restrict out)
 {
-    (void)apart;
-    const double J = params->J, delta = params->delta, w2 = row->present[2];
+    const double J = row->s->params.J, delta = row->s->params.delta, w2 = row->present[2];
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
         *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
     const double *restrict y_row2 = row->x[1] + row->at[2]; /* i + 1 */
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     heisenberg_plane_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
         const double t1 = delta * z;
         const double t2 = w0 * (J * (x * x_row[i + 1])) + w2 * (J * (z_row2[i] * t1))
             + (w0 * (J * (y * y_row[i + 1])) + w0 * (J * (z_row[i + 1] * t1)));
-        out[i - from] = -(w2 * (J * (x * x_row2[i])) + w2 * (J * (y * y_row2[i])) + t2);
+        out[i - row->from] = -(w2 * (J * (x * x_row2[i])) + w2 * (J * (y * y_row2[i])) + t2);
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void heisenberg_plane_casimirs_row(const heisenberg_plane_params *params,
-    const heisenberg_plane_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void heisenberg_plane_casimirs_row(const heisenberg_plane_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
         *restrict z_row = row->x[2] + row->at[0];
     heisenberg_plane_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = z * z + (x * x + y * y);
+        out[i - row->from] = z * z + (x * x + y * y);
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *params,
-    const heisenberg_plane_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void heisenberg_plane_vector_field_row(const heisenberg_plane_row *row, double *restrict out)
 {
-    const double J = params->J, delta = params->delta, w2 = row->present[2], w3 = row->present[3];
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double J = row->s->params.J, delta = row->s->params.delta, w2 = row->present[2],
+        w3 = row->present[3];
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
         *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
@@ -323,9 +315,9 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
     const double *restrict z_row1 = row->x[2] + row->at[1]; /* i - 1 */
     heisenberg_plane_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
         const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
         const double t1 = w0 * (delta * (J * z_row[i + 1])) + w1 * (J * (delta * z_row[i - 1]))
             + (w3 * (J * (delta * z_row1[i])) + w2 * (delta * (J * z_row2[i])));
@@ -333,9 +325,9 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_params *par
             + w1 * (J * y_row[i - 1]));
         const double t3 = w2 * (J * x_row2[i]) + w3 * (J * x_row1[i]) + (w0 * (J * x_row[i + 1])
             + w1 * (J * x_row[i - 1]));
-        out[i - from] = y * t1 - z * t2;
-        out[(ptrdiff_t)apart + i - from] = z * t3 - x * t1;
-        out[2 * (ptrdiff_t)apart + i - from] = x * t2 - y * t3;
+        out[i - row->from] = y * t1 - z * t2;
+        out[apart + i - row->from] = z * t3 - x * t1;
+        out[2 * apart + i - row->from] = x * t2 - y * t3;
     }
 }
 
@@ -598,14 +590,14 @@ heisenberg_plane_status heisenberg_plane_resume(heisenberg_plane_solver *s, doub
 double heisenberg_plane_hamiltonian(const heisenberg_plane_solver *s)
 {
     double density[heisenberg_plane_BUFFER], sum = 0.0, rest = 0.0;
-    heisenberg_plane_row row;
     for (size_t r = 0; r < s->rows; ++r) {
-        heisenberg_plane_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += heisenberg_plane_BUFFER) {
-            const ptrdiff_t to = s->length - from > heisenberg_plane_BUFFER ? from + heisenberg_plane_BUFFER
+        heisenberg_plane_row row = heisenberg_plane_piece_of(s, r);
+        for (row.to = 0; row.to < s->length;) {
+            row.from = row.to;
+            row.to = s->length - row.from > heisenberg_plane_BUFFER ? row.from + heisenberg_plane_BUFFER
                 : s->length;
-            heisenberg_plane_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+            heisenberg_plane_energy_row(&row, density);
+            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
                 const double total = sum + density[i];
                 rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i]
                     : (density[i] - total) + sum;
@@ -617,16 +609,12 @@ double heisenberg_plane_hamiltonian(const heisenberg_plane_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void heisenberg_plane_kernel(const heisenberg_plane_params *, const heisenberg_plane_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void heisenberg_plane_fill(const heisenberg_plane_solver *s, heisenberg_plane_kernel *kernel,
-    double *out)
+static void heisenberg_plane_fill(const heisenberg_plane_solver *s, void kernel(const heisenberg_plane_row *,
+    double *restrict), double *out)
 {
-    heisenberg_plane_row row;
     for (size_t r = 0; r < s->rows; ++r) {
-        heisenberg_plane_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
+        const heisenberg_plane_row row = heisenberg_plane_piece_of(s, r);
+        kernel(&row, out + r * (size_t)s->length);
     }
 }
 

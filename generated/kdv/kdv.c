@@ -13,7 +13,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 01d76f0444471397fd8d4b92f161fe87d8fe69bc399ea2ef5319b2a38107fe35
+ * body-sha256: 8e3c72c7e0d40970fa31ad19cffce511086b8a14b06c5da9c84647badda68cb4
  */
 #include "kdv.h"
 #include <float.h>
@@ -70,10 +70,11 @@ static void kdv_prepare(const kdv_params *params, double h, double coef[restrict
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see kdv_solver */
-    ptrdiff_t length; /* sites of a row */
+    const kdv_solver *s;
+    double *const *x;   /* see kdv_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
     double *const *varied; /* a variation of x */
@@ -100,12 +101,16 @@ static inline void kdv_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrdi
         for (ptrdiff_t k = 1; k <= kdv_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void kdv_locate(const kdv_solver *s, kdv_row *row)
+/* The whole row. */
+static inline kdv_row kdv_row_of(const kdv_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->start = row->out = s->x;
+    kdv_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    row.start = row.out = s->x;
+    return row;
 }
 
 enum { kdv_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -116,19 +121,13 @@ static size_t kdv_units(const kdv_solver *s)
     return s->length < 2 * kdv_PIECE ? 1 : (size_t)s->length / kdv_PIECE;
 }
 
-typedef struct {
-    kdv_row row;
-    ptrdiff_t from, to;
-} kdv_piece;
-
-/* The piece of that number, or the row. */
-static inline kdv_piece kdv_piece_of(const kdv_solver *s, size_t unit)
+/* The piece of that number. */
+static inline kdv_row kdv_piece_of(const kdv_solver *s, size_t unit)
 {
-    kdv_piece piece;
-    kdv_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * kdv_PIECE;
-    piece.to = unit == kdv_units(s) - 1 ? s->length : piece.from + kdv_PIECE;
-    return piece;
+    kdv_row row = kdv_row_of(s);
+    row.from = (ptrdiff_t)unit * kdv_PIECE;
+    if (unit + 1 < kdv_units(s)) row.to = row.from + kdv_PIECE;
+    return row;
 }
 
 /* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what
@@ -162,13 +161,13 @@ static size_t kdv_matrix_of(size_t sites, double *memory, kdv_matrix *m)
 }
 
 /* y at a site from x there and y around it */
-static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void kdv_relax(const double *coef, const kdv_row *row)
 {
     double *restrict out_u = row->out[0];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2], c3 = coef[3];
     const double *restrict start_u = row->start[0], *restrict u_row = row->x[0];
     kdv_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i];
         const double t1 = 0.5 * (c3 * (c2 * (c0 * (u_row[i + 1] - u) - c0 * (u_row[i + 2] - u_row[i + 1])
             - 0.5 * (c1 * (u_row[i + 1] * u_row[i + 1])))))
@@ -182,22 +181,22 @@ static inline void kdv_relax(const double *coef, const kdv_row *row, ptrdiff_t f
 static void kdv_relax_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
     size_t unit)
 {
-    kdv_piece at = kdv_piece_of(s, unit);
-    at.row.x = y;
-    at.row.start = s->x;
-    at.row.out = to;
-    kdv_relax(coef, &at.row, at.from, at.to);
-    kdv_ends(to[0], s->length, at.from, at.to);
+    kdv_row row = kdv_piece_of(s, unit);
+    row.x = y;
+    row.start = s->x;
+    row.out = to;
+    kdv_relax(coef, &row);
+    kdv_ends(to[0], s->length, row.from, row.to);
 }
 
 /* what a stage adds to x at a site, from y around it */
-static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void kdv_increment(const double *coef, const kdv_row *row)
 {
     double *restrict out_u = row->out[0];
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2], c3 = coef[3];
     const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i];
         const double t1 = 0.5 * (c3 * (c2 * (c0 * (u_row[i + 1] - u) - c0 * (u_row[i + 2] - u_row[i + 1])
             - 0.5 * (c1 * (u_row[i + 1] * u_row[i + 1])))))
@@ -211,22 +210,22 @@ static inline void kdv_increment(const double *coef, const kdv_row *row, ptrdiff
 static void kdv_increment_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
     size_t unit)
 {
-    kdv_piece at = kdv_piece_of(s, unit);
-    at.row.x = y;
-    at.row.out = to;
-    kdv_increment(coef, &at.row, at.from, at.to);
-    kdv_ends(to[0], s->length, at.from, at.to);
+    kdv_row row = kdv_piece_of(s, unit);
+    row.x = y;
+    row.out = to;
+    kdv_increment(coef, &row);
+    kdv_ends(to[0], s->length, row.from, row.to);
 }
 
 /* how y at a site follows y around it */
-static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void kdv_slope(const double *coef, const kdv_row *row)
 {
     double *restrict out_u = row->out[0];
     const double c4 = coef[4], c5 = coef[5], c6 = coef[6];
     const double *varied_u_0 = row->varied[0];
     const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double t1 = varied_u_0[i + 1] * (c6 + (c6 - 0.25 * (c5 * u_row[i + 1])))
             - 0.25 * (c4 * varied_u_0[i + 2]) + (0.25 * (c4 * varied_u_0[i - 2]) + varied_u_0[i - 1]
             * (0.25 * (c5 * u_row[i - 1]) - c6 - c6));
@@ -238,51 +237,45 @@ static inline void kdv_slope(const double *coef, const kdv_row *row, ptrdiff_t f
 static void kdv_slope_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *v,
     double *const *to, size_t unit)
 {
-    kdv_piece at = kdv_piece_of(s, unit);
-    at.row.x = y;
-    at.row.varied = v;
-    at.row.out = to;
-    kdv_slope(coef, &at.row, at.from, at.to);
+    kdv_row row = kdv_piece_of(s, unit);
+    row.x = y;
+    row.varied = v;
+    row.out = to;
+    kdv_slope(coef, &row);
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void kdv_energy_row(const kdv_params *params, const kdv_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void kdv_energy_row(const kdv_row *row, double *restrict out)
 {
-    (void)apart;
-    const double delta = params->delta, d = params->d;
+    const double delta = row->s->params.delta, d = row->s->params.d;
     const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i];
         const double t1 = u_row[i + 1] - u;
-        out[i - from] = 0.5 * (delta * delta * (t1 * t1) / d) - 1.0 / 6.0 * (d * (u * (u * u)));
+        out[i - row->from] = 0.5 * (delta * delta * (t1 * t1) / d) - 1.0 / 6.0 * (d * (u * (u * u)));
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void kdv_casimirs_row(const kdv_params *params, const kdv_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void kdv_casimirs_row(const kdv_row *row, double *restrict out)
 {
-    (void)apart;
-    const double d = params->d;
+    const double d = row->s->params.d;
     const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i];
-        out[i - from] = d * u;
+        out[i - row->from] = d * u;
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void kdv_vector_field_row(const kdv_row *row, double *restrict out)
 {
-    (void)apart;
-    const double delta = params->delta, d = params->d;
+    const double delta = row->s->params.delta, d = row->s->params.d;
     const double *restrict u_row = row->x[0];
     kdv_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i];
         const double t1 = 1.0 / d;
         const double t2 = t1 * t1;
@@ -290,7 +283,7 @@ static void kdv_vector_field_row(const kdv_params *params, const kdv_row *row, p
         const double t4 = 0.5 * (t2 * ((u_row[i + 1] - u) * t3 - (u_row[i + 2] - u_row[i + 1]) * t3
             - 0.5 * (d * (u_row[i + 1] * u_row[i + 1])))) - 0.5 * (t2 * ((u_row[i - 1] - u_row[i - 2]) * t3
             - (u - u_row[i - 1]) * t3 - 0.5 * (d * (u_row[i - 1] * u_row[i - 1]))));
-        out[i - from] = t4;
+        out[i - row->from] = t4;
     }
 }
 
@@ -436,17 +429,17 @@ static inline void kdv_raise(double *largest, double value)
    number is left out. */
 static void kdv_measure(const kdv_solver *s, int now, size_t unit, double *change, double *size)
 {
-    const kdv_piece at = kdv_piece_of(s, unit);
-    const ptrdiff_t whole = at.to - (at.to - at.from) % kdv_WIDTH;
+    const kdv_row row = kdv_piece_of(s, unit);
+    const ptrdiff_t whole = row.to - (row.to - row.from) % kdv_WIDTH;
     for (int k = 0; k < kdv_DIM; ++k) {
         const double *restrict before = s->y[now][k], *restrict after = s->y[1 - now][k];
         double changes[kdv_WIDTH] = { 0.0 }, sizes[kdv_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = at.from; i < whole; i += kdv_WIDTH)
+        for (ptrdiff_t i = row.from; i < whole; i += kdv_WIDTH)
             for (int l = 0; l < kdv_WIDTH; ++l) {
                 kdv_raise(changes + l, fabs(after[i + l] - before[i + l]));
                 kdv_raise(sizes + l, fabs(after[i + l]));
             }
-        for (ptrdiff_t i = whole; i < at.to; ++i) {
+        for (ptrdiff_t i = whole; i < row.to; ++i) {
             kdv_raise(changes, fabs(after[i] - before[i]));
             kdv_raise(sizes, fabs(after[i]));
         }
@@ -835,12 +828,12 @@ kdv_status kdv_kick(kdv_solver *s, const double *change) { return kdv_move(s, ch
 double kdv_hamiltonian(const kdv_solver *s)
 {
     double density[kdv_BUFFER], sum = 0.0, rest = 0.0;
-    kdv_row row;
-    kdv_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += kdv_BUFFER) {
-        const ptrdiff_t to = s->length - from > kdv_BUFFER ? from + kdv_BUFFER : s->length;
-        kdv_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    kdv_row row = kdv_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > kdv_BUFFER ? row.from + kdv_BUFFER : s->length;
+        kdv_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -850,13 +843,10 @@ double kdv_hamiltonian(const kdv_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void kdv_kernel(const kdv_params *, const kdv_row *, ptrdiff_t, ptrdiff_t, double *restrict, size_t);
-
-static void kdv_fill(const kdv_solver *s, kdv_kernel *kernel, double *out)
+static void kdv_fill(const kdv_solver *s, void kernel(const kdv_row *, double *restrict), double *out)
 {
-    kdv_row row;
-    kdv_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const kdv_row row = kdv_row_of(s);
+    kernel(&row, out);
 }
 
 void kdv_density(const kdv_solver *s, double *out) { kdv_fill(s, kdv_energy_row, out); }

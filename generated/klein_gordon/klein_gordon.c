@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 065b63414d7c3ce108e1b7a7c8de01f2298bf5e114a264b6a1a3fdeeaae81b57
+ * body-sha256: 589b5e8727037b0786a9622f7f1deff325d7da734c71985ca2407ef2301f5eb0
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -69,10 +69,11 @@ static void klein_gordon_prepare(const klein_gordon_params *params, double h, do
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see klein_gordon_solver */
-    ptrdiff_t length; /* sites of a row */
+    const klein_gordon_solver *s;
+    double *const *x;   /* see klein_gordon_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } klein_gordon_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -96,11 +97,15 @@ static inline void klein_gordon_ends(double *row, ptrdiff_t length, ptrdiff_t fr
         for (ptrdiff_t k = 1; k <= klein_gordon_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void klein_gordon_locate(const klein_gordon_solver *s, klein_gordon_row *row)
+/* The whole row. */
+static inline klein_gordon_row klein_gordon_row_of(const klein_gordon_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    klein_gordon_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { klein_gordon_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -111,44 +116,36 @@ static size_t klein_gordon_units(const klein_gordon_solver *s)
     return s->length < 2 * klein_gordon_PIECE ? 1 : (size_t)s->length / klein_gordon_PIECE;
 }
 
-typedef struct {
-    klein_gordon_row row;
-    ptrdiff_t from, to;
-} klein_gordon_piece;
-
-/* The piece of that number, or the row. */
-static inline klein_gordon_piece klein_gordon_piece_of(const klein_gordon_solver *s, size_t unit)
+/* The piece of that number. */
+static inline klein_gordon_row klein_gordon_piece_of(const klein_gordon_solver *s, size_t unit)
 {
-    klein_gordon_piece piece;
-    klein_gordon_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * klein_gordon_PIECE;
-    piece.to = unit == klein_gordon_units(s) - 1 ? s->length : piece.from + klein_gordon_PIECE;
-    return piece;
+    klein_gordon_row row = klein_gordon_row_of(s);
+    row.from = (ptrdiff_t)unit * klein_gordon_PIECE;
+    if (unit + 1 < klein_gordon_units(s)) row.to = row.from + klein_gordon_PIECE;
+    return row;
 }
 
 /* the flow of H_1 = sum of 1/4*(q**2 - 1)**2 + 1/2*(d**(-2)*(q[i+1] - q)**2): p shifted */
-static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
     const double *restrict q_row = row->x[0];
     double *p_row = row->x[1];
     klein_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double q = q_row[i];
         p_row[i] += -(c1 * (c0 * (q - q_row[i - 1]) + (q * (q * q - 1.0) - c0 * (q_row[i + 1] - q))));
     }
 }
 
 /* the flow of H_2 = sum of 1/2*p**2: q shifted */
-static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_row *row)
 {
     const double c1 = coef[1];
     const double *restrict p_row = row->x[1];
     double *q_row = row->x[0];
     klein_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i];
         q_row[i] += c1 * p;
     }
@@ -157,49 +154,47 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
 /* The flow of a part of H, for a piece of a row. */
 static void klein_gordon_sweep_piece(const klein_gordon_solver *s, int part, const double *coef, size_t unit)
 {
-    const klein_gordon_piece at = klein_gordon_piece_of(s, unit);
+    const klein_gordon_row row = klein_gordon_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        klein_gordon_sweep1(coef, &at.row, at.from, at.to);
-        klein_gordon_ends(s->x[1], s->length, at.from, at.to);
+        klein_gordon_sweep1(coef, &row);
+        klein_gordon_ends(s->x[1], s->length, row.from, row.to);
         break;
     default: /* H_2 */
-        klein_gordon_sweep2(coef, &at.row, at.from, at.to);
-        klein_gordon_ends(s->x[0], s->length, at.from, at.to);
+        klein_gordon_sweep2(coef, &row);
+        klein_gordon_ends(s->x[0], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void klein_gordon_energy_row(const klein_gordon_params *params, const klein_gordon_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void klein_gordon_energy_row(const klein_gordon_row *row, double *restrict out)
 {
-    (void)apart;
-    const double d = params->d;
+    const double d = row->s->params.d;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     klein_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = 1.0 / d;
         const double t2 = q_row[i + 1] - q;
         const double t3 = q * q - 1.0;
-        out[i - from] = 0.5 * (t1 * t1 * (t2 * t2)) + (0.5 * (p * p) + 0.25 * (t3 * t3));
+        out[i - row->from] = 0.5 * (t1 * t1 * (t2 * t2)) + (0.5 * (p * p) + 0.25 * (t3 * t3));
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void klein_gordon_vector_field_row(const klein_gordon_params *params, const klein_gordon_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void klein_gordon_vector_field_row(const klein_gordon_row *row, double *restrict out)
 {
-    const double d = params->d;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double d = row->s->params.d;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     klein_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = 1.0 / d;
         const double t2 = t1 * t1;
-        out[i - from] = p;
-        out[(ptrdiff_t)apart + i - from] =
+        out[i - row->from] = p;
+        out[apart + i - row->from] =
             -((q - q_row[i - 1]) * t2 + (q * (q * q - 1.0) - (q_row[i + 1] - q) * t2));
     }
 }
@@ -415,12 +410,12 @@ klein_gordon_status klein_gordon_resume(klein_gordon_solver *s, double h, const 
 double klein_gordon_hamiltonian(const klein_gordon_solver *s)
 {
     double density[klein_gordon_BUFFER], sum = 0.0, rest = 0.0;
-    klein_gordon_row row;
-    klein_gordon_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += klein_gordon_BUFFER) {
-        const ptrdiff_t to = s->length - from > klein_gordon_BUFFER ? from + klein_gordon_BUFFER : s->length;
-        klein_gordon_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    klein_gordon_row row = klein_gordon_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > klein_gordon_BUFFER ? row.from + klein_gordon_BUFFER : s->length;
+        klein_gordon_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -430,14 +425,11 @@ double klein_gordon_hamiltonian(const klein_gordon_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void klein_gordon_kernel(const klein_gordon_params *, const klein_gordon_row *, ptrdiff_t, ptrdiff_t,
-    double *restrict, size_t);
-
-static void klein_gordon_fill(const klein_gordon_solver *s, klein_gordon_kernel *kernel, double *out)
+static void klein_gordon_fill(const klein_gordon_solver *s, void kernel(const klein_gordon_row *,
+    double *restrict), double *out)
 {
-    klein_gordon_row row;
-    klein_gordon_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const klein_gordon_row row = klein_gordon_row_of(s);
+    kernel(&row, out);
 }
 
 void klein_gordon_density(const klein_gordon_solver *s, double *out)

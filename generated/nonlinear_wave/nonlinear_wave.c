@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 1425b1cd0c69614454bc7d016bb243c93c39788e28a68c1c6896cbc5df10fe38
+ * body-sha256: c2c1c37c3a7af8502ce46ac52f841bab5deb680f3a4b336ca62adba2234b04aa
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -72,10 +72,11 @@ static void nonlinear_wave_prepare(const nonlinear_wave_params *params, double h
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see nonlinear_wave_solver */
-    ptrdiff_t length; /* sites of a row */
+    const nonlinear_wave_solver *s;
+    double *const *x;   /* see nonlinear_wave_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } nonlinear_wave_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -99,11 +100,15 @@ static inline void nonlinear_wave_ends(double *row, ptrdiff_t length, ptrdiff_t 
         for (ptrdiff_t k = 1; k <= nonlinear_wave_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void nonlinear_wave_locate(const nonlinear_wave_solver *s, nonlinear_wave_row *row)
+/* The whole row. */
+static inline nonlinear_wave_row nonlinear_wave_row_of(const nonlinear_wave_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    nonlinear_wave_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { nonlinear_wave_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -114,30 +119,23 @@ static size_t nonlinear_wave_units(const nonlinear_wave_solver *s)
     return s->length < 2 * nonlinear_wave_PIECE ? 1 : (size_t)s->length / nonlinear_wave_PIECE;
 }
 
-typedef struct {
-    nonlinear_wave_row row;
-    ptrdiff_t from, to;
-} nonlinear_wave_piece;
-
-/* The piece of that number, or the row. */
-static inline nonlinear_wave_piece nonlinear_wave_piece_of(const nonlinear_wave_solver *s, size_t unit)
+/* The piece of that number. */
+static inline nonlinear_wave_row nonlinear_wave_piece_of(const nonlinear_wave_solver *s, size_t unit)
 {
-    nonlinear_wave_piece piece;
-    nonlinear_wave_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * nonlinear_wave_PIECE;
-    piece.to = unit == nonlinear_wave_units(s) - 1 ? s->length : piece.from + nonlinear_wave_PIECE;
-    return piece;
+    nonlinear_wave_row row = nonlinear_wave_row_of(s);
+    row.from = (ptrdiff_t)unit * nonlinear_wave_PIECE;
+    if (unit + 1 < nonlinear_wave_units(s)) row.to = row.from + nonlinear_wave_PIECE;
+    return row;
 }
 
 /* the flow of H_1 = sum of 1/2*(d*u**2) + 1/4*(d*(beta*u**4)): v shifted */
-static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wave_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wave_row *row)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
     const double *restrict u_row = row->x[0];
     double *v_row = row->x[1];
     nonlinear_wave_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i];
         v_row[i] +=
             c2 * (c0 * u + c1 * (u * (u * u)) - (c0 * u_row[i - 1]
@@ -146,14 +144,13 @@ static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wav
 }
 
 /* the flow of H_2 = sum of 1/2*(d*v**2): u shifted */
-static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wave_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wave_row *row)
 {
     const double c3 = coef[3];
     const double *restrict v_row = row->x[1];
     double *u_row = row->x[0];
     nonlinear_wave_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double v = v_row[i];
         u_row[i] += c3 * (v_row[i + 1] - v);
     }
@@ -163,62 +160,60 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
 static void nonlinear_wave_sweep_piece(const nonlinear_wave_solver *s, int part, const double *coef,
     size_t unit)
 {
-    const nonlinear_wave_piece at = nonlinear_wave_piece_of(s, unit);
+    const nonlinear_wave_row row = nonlinear_wave_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        nonlinear_wave_sweep1(coef, &at.row, at.from, at.to);
-        nonlinear_wave_ends(s->x[1], s->length, at.from, at.to);
+        nonlinear_wave_sweep1(coef, &row);
+        nonlinear_wave_ends(s->x[1], s->length, row.from, row.to);
         break;
     default: /* H_2 */
-        nonlinear_wave_sweep2(coef, &at.row, at.from, at.to);
-        nonlinear_wave_ends(s->x[0], s->length, at.from, at.to);
+        nonlinear_wave_sweep2(coef, &row);
+        nonlinear_wave_ends(s->x[0], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void nonlinear_wave_energy_row(const nonlinear_wave_params *params, const nonlinear_wave_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void nonlinear_wave_energy_row(const nonlinear_wave_row *row, double *restrict out)
 {
-    (void)apart;
-    const double beta = params->beta, d = params->d;
+    const double beta = row->s->params.beta, d = row->s->params.d;
     const double *restrict u_row = row->x[0], *restrict v_row = row->x[1];
     nonlinear_wave_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i], v = v_row[i];
         const double t1 = u * u;
-        out[i - from] = 0.5 * (d * t1) + (0.5 * (d * (v * v)) + 0.25 * (d * (beta * (t1 * t1))));
+        out[i - row->from] = 0.5 * (d * t1) + (0.5 * (d * (v * v)) + 0.25 * (d * (beta * (t1 * t1))));
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void nonlinear_wave_casimirs_row(const nonlinear_wave_params *params, const nonlinear_wave_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void nonlinear_wave_casimirs_row(const nonlinear_wave_row *row, double *restrict out)
 {
-    const double d = params->d;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double d = row->s->params.d;
     const double *restrict u_row = row->x[0], *restrict v_row = row->x[1];
     nonlinear_wave_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i], v = v_row[i];
-        out[i - from] = d * u;
-        out[(ptrdiff_t)apart + i - from] = d * v;
+        out[i - row->from] = d * u;
+        out[apart + i - row->from] = d * v;
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void nonlinear_wave_vector_field_row(const nonlinear_wave_params *params,
-    const nonlinear_wave_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void nonlinear_wave_vector_field_row(const nonlinear_wave_row *row, double *restrict out)
 {
-    const double beta = params->beta, d = params->d;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double beta = row->s->params.beta, d = row->s->params.d;
     const double *restrict u_row = row->x[0], *restrict v_row = row->x[1];
     nonlinear_wave_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double u = u_row[i], v = v_row[i];
         const double t1 = 1.0 / d;
         const double t2 = t1 * t1;
         const double t3 = beta * d;
-        out[i - from] = t2 * (d * v_row[i + 1]) - t2 * (d * v);
-        out[(ptrdiff_t)apart + i - from] = t2 * (d * u + t3 * (u * (u * u))) - t2 * (d * u_row[i - 1]
+        out[i - row->from] = t2 * (d * v_row[i + 1]) - t2 * (d * v);
+        out[apart + i - row->from] = t2 * (d * u + t3 * (u * (u * u))) - t2 * (d * u_row[i - 1]
             + t3 * (u_row[i - 1] * (u_row[i - 1] * u_row[i - 1])));
     }
 }
@@ -436,13 +431,12 @@ nonlinear_wave_status nonlinear_wave_resume(nonlinear_wave_solver *s, double h, 
 double nonlinear_wave_hamiltonian(const nonlinear_wave_solver *s)
 {
     double density[nonlinear_wave_BUFFER], sum = 0.0, rest = 0.0;
-    nonlinear_wave_row row;
-    nonlinear_wave_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += nonlinear_wave_BUFFER) {
-        const ptrdiff_t to = s->length - from > nonlinear_wave_BUFFER ? from + nonlinear_wave_BUFFER
-            : s->length;
-        nonlinear_wave_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    nonlinear_wave_row row = nonlinear_wave_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > nonlinear_wave_BUFFER ? row.from + nonlinear_wave_BUFFER : s->length;
+        nonlinear_wave_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -452,14 +446,11 @@ double nonlinear_wave_hamiltonian(const nonlinear_wave_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void nonlinear_wave_kernel(const nonlinear_wave_params *, const nonlinear_wave_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void nonlinear_wave_fill(const nonlinear_wave_solver *s, nonlinear_wave_kernel *kernel, double *out)
+static void nonlinear_wave_fill(const nonlinear_wave_solver *s, void kernel(const nonlinear_wave_row *,
+    double *restrict), double *out)
 {
-    nonlinear_wave_row row;
-    nonlinear_wave_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const nonlinear_wave_row row = nonlinear_wave_row_of(s);
+    kernel(&row, out);
 }
 
 void nonlinear_wave_density(const nonlinear_wave_solver *s, double *out)

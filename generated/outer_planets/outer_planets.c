@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: bcfd04a8ba8daac6ac85e0db2d058dd76a57dd93d82518d9232a742f37ee05c3
+ * body-sha256: 3773e3948980dda6c6ff6f642a7f784958e5abc0ec397937999c478cd725da19
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -69,11 +69,11 @@ static void outer_planets_prepare(const outer_planets_params *params, double h, 
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x;        /* see outer_planets_solver */
-    ptrdiff_t length;        /* sites of a row */
-    double *const *gathered; /* see outer_planets_solver */
+    const outer_planets_solver *s;
+    double *const *x;   /* see outer_planets_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } outer_planets_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -87,12 +87,15 @@ typedef struct {
 #define outer_planets_EACH_SITE
 #endif
 
-/* What kernels are told of a row. */
-static inline void outer_planets_locate(const outer_planets_solver *s, outer_planets_row *row)
+/* The whole row. */
+static inline outer_planets_row outer_planets_row_of(const outer_planets_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->gathered = s->gathered;
+    outer_planets_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { outer_planets_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
@@ -103,34 +106,28 @@ static size_t outer_planets_units(const outer_planets_solver *s)
     return s->length < 2 * outer_planets_PIECE ? 1 : (size_t)s->length / outer_planets_PIECE;
 }
 
-typedef struct {
-    outer_planets_row row;
-    ptrdiff_t from, to;
-} outer_planets_piece;
-
-/* The piece of that number, or the row. */
-static inline outer_planets_piece outer_planets_piece_of(const outer_planets_solver *s, size_t unit)
+/* The piece of that number. */
+static inline outer_planets_row outer_planets_piece_of(const outer_planets_solver *s, size_t unit)
 {
-    outer_planets_piece piece;
-    outer_planets_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * outer_planets_PIECE;
-    piece.to = unit == outer_planets_units(s) - 1 ? s->length : piece.from + outer_planets_PIECE;
-    return piece;
+    outer_planets_row row = outer_planets_row_of(s);
+    row.from = (ptrdiff_t)unit * outer_planets_PIECE;
+    if (unit + 1 < outer_planets_units(s)) row.to = row.from + outer_planets_PIECE;
+    return row;
 }
 
 /* what all other sites b add to the forces of H_1 at a site a */
-static inline void outer_planets_gather1(const double *coef, const outer_planets_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void outer_planets_gather1(const double *coef, const outer_planets_row *row)
 {
     const double c1 = coef[1];
     const double *restrict m_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
         *restrict z_row = row->x[2];
-    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1], *restrict g2 = row->gathered[2];
-    for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = 0.0;
-    for (ptrdiff_t j = 0; j < row->length; ++j) {
+    double *restrict g0 = row->s->gathered[0], *restrict g1 = row->s->gathered[1], *restrict g2 =
+        row->s->gathered[2];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) g0[i] = g1[i] = g2[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->s->length; ++j) {
         const double m_b_ = m_row[j], x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j];
         outer_planets_EACH_SITE
-        for (ptrdiff_t i = from; i < to; ++i) {
+        for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
             const double m_a_ = m_row[i], x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = z_a_ - z_b_;
@@ -146,16 +143,15 @@ static inline void outer_planets_gather1(const double *coef, const outer_planets
 
 /* the flow of H_1 = sum of -m[b]*(G*m[a])*((z[a] - z[b])**2 + ((x[a] - x[b])**2 + (y[a] - y[b])**2))**(-1/2):
       px, py, pz shifted */
-static inline void outer_planets_sweep1(const double *coef, const outer_planets_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void outer_planets_sweep1(const double *coef, const outer_planets_row *row)
 {
     const double c0 = coef[0];
     double *px_row = row->x[3], *py_row = row->x[4], *pz_row = row->x[5];
     outer_planets_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        const double change0 = -(c0 * row->gathered[0][i]);
-        const double change1 = -(c0 * row->gathered[1][i]);
-        const double change2 = -(c0 * row->gathered[2][i]);
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
+        const double change0 = -(c0 * row->s->gathered[0][i]);
+        const double change1 = -(c0 * row->s->gathered[1][i]);
+        const double change2 = -(c0 * row->s->gathered[2][i]);
         px_row[i] += change0;
         py_row[i] += change1;
         pz_row[i] += change2;
@@ -163,15 +159,14 @@ static inline void outer_planets_sweep1(const double *coef, const outer_planets_
 }
 
 /* the flow of H_2 = sum of 1/2*(1/m*(pz**2 + (px**2 + py**2))): x, y, z shifted */
-static inline void outer_planets_sweep2(const double *coef, const outer_planets_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void outer_planets_sweep2(const double *coef, const outer_planets_row *row)
 {
     const double c0 = coef[0];
     const double *restrict m_row = row->x[6], *restrict px_row = row->x[3], *restrict py_row = row->x[4],
         *restrict pz_row = row->x[5];
     double *x_row = row->x[0], *y_row = row->x[1], *z_row = row->x[2];
     outer_planets_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
         const double t1 = 1.0 / m;
         const double change0 = c0 * (px * t1);
@@ -187,31 +182,31 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
 static void outer_planets_sweep_piece(const outer_planets_solver *s, int part, const double *coef,
     size_t unit)
 {
-    const outer_planets_piece at = outer_planets_piece_of(s, unit);
+    const outer_planets_row row = outer_planets_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        outer_planets_gather1(coef, &at.row, at.from, at.to);
-        outer_planets_sweep1(coef, &at.row, at.from, at.to);
+        outer_planets_gather1(coef, &row);
+        outer_planets_sweep1(coef, &row);
         break;
     default: /* H_2 */
-        outer_planets_sweep2(coef, &at.row, at.from, at.to);
+        outer_planets_sweep2(coef, &row);
         break;
     }
 }
 
 /* what a site b adds to the forces at a site a */
-static inline void outer_planets_pair_forces(const outer_planets_params *params, const outer_planets_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void outer_planets_pair_forces(const outer_planets_row *row)
 {
-    const double G = params->G;
+    const double G = row->s->params.G;
     const double *restrict m_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
         *restrict z_row = row->x[2];
-    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1], *restrict g2 = row->gathered[2];
-    for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = 0.0;
-    for (ptrdiff_t j = 0; j < row->length; ++j) {
+    double *restrict g0 = row->s->gathered[0], *restrict g1 = row->s->gathered[1], *restrict g2 =
+        row->s->gathered[2];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) g0[i] = g1[i] = g2[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->s->length; ++j) {
         const double m_b_ = m_row[j], x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j];
         outer_planets_EACH_SITE
-        for (ptrdiff_t i = from; i < to; ++i) {
+        for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
             const double m_a_ = m_row[i], x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = z_a_ - z_b_;
@@ -226,18 +221,17 @@ static inline void outer_planets_pair_forces(const outer_planets_params *params,
 }
 
 /* the energy of a pair */
-static inline void outer_planets_pair_energy(const outer_planets_params *params, const outer_planets_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void outer_planets_pair_energy(const outer_planets_row *row)
 {
-    const double G = params->G;
+    const double G = row->s->params.G;
     const double *restrict m_row = row->x[6], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
         *restrict z_row = row->x[2];
-    double *restrict g0 = row->gathered[0];
-    for (ptrdiff_t i = from; i < to; ++i) g0[i] = 0.0;
-    for (ptrdiff_t j = 0; j < row->length; ++j) {
+    double *restrict g0 = row->s->gathered[0];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) g0[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->s->length; ++j) {
         const double m_b_ = m_row[j], x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j];
         outer_planets_EACH_SITE
-        for (ptrdiff_t i = from; i < to; ++i) {
+        for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
             const double m_a_ = m_row[i], x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
             const double t1 = z_a_ - z_b_;
             const double t2 = x_a_ - x_b_;
@@ -247,38 +241,36 @@ static inline void outer_planets_pair_energy(const outer_planets_params *params,
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void outer_planets_energy_row(const outer_planets_params *params, const outer_planets_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void outer_planets_energy_row(const outer_planets_row *row, double *restrict out)
 {
-    (void)apart;
-    outer_planets_pair_energy(params, row, from, to);
+    outer_planets_pair_energy(row);
     const double *restrict m_row = row->x[6], *restrict px_row = row->x[3], *restrict py_row = row->x[4],
         *restrict pz_row = row->x[5];
     outer_planets_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
-        out[i - from] = 0.5 * ((pz * pz + (px * px + py * py)) / m) + 0.5 * row->gathered[0][i];
+        out[i - row->from] = 0.5 * ((pz * pz + (px * px + py * py)) / m) + 0.5 * row->s->gathered[0][i];
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void outer_planets_vector_field_row(const outer_planets_params *params, const outer_planets_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void outer_planets_vector_field_row(const outer_planets_row *row, double *restrict out)
 {
-    outer_planets_pair_forces(params, row, from, to);
+    outer_planets_pair_forces(row);
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
     const double *restrict m_row = row->x[6], *restrict px_row = row->x[3], *restrict py_row = row->x[4],
         *restrict pz_row = row->x[5];
     outer_planets_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double m = m_row[i], px = px_row[i], py = py_row[i], pz = pz_row[i];
         const double t1 = 1.0 / m;
-        out[i - from] = px * t1;
-        out[(ptrdiff_t)apart + i - from] = py * t1;
-        out[2 * (ptrdiff_t)apart + i - from] = pz * t1;
-        out[3 * (ptrdiff_t)apart + i - from] = -row->gathered[0][i];
-        out[4 * (ptrdiff_t)apart + i - from] = -row->gathered[1][i];
-        out[5 * (ptrdiff_t)apart + i - from] = -row->gathered[2][i];
+        out[i - row->from] = px * t1;
+        out[apart + i - row->from] = py * t1;
+        out[2 * apart + i - row->from] = pz * t1;
+        out[3 * apart + i - row->from] = -row->s->gathered[0][i];
+        out[4 * apart + i - row->from] = -row->s->gathered[1][i];
+        out[5 * apart + i - row->from] = -row->s->gathered[2][i];
     }
 }
 
@@ -510,13 +502,12 @@ outer_planets_status outer_planets_resume(outer_planets_solver *s, double h, con
 double outer_planets_hamiltonian(const outer_planets_solver *s)
 {
     double density[outer_planets_BUFFER], sum = 0.0, rest = 0.0;
-    outer_planets_row row;
-    outer_planets_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += outer_planets_BUFFER) {
-        const ptrdiff_t to = s->length - from > outer_planets_BUFFER ? from + outer_planets_BUFFER
-            : s->length;
-        outer_planets_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    outer_planets_row row = outer_planets_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > outer_planets_BUFFER ? row.from + outer_planets_BUFFER : s->length;
+        outer_planets_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -526,14 +517,11 @@ double outer_planets_hamiltonian(const outer_planets_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void outer_planets_kernel(const outer_planets_params *, const outer_planets_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void outer_planets_fill(const outer_planets_solver *s, outer_planets_kernel *kernel, double *out)
+static void outer_planets_fill(const outer_planets_solver *s, void kernel(const outer_planets_row *,
+    double *restrict), double *out)
 {
-    outer_planets_row row;
-    outer_planets_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const outer_planets_row row = outer_planets_row_of(s);
+    kernel(&row, out);
 }
 
 void outer_planets_density(const outer_planets_solver *s, double *out)

@@ -14,7 +14,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 167f86a22ec507baf69464a5b68371e4815e9a101f0a963f9bbc872eb3354622
+ * body-sha256: 45e252bc21f40416897c8decfde146d85603933654e4eab5ff42b2ac0fe44027
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -61,14 +61,14 @@ static void point_vortices_prepare(const point_vortices_params *params, double h
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see point_vortices_solver */
-    ptrdiff_t length; /* sites of a row */
+    const point_vortices_solver *s;
+    double *const *x;   /* see point_vortices_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
     /* where a stage starts, and where what is computed goes; x is y there */
     double *const *start, *const *out;
-    double *const *varied;   /* a variation of x */
-    double *const *gathered; /* see point_vortices_solver */
+    double *const *varied; /* a variation of x */
 } point_vortices_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -82,13 +82,16 @@ typedef struct {
 #define point_vortices_EACH_SITE
 #endif
 
-/* What kernels are told of a row. */
-static inline void point_vortices_locate(const point_vortices_solver *s, point_vortices_row *row)
+/* The whole row. */
+static inline point_vortices_row point_vortices_row_of(const point_vortices_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->start = row->out = s->x;
-    row->gathered = s->gathered;
+    point_vortices_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    row.start = row.out = s->x;
+    return row;
 }
 
 enum { point_vortices_PIECE = 256 }; /* sites that are worked at in one go, with any number of threads */
@@ -99,33 +102,25 @@ static size_t point_vortices_units(const point_vortices_solver *s)
     return s->length < 2 * point_vortices_PIECE ? 1 : (size_t)s->length / point_vortices_PIECE;
 }
 
-typedef struct {
-    point_vortices_row row;
-    ptrdiff_t from, to;
-} point_vortices_piece;
-
-/* The piece of that number, or the row. */
-static inline point_vortices_piece point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
+/* The piece of that number. */
+static inline point_vortices_row point_vortices_piece_of(const point_vortices_solver *s, size_t unit)
 {
-    point_vortices_piece piece;
-    point_vortices_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * point_vortices_PIECE;
-    piece.to = unit == point_vortices_units(s) - 1 ? s->length : piece.from + point_vortices_PIECE;
-    return piece;
+    point_vortices_row row = point_vortices_row_of(s);
+    row.from = (ptrdiff_t)unit * point_vortices_PIECE;
+    if (unit + 1 < point_vortices_units(s)) row.to = row.from + point_vortices_PIECE;
+    return row;
 }
 
 /* what a site b adds to the forces at a site a */
-static inline void point_vortices_pair_forces(const point_vortices_params *params,
-    const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void point_vortices_pair_forces(const point_vortices_row *row)
 {
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
-    (void)params;
-    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1];
-    for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = 0.0;
-    for (ptrdiff_t j = 0; j < row->length; ++j) {
+    double *restrict g0 = row->s->gathered[0], *restrict g1 = row->s->gathered[1];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) g0[i] = g1[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->s->length; ++j) {
         const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j];
         point_vortices_EACH_SITE
-        for (ptrdiff_t i = from; i < to; ++i) {
+        for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
             const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = y_a_ - y_b_;
@@ -137,17 +132,15 @@ static inline void point_vortices_pair_forces(const point_vortices_params *param
 }
 
 /* the energy of a pair */
-static inline void point_vortices_pair_energy(const point_vortices_params *params,
-    const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void point_vortices_pair_energy(const point_vortices_row *row)
 {
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
-    (void)params;
-    double *restrict g0 = row->gathered[0];
-    for (ptrdiff_t i = from; i < to; ++i) g0[i] = 0.0;
-    for (ptrdiff_t j = 0; j < row->length; ++j) {
+    double *restrict g0 = row->s->gathered[0];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) g0[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->s->length; ++j) {
         const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j];
         point_vortices_EACH_SITE
-        for (ptrdiff_t i = from; i < to; ++i) {
+        for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
             const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i];
             const double t1 = x_a_ - x_b_;
             const double t2 = y_a_ - y_b_;
@@ -157,20 +150,18 @@ static inline void point_vortices_pair_energy(const point_vortices_params *param
 }
 
 /* what a site b adds to the forces at a site a, and to their variations */
-static inline void point_vortices_pair_slopes(const point_vortices_params *params,
-    const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void point_vortices_pair_slopes(const point_vortices_row *row)
 {
     const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1];
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
-    (void)params;
-    double *restrict g0 = row->gathered[0], *restrict g1 = row->gathered[1], *restrict g2 = row->gathered[2],
-        *restrict g3 = row->gathered[3];
-    for (ptrdiff_t i = from; i < to; ++i) g0[i] = g1[i] = g2[i] = g3[i] = 0.0;
-    for (ptrdiff_t j = 0; j < row->length; ++j) {
+    double *restrict g0 = row->s->gathered[0], *restrict g1 = row->s->gathered[1], *restrict g2 =
+        row->s->gathered[2], *restrict g3 = row->s->gathered[3];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) g0[i] = g1[i] = g2[i] = g3[i] = 0.0;
+    for (ptrdiff_t j = 0; j < row->s->length; ++j) {
         const double G_b_ = G_row[j], x_b_ = x_row[j], y_b_ = y_row[j], v_x_b_ = varied_x_0[j],
             v_y_b_ = varied_y_0[j];
         point_vortices_EACH_SITE
-        for (ptrdiff_t i = from; i < to; ++i) {
+        for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
             const double G_a_ = G_row[i], x_a_ = x_row[i], y_a_ = y_row[i], v_x_a_ = varied_x_0[i],
                 v_y_a_ = varied_y_0[i];
             const double t1 = x_a_ - x_b_;
@@ -195,19 +186,18 @@ static inline void point_vortices_pair_slopes(const point_vortices_params *param
 }
 
 /* y at a site from x there and y around it */
-static inline void point_vortices_relax(const double *coef, const point_vortices_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void point_vortices_relax(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
     const double *restrict start_x = row->start[0], *restrict start_y = row->start[1], *restrict G_row =
         row->x[2];
     point_vortices_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double G = G_row[i];
         const double t1 = 1.0 / G;
-        out_x[i] = start_x[i] + 0.5 * (t1 * (c0 * row->gathered[1][i]));
-        out_y[i] = start_y[i] - 0.5 * (t1 * (c0 * row->gathered[0][i]));
+        out_x[i] = start_x[i] + 0.5 * (t1 * (c0 * row->s->gathered[1][i]));
+        out_y[i] = start_y[i] - 0.5 * (t1 * (c0 * row->s->gathered[0][i]));
     }
 }
 
@@ -215,27 +205,26 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
 static void point_vortices_relax_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *to, size_t unit)
 {
-    point_vortices_piece at = point_vortices_piece_of(s, unit);
-    at.row.x = y;
-    at.row.start = s->x;
-    at.row.out = to;
-    point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
-    point_vortices_relax(coef, &at.row, at.from, at.to);
+    point_vortices_row row = point_vortices_piece_of(s, unit);
+    row.x = y;
+    row.start = s->x;
+    row.out = to;
+    point_vortices_pair_forces(&row);
+    point_vortices_relax(coef, &row);
 }
 
 /* what a stage adds to x at a site, from y around it */
-static inline void point_vortices_increment(const double *coef, const point_vortices_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void point_vortices_increment(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
     const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double G = G_row[i];
         const double t1 = 1.0 / G;
-        out_x[i] += t1 * (c0 * row->gathered[1][i]);
-        out_y[i] += -(t1 * (c0 * row->gathered[0][i]));
+        out_x[i] += t1 * (c0 * row->s->gathered[1][i]);
+        out_y[i] += -(t1 * (c0 * row->s->gathered[0][i]));
     }
 }
 
@@ -243,26 +232,25 @@ static inline void point_vortices_increment(const double *coef, const point_vort
 static void point_vortices_increment_piece(const point_vortices_solver *s, const double *coef,
     double *const *y, double *const *to, size_t unit)
 {
-    point_vortices_piece at = point_vortices_piece_of(s, unit);
-    at.row.x = y;
-    at.row.out = to;
-    point_vortices_pair_forces(&s->params, &at.row, at.from, at.to);
-    point_vortices_increment(coef, &at.row, at.from, at.to);
+    point_vortices_row row = point_vortices_piece_of(s, unit);
+    row.x = y;
+    row.out = to;
+    point_vortices_pair_forces(&row);
+    point_vortices_increment(coef, &row);
 }
 
 /* how y at a site follows y around it */
-static inline void point_vortices_slope(const double *coef, const point_vortices_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void point_vortices_slope(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
     const double c0 = coef[0];
     const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double G = G_row[i];
         const double t1 = c0 / G;
-        out_x[i] = 0.5 * (row->gathered[3][i] * t1);
-        out_y[i] = (-0.5) * (row->gathered[2][i] * t1);
+        out_x[i] = 0.5 * (row->s->gathered[3][i] * t1);
+        out_y[i] = (-0.5) * (row->s->gathered[2][i] * t1);
     }
 }
 
@@ -270,38 +258,36 @@ static inline void point_vortices_slope(const double *coef, const point_vortices
 static void point_vortices_slope_piece(const point_vortices_solver *s, const double *coef, double *const *y,
     double *const *v, double *const *to, size_t unit)
 {
-    point_vortices_piece at = point_vortices_piece_of(s, unit);
-    at.row.x = y;
-    at.row.varied = v;
-    at.row.out = to;
-    point_vortices_pair_slopes(&s->params, &at.row, at.from, at.to);
-    point_vortices_slope(coef, &at.row, at.from, at.to);
+    point_vortices_row row = point_vortices_piece_of(s, unit);
+    row.x = y;
+    row.varied = v;
+    row.out = to;
+    point_vortices_pair_slopes(&row);
+    point_vortices_slope(coef, &row);
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void point_vortices_energy_row(const point_vortices_params *params, const point_vortices_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void point_vortices_energy_row(const point_vortices_row *row, double *restrict out)
 {
-    (void)apart;
-    point_vortices_pair_energy(params, row, from, to);
+    point_vortices_pair_energy(row);
     point_vortices_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
-        out[i - from] = 0.5 * row->gathered[0][i];
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
+        out[i - row->from] = 0.5 * row->s->gathered[0][i];
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void point_vortices_vector_field_row(const point_vortices_params *params,
-    const point_vortices_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void point_vortices_vector_field_row(const point_vortices_row *row, double *restrict out)
 {
-    point_vortices_pair_forces(params, row, from, to);
+    point_vortices_pair_forces(row);
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
     const double *restrict G_row = row->x[2];
     point_vortices_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double G = G_row[i];
         const double t1 = 1.0 / G;
-        out[i - from] = row->gathered[1][i] * t1;
-        out[(ptrdiff_t)apart + i - from] = -(row->gathered[0][i] * t1);
+        out[i - row->from] = row->s->gathered[1][i] * t1;
+        out[apart + i - row->from] = -(row->s->gathered[0][i] * t1);
     }
 }
 
@@ -472,17 +458,17 @@ static inline void point_vortices_raise(double *largest, double value)
 static void point_vortices_measure(const point_vortices_solver *s, int now, size_t unit, double *change,
     double *size)
 {
-    const point_vortices_piece at = point_vortices_piece_of(s, unit);
-    const ptrdiff_t whole = at.to - (at.to - at.from) % point_vortices_WIDTH;
+    const point_vortices_row row = point_vortices_piece_of(s, unit);
+    const ptrdiff_t whole = row.to - (row.to - row.from) % point_vortices_WIDTH;
     for (int k = 0; k < point_vortices_DIM; ++k) {
         const double *restrict before = s->y[now][k], *restrict after = s->y[1 - now][k];
         double changes[point_vortices_WIDTH] = { 0.0 }, sizes[point_vortices_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = at.from; i < whole; i += point_vortices_WIDTH)
+        for (ptrdiff_t i = row.from; i < whole; i += point_vortices_WIDTH)
             for (int l = 0; l < point_vortices_WIDTH; ++l) {
                 point_vortices_raise(changes + l, fabs(after[i + l] - before[i + l]));
                 point_vortices_raise(sizes + l, fabs(after[i + l]));
             }
-        for (ptrdiff_t i = whole; i < at.to; ++i) {
+        for (ptrdiff_t i = whole; i < row.to; ++i) {
             point_vortices_raise(changes, fabs(after[i] - before[i]));
             point_vortices_raise(sizes, fabs(after[i]));
         }
@@ -590,15 +576,15 @@ static double point_vortices_product(const point_vortices_solver *s, double *con
     double sum = 0.0;
     point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        const point_vortices_piece at = point_vortices_piece_of(s, unit);
-        const ptrdiff_t whole = at.to - (at.to - at.from) % point_vortices_WIDTH;
+        const point_vortices_row row = point_vortices_piece_of(s, unit);
+        const ptrdiff_t whole = row.to - (row.to - row.from) % point_vortices_WIDTH;
         s->sums[unit] = 0.0;
         for (int k = 0; k < point_vortices_DIM; ++k) {
             const double *one = x[k], *other = y[k];
             double lanes[point_vortices_WIDTH] = { 0.0 };
-            for (ptrdiff_t i = at.from; i < whole; i += point_vortices_WIDTH)
+            for (ptrdiff_t i = row.from; i < whole; i += point_vortices_WIDTH)
                 for (int l = 0; l < point_vortices_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
-            for (ptrdiff_t i = whole; i < at.to; ++i) *lanes += one[i] * other[i];
+            for (ptrdiff_t i = whole; i < row.to; ++i) *lanes += one[i] * other[i];
             for (int l = 1; l < point_vortices_WIDTH; ++l) *lanes += lanes[l];
             s->sums[unit] += *lanes / s->usual[k] / s->usual[k];
         }
@@ -614,12 +600,12 @@ static void point_vortices_combine(const point_vortices_solver *s, double *const
     const size_t units = point_vortices_units(s);
     point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        const point_vortices_piece at = point_vortices_piece_of(s, unit);
+        const point_vortices_row row = point_vortices_piece_of(s, unit);
         for (int k = 0; k < point_vortices_DIM; ++k) {
             const double *one = x[k], *other = y[k];
             double *sum = to[k];
             point_vortices_EACH_SITE
-            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = a * one[i] + b * other[i];
+            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = a * one[i] + b * other[i];
         }
     }
 }
@@ -837,13 +823,12 @@ point_vortices_status point_vortices_kick(point_vortices_solver *s, const double
 double point_vortices_hamiltonian(const point_vortices_solver *s)
 {
     double density[point_vortices_BUFFER], sum = 0.0, rest = 0.0;
-    point_vortices_row row;
-    point_vortices_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += point_vortices_BUFFER) {
-        const ptrdiff_t to = s->length - from > point_vortices_BUFFER ? from + point_vortices_BUFFER
-            : s->length;
-        point_vortices_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    point_vortices_row row = point_vortices_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > point_vortices_BUFFER ? row.from + point_vortices_BUFFER : s->length;
+        point_vortices_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -853,14 +838,11 @@ double point_vortices_hamiltonian(const point_vortices_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void point_vortices_kernel(const point_vortices_params *, const point_vortices_row *, ptrdiff_t,
-    ptrdiff_t, double *restrict, size_t);
-
-static void point_vortices_fill(const point_vortices_solver *s, point_vortices_kernel *kernel, double *out)
+static void point_vortices_fill(const point_vortices_solver *s, void kernel(const point_vortices_row *,
+    double *restrict), double *out)
 {
-    point_vortices_row row;
-    point_vortices_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const point_vortices_row row = point_vortices_row_of(s);
+    kernel(&row, out);
 }
 
 void point_vortices_density(const point_vortices_solver *s, double *out)

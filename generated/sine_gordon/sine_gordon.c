@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a2be6284d498d366fb7eaa985f47dee5345f7676e4558a5c2d6b6bd5e4d83576
+ * body-sha256: f7f8f013f6d67a41e9640ff4065b95ce98a3d8a51ab5c1cca554541e16eea7ab
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -70,10 +70,11 @@ static void sine_gordon_prepare(const sine_gordon_params *params, double h, doub
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see sine_gordon_solver */
-    ptrdiff_t length; /* sites of a row */
+    const sine_gordon_solver *s;
+    double *const *x;   /* see sine_gordon_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } sine_gordon_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -97,11 +98,15 @@ static inline void sine_gordon_ends(double *row, ptrdiff_t length, ptrdiff_t fro
         for (ptrdiff_t k = 1; k <= sine_gordon_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void sine_gordon_locate(const sine_gordon_solver *s, sine_gordon_row *row)
+/* The whole row. */
+static inline sine_gordon_row sine_gordon_row_of(const sine_gordon_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    sine_gordon_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { sine_gordon_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -112,19 +117,13 @@ static size_t sine_gordon_units(const sine_gordon_solver *s)
     return s->length < 2 * sine_gordon_PIECE ? 1 : (size_t)s->length / sine_gordon_PIECE;
 }
 
-typedef struct {
-    sine_gordon_row row;
-    ptrdiff_t from, to;
-} sine_gordon_piece;
-
-/* The piece of that number, or the row. */
-static inline sine_gordon_piece sine_gordon_piece_of(const sine_gordon_solver *s, size_t unit)
+/* The piece of that number. */
+static inline sine_gordon_row sine_gordon_piece_of(const sine_gordon_solver *s, size_t unit)
 {
-    sine_gordon_piece piece;
-    sine_gordon_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * sine_gordon_PIECE;
-    piece.to = unit == sine_gordon_units(s) - 1 ? s->length : piece.from + sine_gordon_PIECE;
-    return piece;
+    sine_gordon_row row = sine_gordon_row_of(s);
+    row.from = (ptrdiff_t)unit * sine_gordon_PIECE;
+    if (unit + 1 < sine_gordon_units(s)) row.to = row.from + sine_gordon_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -161,28 +160,26 @@ static inline double sine_gordon_turned_sin(double u, double offset)
 static inline double sine_gordon_sin_lane(double u) { return sine_gordon_turned_sin(u, 0.0); }
 
 /* the flow of H_1 = sum of 1/2*(d**(-2)*(q[i+1] - q)**2) - cos(q): p shifted */
-static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
     const double *restrict q_row = row->x[0];
     double *p_row = row->x[1];
     sine_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double q = q_row[i];
         p_row[i] += c1 * (sine_gordon_sin_lane(q) + c0 * (q - q_row[i - 1] - (q_row[i + 1] - q)));
     }
 }
 
 /* the flow of H_2 = sum of 1 + 1/2*p**2: q shifted */
-static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row *row)
 {
     const double c2 = coef[2];
     const double *restrict p_row = row->x[1];
     double *q_row = row->x[0];
     sine_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i];
         q_row[i] += c2 * p;
     }
@@ -191,48 +188,46 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
 /* The flow of a part of H, for a piece of a row. */
 static void sine_gordon_sweep_piece(const sine_gordon_solver *s, int part, const double *coef, size_t unit)
 {
-    const sine_gordon_piece at = sine_gordon_piece_of(s, unit);
+    const sine_gordon_row row = sine_gordon_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        sine_gordon_sweep1(coef, &at.row, at.from, at.to);
-        sine_gordon_ends(s->x[1], s->length, at.from, at.to);
+        sine_gordon_sweep1(coef, &row);
+        sine_gordon_ends(s->x[1], s->length, row.from, row.to);
         break;
     default: /* H_2 */
-        sine_gordon_sweep2(coef, &at.row, at.from, at.to);
-        sine_gordon_ends(s->x[0], s->length, at.from, at.to);
+        sine_gordon_sweep2(coef, &row);
+        sine_gordon_ends(s->x[0], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void sine_gordon_energy_row(const sine_gordon_params *params, const sine_gordon_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void sine_gordon_energy_row(const sine_gordon_row *row, double *restrict out)
 {
-    (void)apart;
-    const double d = params->d;
+    const double d = row->s->params.d;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     sine_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = 1.0 / d;
         const double t2 = q_row[i + 1] - q;
-        out[i - from] = 1.0 + 0.5 * (p * p) + (0.5 * (t1 * t1 * (t2 * t2)) - cos(q));
+        out[i - row->from] = 1.0 + 0.5 * (p * p) + (0.5 * (t1 * t1 * (t2 * t2)) - cos(q));
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void sine_gordon_vector_field_row(const sine_gordon_params *params, const sine_gordon_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void sine_gordon_vector_field_row(const sine_gordon_row *row, double *restrict out)
 {
-    const double d = params->d;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double d = row->s->params.d;
     const double *restrict p_row = row->x[1], *restrict q_row = row->x[0];
     sine_gordon_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double p = p_row[i], q = q_row[i];
         const double t1 = 1.0 / d;
         const double t2 = t1 * t1;
-        out[i - from] = p;
-        out[(ptrdiff_t)apart + i - from] = -(sin(q) + ((q - q_row[i - 1]) * t2 - (q_row[i + 1] - q) * t2));
+        out[i - row->from] = p;
+        out[apart + i - row->from] = -(sin(q) + ((q - q_row[i - 1]) * t2 - (q_row[i + 1] - q) * t2));
     }
 }
 
@@ -447,12 +442,12 @@ sine_gordon_status sine_gordon_resume(sine_gordon_solver *s, double h, const dou
 double sine_gordon_hamiltonian(const sine_gordon_solver *s)
 {
     double density[sine_gordon_BUFFER], sum = 0.0, rest = 0.0;
-    sine_gordon_row row;
-    sine_gordon_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += sine_gordon_BUFFER) {
-        const ptrdiff_t to = s->length - from > sine_gordon_BUFFER ? from + sine_gordon_BUFFER : s->length;
-        sine_gordon_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    sine_gordon_row row = sine_gordon_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > sine_gordon_BUFFER ? row.from + sine_gordon_BUFFER : s->length;
+        sine_gordon_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -462,14 +457,11 @@ double sine_gordon_hamiltonian(const sine_gordon_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void sine_gordon_kernel(const sine_gordon_params *, const sine_gordon_row *, ptrdiff_t, ptrdiff_t,
-    double *restrict, size_t);
-
-static void sine_gordon_fill(const sine_gordon_solver *s, sine_gordon_kernel *kernel, double *out)
+static void sine_gordon_fill(const sine_gordon_solver *s, void kernel(const sine_gordon_row *,
+    double *restrict), double *out)
 {
-    sine_gordon_row row;
-    sine_gordon_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const sine_gordon_row row = sine_gordon_row_of(s);
+    kernel(&row, out);
 }
 
 void sine_gordon_density(const sine_gordon_solver *s, double *out)

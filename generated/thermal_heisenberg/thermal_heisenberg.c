@@ -17,7 +17,7 @@
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: f25a82578d298b2512e71c5356249418afae889c9afa65eb7a25a9f4fb3cd036
+ * body-sha256: 8160c2ecefe6c6e341e71f65fa143c459b34ceef0b82a5f78e942f4b1e5cbed4
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -86,12 +86,12 @@ static void thermal_heisenberg_prepare(const thermal_heisenberg_params *params, 
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see thermal_heisenberg_solver */
-    ptrdiff_t length; /* sites of a row */
-    int colour;       /* of the first site */
-    int swept;        /* that of the sites which are swept */
+    const thermal_heisenberg_solver *s;
+    double *const *x;   /* see thermal_heisenberg_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
+    int swept;          /* that of the sites which are swept */
 } thermal_heisenberg_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -109,9 +109,9 @@ typedef struct {
 static ptrdiff_t thermal_heisenberg_first(const thermal_heisenberg_row *row, int colour, ptrdiff_t from)
 {
     for (ptrdiff_t i = from; i < from + thermal_heisenberg_COLOUR_COUNT; ++i)
-        if ((row->colour + (int)(i % thermal_heisenberg_COLOUR_COUNT)
-            * thermal_heisenberg_COLOUR_STRIDE) % thermal_heisenberg_COLOUR_COUNT == colour) return i;
-    return row->length;
+        if ((int)(i % thermal_heisenberg_COLOUR_COUNT)
+            * thermal_heisenberg_COLOUR_STRIDE % thermal_heisenberg_COLOUR_COUNT == colour) return i;
+    return row->to;
 }
 
 /* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
@@ -125,13 +125,16 @@ static inline void thermal_heisenberg_ends(double *row, ptrdiff_t length, ptrdif
     }
 }
 
-/* What kernels are told of a row. */
-static inline void thermal_heisenberg_locate(const thermal_heisenberg_solver *s, thermal_heisenberg_row *row)
+/* The whole row. */
+static inline thermal_heisenberg_row thermal_heisenberg_row_of(const thermal_heisenberg_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->colour = 0;
-    row->swept = 0;
+    thermal_heisenberg_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    row.swept = 0;
+    return row;
 }
 
 enum { thermal_heisenberg_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -142,20 +145,14 @@ static size_t thermal_heisenberg_units(const thermal_heisenberg_solver *s)
     return s->length < 2 * thermal_heisenberg_PIECE ? 1 : (size_t)s->length / thermal_heisenberg_PIECE;
 }
 
-typedef struct {
-    thermal_heisenberg_row row;
-    ptrdiff_t from, to;
-} thermal_heisenberg_piece;
-
-/* The piece of that number, or the row. */
-static inline thermal_heisenberg_piece thermal_heisenberg_piece_of(const thermal_heisenberg_solver *s,
+/* The piece of that number. */
+static inline thermal_heisenberg_row thermal_heisenberg_piece_of(const thermal_heisenberg_solver *s,
     size_t unit)
 {
-    thermal_heisenberg_piece piece;
-    thermal_heisenberg_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * thermal_heisenberg_PIECE;
-    piece.to = unit == thermal_heisenberg_units(s) - 1 ? s->length : piece.from + thermal_heisenberg_PIECE;
-    return piece;
+    thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
+    row.from = (ptrdiff_t)unit * thermal_heisenberg_PIECE;
+    if (unit + 1 < thermal_heisenberg_units(s)) row.to = row.from + thermal_heisenberg_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -225,14 +222,13 @@ static inline double thermal_heisenberg_sinroot(double s)
 /* the flow of the noise bath_x: y, z turned
    the flow of the noise bath_y: x, z turned, where x, y, z stand for its y, z, x
    the flow of the noise bath_z: x, y turned, where x, y, z stand for its z, x, y */
-static inline void thermal_heisenberg_sweep_y_z(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void thermal_heisenberg_sweep_y_z(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c0 = coef[0];
     const double *restrict T_row = row->x[3], *restrict dw_0_row = row->x[4];
     double *y_row = row->x[1], *z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double T = T_row[i], dw_0 = dw_0_row[i], y = y_row[i], z = z_row[i];
         const double t1 = dw_0 * sqrt(T * c0);
         const double t2 = thermal_heisenberg_sin_lane(t1);
@@ -247,15 +243,14 @@ static inline void thermal_heisenberg_sweep_y_z(const double *coef, const therma
 
 /* the flow of F_1, a force: x, y, z moved on a sphere, as by a boost
    the flow of F_5, a force: x, y, z moved on a sphere, as by a boost */
-static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2], c3 = coef[3];
     double *x_row = row->x[0], *y_row = row->x[1], *z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = thermal_heisenberg_first(row, row->swept, from); i < to; i += 2) {
+    for (ptrdiff_t i = thermal_heisenberg_first(row, row->swept, row->from), to = row->to; i < to; i += 2) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = w1 * x_row[i - 1] + w0 * x_row[i + 1];
         const double t2 = z * z + (x * x + y * y);
@@ -283,16 +278,15 @@ static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const ther
 /* the flow of H_2 = sum of -J*(z*z[i+1]): x, y turned
    the flow of H_3 = sum of -J*(x*x[i+1]): y, z turned, where x, y, z stand for its y, z, x
    the flow of H_4 = sum of -J*(y*y[i+1]): x, z turned, where x, y, z stand for its z, x, y */
-static inline void thermal_heisenberg_sweep_x_y(const double *coef, const thermal_heisenberg_row *row,
-    ptrdiff_t from, ptrdiff_t to)
+static inline void thermal_heisenberg_sweep_x_y(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c4 = coef[4];
     double *x_row = row->x[0], *y_row = row->x[1];
     const double *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = c4 * (w0 * z_row[i + 1] + w1 * z_row[i - 1]);
         const double t2 = (2.0 * thermal_heisenberg_sin_lane(0.5 * (t1)) * thermal_heisenberg_sin_lane(0.5
@@ -311,81 +305,77 @@ static void thermal_heisenberg_sweep_piece(const thermal_heisenberg_solver *s, i
 {
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0], s->x[3], s->x[5], s->x[6], s->x[4] };
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3], s->x[6], s->x[4], s->x[5] };
-    thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+    thermal_heisenberg_row row = thermal_heisenberg_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
+        thermal_heisenberg_sweep_y_z(coef, &row);
         break;
     case 2: /* H_2 */
-        at.row.x = y_z_x;
-        thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
+        row.x = y_z_x;
+        thermal_heisenberg_sweep_y_z(coef, &row);
         break;
     case 3: /* H_3 */
-        at.row.x = z_x_y;
-        thermal_heisenberg_sweep_y_z(coef, &at.row, at.from, at.to);
+        row.x = z_x_y;
+        thermal_heisenberg_sweep_y_z(coef, &row);
         break;
     case 4: /* H_4 */
-        thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
+        thermal_heisenberg_sweep_x_y_z(coef, &row);
         break;
     case 5: /* H_5 */
-        thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
+        thermal_heisenberg_sweep_x_y(coef, &row);
         break;
     case 6: /* H_6 */
-        at.row.x = y_z_x;
-        thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
+        row.x = y_z_x;
+        thermal_heisenberg_sweep_x_y(coef, &row);
         break;
     case 7: /* H_7 */
-        at.row.x = z_x_y;
-        thermal_heisenberg_sweep_x_y(coef, &at.row, at.from, at.to);
+        row.x = z_x_y;
+        thermal_heisenberg_sweep_x_y(coef, &row);
         break;
     default: /* H_8 */
-        at.row.swept = 1;
-        thermal_heisenberg_sweep_x_y_z(coef, &at.row, at.from, at.to);
+        row.swept = 1;
+        thermal_heisenberg_sweep_x_y_z(coef, &row);
         break;
     }
     for (int k = 0; k < thermal_heisenberg_DIM; ++k)
-        thermal_heisenberg_ends(s->x[k], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->x[k], s->length, row.from, row.to);
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void thermal_heisenberg_energy_row(const thermal_heisenberg_params *params,
-    const thermal_heisenberg_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void thermal_heisenberg_energy_row(const thermal_heisenberg_row *row, double *restrict out)
 {
-    (void)apart;
-    const double J = params->J;
+    const double J = row->s->params.J;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
-        out[i - from] = -(w0 * (J * (y * y_row[i + 1])) + (w0 * (J * (x * x_row[i + 1]))
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
+        out[i - row->from] = -(w0 * (J * (y * y_row[i + 1])) + (w0 * (J * (x * x_row[i + 1]))
             + w0 * (J * (z * z_row[i + 1]))));
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void thermal_heisenberg_casimirs_row(const thermal_heisenberg_params *params,
-    const thermal_heisenberg_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void thermal_heisenberg_casimirs_row(const thermal_heisenberg_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = z * z + (x * x + y * y);
+        out[i - row->from] = z * z + (x * x + y * y);
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void thermal_heisenberg_vector_field_row(const thermal_heisenberg_params *params,
-    const thermal_heisenberg_row *row, ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void thermal_heisenberg_vector_field_row(const thermal_heisenberg_row *row, double *restrict out)
 {
-    const double J = params->J, lambda = params->lambda;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double J = row->s->params.J, lambda = row->s->params.lambda;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     thermal_heisenberg_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->length ? 1.0 : 0.0;
+        const double w0 = i + 1 < row->s->length ? 1.0 : 0.0;
         const double w1 = i - 1 >= 0 ? 1.0 : 0.0;
         const double t1 = w0 * (J * x_row[i + 1]) + w1 * (J * x_row[i - 1]);
         const double t2 = w1 * (J * z_row[i - 1]) + w0 * (J * z_row[i + 1]);
@@ -393,9 +383,9 @@ static void thermal_heisenberg_vector_field_row(const thermal_heisenberg_params 
         const double t4 = lambda * (z * t1 - x * t2) - t3;
         const double t5 = lambda * (x * t3 - y * t1) - t2;
         const double t6 = lambda * (y * t2 - z * t3) - t1;
-        out[i - from] = z * t4 - y * t5;
-        out[(ptrdiff_t)apart + i - from] = x * t5 - z * t6;
-        out[2 * (ptrdiff_t)apart + i - from] = y * t6 - x * t4;
+        out[i - row->from] = z * t4 - y * t5;
+        out[apart + i - row->from] = x * t5 - z * t6;
+        out[2 * apart + i - row->from] = y * t6 - x * t4;
     }
 }
 
@@ -444,11 +434,11 @@ static void thermal_heisenberg_draw_piece(const thermal_heisenberg_solver *s, si
     const uint32_t now = (uint32_t)(s->h < 0.0 ? thermal_heisenberg_PARTS - 1 - part
         : part) * ((thermal_heisenberg_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)thermal_heisenberg_PARTS), s->h);
-    const thermal_heisenberg_piece at = thermal_heisenberg_piece_of(s, unit);
+    const thermal_heisenberg_row row = thermal_heisenberg_piece_of(s, unit);
     for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
         double *one = s->x[thermal_heisenberg_DRAWN + k];
         double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
-        for (ptrdiff_t i = at.from; i < at.to; ++i) {
+        for (ptrdiff_t i = row.from; i < row.to; ++i) {
             const uint64_t site = (uint64_t)i;
             const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
             uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
@@ -460,7 +450,7 @@ static void thermal_heisenberg_draw_piece(const thermal_heisenberg_solver *s, si
         }
     }
     for (int k = 0; k < thermal_heisenberg_SOURCES; ++k)
-        thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, at.from, at.to);
+        thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, row.from, row.to);
 }
 
 thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver *s, uint64_t seed,
@@ -725,13 +715,13 @@ thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s
 double thermal_heisenberg_hamiltonian(const thermal_heisenberg_solver *s)
 {
     double density[thermal_heisenberg_BUFFER], sum = 0.0, rest = 0.0;
-    thermal_heisenberg_row row;
-    thermal_heisenberg_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += thermal_heisenberg_BUFFER) {
-        const ptrdiff_t to = s->length - from > thermal_heisenberg_BUFFER ? from + thermal_heisenberg_BUFFER
+    thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > thermal_heisenberg_BUFFER ? row.from + thermal_heisenberg_BUFFER
             : s->length;
-        thermal_heisenberg_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+        thermal_heisenberg_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -741,15 +731,11 @@ double thermal_heisenberg_hamiltonian(const thermal_heisenberg_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void thermal_heisenberg_kernel(const thermal_heisenberg_params *, const thermal_heisenberg_row *,
-    ptrdiff_t, ptrdiff_t, double *restrict, size_t);
-
-static void thermal_heisenberg_fill(const thermal_heisenberg_solver *s, thermal_heisenberg_kernel *kernel,
-    double *out)
+static void thermal_heisenberg_fill(const thermal_heisenberg_solver *s,
+    void kernel(const thermal_heisenberg_row *, double *restrict), double *out)
 {
-    thermal_heisenberg_row row;
-    thermal_heisenberg_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
+    kernel(&row, out);
 }
 
 void thermal_heisenberg_density(const thermal_heisenberg_solver *s, double *out)

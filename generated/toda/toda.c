@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 898523ffe21888ba014b8c45cce161d4cd8b5614a39dd1dbf75c50bfb2ee944d
+ * body-sha256: fae0e8c85c33fd7aaea1f86bcd03499c6ecd1d3c59af70a779ca674d418bb695
  */
 #include "toda.h"
 #include <float.h>
@@ -66,10 +66,11 @@ static void toda_prepare(const toda_params *params, double h, double coef[restri
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see toda_solver */
-    ptrdiff_t length; /* sites of a row */
+    const toda_solver *s;
+    double *const *x;   /* see toda_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } toda_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -93,11 +94,15 @@ static inline void toda_ends(double *row, ptrdiff_t length, ptrdiff_t from, ptrd
         for (ptrdiff_t k = 1; k <= toda_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void toda_locate(const toda_solver *s, toda_row *row)
+/* The whole row. */
+static inline toda_row toda_row_of(const toda_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    toda_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { toda_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -108,19 +113,13 @@ static size_t toda_units(const toda_solver *s)
     return s->length < 2 * toda_PIECE ? 1 : (size_t)s->length / toda_PIECE;
 }
 
-typedef struct {
-    toda_row row;
-    ptrdiff_t from, to;
-} toda_piece;
-
-/* The piece of that number, or the row. */
-static inline toda_piece toda_piece_of(const toda_solver *s, size_t unit)
+/* The piece of that number. */
+static inline toda_row toda_piece_of(const toda_solver *s, size_t unit)
 {
-    toda_piece piece;
-    toda_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * toda_PIECE;
-    piece.to = unit == toda_units(s) - 1 ? s->length : piece.from + toda_PIECE;
-    return piece;
+    toda_row row = toda_row_of(s);
+    row.from = (ptrdiff_t)unit * toda_PIECE;
+    if (unit + 1 < toda_units(s)) row.to = row.from + toda_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -160,26 +159,26 @@ static inline double toda_expm1_lane(double u)
 }
 
 /* the flow of H_1 = sum of a**2: b shifted */
-static inline void toda_sweep1(const double *coef, const toda_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void toda_sweep1(const double *coef, const toda_row *row)
 {
     const double c0 = coef[0];
     const double *restrict a_row = row->x[0];
     double *b_row = row->x[1];
     toda_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i];
         b_row[i] += c0 * (a * a - a_row[i - 1] * a_row[i - 1]);
     }
 }
 
 /* the flow of H_2 = sum of 1/2*b**2: a scaled */
-static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void toda_sweep2(const double *coef, const toda_row *row)
 {
     const double c1 = coef[1];
     double *a_row = row->x[0];
     const double *restrict b_row = row->x[1];
     toda_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
         a_row[i] = a + a * toda_expm1_lane(c1 * (b_row[i + 1] - b));
     }
@@ -188,57 +187,53 @@ static inline void toda_sweep2(const double *coef, const toda_row *row, ptrdiff_
 /* The flow of a part of H, for a piece of a row. */
 static void toda_sweep_piece(const toda_solver *s, int part, const double *coef, size_t unit)
 {
-    const toda_piece at = toda_piece_of(s, unit);
+    const toda_row row = toda_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        toda_sweep1(coef, &at.row, at.from, at.to);
-        toda_ends(s->x[1], s->length, at.from, at.to);
+        toda_sweep1(coef, &row);
+        toda_ends(s->x[1], s->length, row.from, row.to);
         break;
     default: /* H_2 */
-        toda_sweep2(coef, &at.row, at.from, at.to);
-        toda_ends(s->x[0], s->length, at.from, at.to);
+        toda_sweep2(coef, &row);
+        toda_ends(s->x[0], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void toda_energy_row(const toda_params *params, const toda_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void toda_energy_row(const toda_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
     toda_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
-        out[i - from] = a * a + 0.5 * (b * b);
+        out[i - row->from] = a * a + 0.5 * (b * b);
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void toda_casimirs_row(const toda_params *params, const toda_row *row, ptrdiff_t from, ptrdiff_t to,
-    double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void toda_casimirs_row(const toda_row *row, double *restrict out)
 {
-    (void)params;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
     const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
     toda_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
-        out[i - from] = b;
-        out[(ptrdiff_t)apart + i - from] = a;
+        out[i - row->from] = b;
+        out[apart + i - row->from] = a;
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void toda_vector_field_row(const toda_params *params, const toda_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void toda_vector_field_row(const toda_row *row, double *restrict out)
 {
-    (void)params;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
     const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
     toda_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i], b = b_row[i];
-        out[i - from] = a * b_row[i + 1] - a * b;
-        out[(ptrdiff_t)apart + i - from] = 2.0 * (a * a) - 2.0 * (a_row[i - 1] * a_row[i - 1]);
+        out[i - row->from] = a * b_row[i + 1] - a * b;
+        out[apart + i - row->from] = 2.0 * (a * a) - 2.0 * (a_row[i - 1] * a_row[i - 1]);
     }
 }
 
@@ -444,12 +439,12 @@ toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far)
 double toda_hamiltonian(const toda_solver *s)
 {
     double density[toda_BUFFER], sum = 0.0, rest = 0.0;
-    toda_row row;
-    toda_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += toda_BUFFER) {
-        const ptrdiff_t to = s->length - from > toda_BUFFER ? from + toda_BUFFER : s->length;
-        toda_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    toda_row row = toda_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > toda_BUFFER ? row.from + toda_BUFFER : s->length;
+        toda_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -459,14 +454,10 @@ double toda_hamiltonian(const toda_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void toda_kernel(const toda_params *, const toda_row *, ptrdiff_t, ptrdiff_t, double *restrict,
-    size_t);
-
-static void toda_fill(const toda_solver *s, toda_kernel *kernel, double *out)
+static void toda_fill(const toda_solver *s, void kernel(const toda_row *, double *restrict), double *out)
 {
-    toda_row row;
-    toda_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const toda_row row = toda_row_of(s);
+    kernel(&row, out);
 }
 
 void toda_density(const toda_solver *s, double *out) { toda_fill(s, toda_energy_row, out); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 1cb15e01b656b2ff01796227d1989f1b02394a3e85f972cde16a87faf305047a
+ * body-sha256: 90c934e21f20d6ca2e4d1f51d21b24d61c779748d61bf537ee3f48efb7c4748e
  */
 #include "volterra.h"
 #include <float.h>
@@ -67,12 +67,12 @@ static void volterra_prepare(const volterra_params *params, double h, double coe
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see volterra_solver */
-    ptrdiff_t length; /* sites of a row */
-    int colour;       /* of the first site */
-    int swept;        /* that of the sites which are swept */
+    const volterra_solver *s;
+    double *const *x;   /* see volterra_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
+    int swept;          /* that of the sites which are swept */
 } volterra_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -90,9 +90,9 @@ typedef struct {
 static ptrdiff_t volterra_first(const volterra_row *row, int colour, ptrdiff_t from)
 {
     for (ptrdiff_t i = from; i < from + volterra_COLOUR_COUNT; ++i)
-        if ((row->colour + (int)(i % volterra_COLOUR_COUNT) * volterra_COLOUR_STRIDE) % volterra_COLOUR_COUNT
-            == colour) return i;
-    return row->length;
+        if ((int)(i % volterra_COLOUR_COUNT) * volterra_COLOUR_STRIDE % volterra_COLOUR_COUNT == colour)
+            return i;
+    return row->to;
 }
 
 /* The copies beside a row, of the ends that are among the sites from..to: of the other end, or mirrored at
@@ -105,13 +105,16 @@ static inline void volterra_ends(double *row, ptrdiff_t length, ptrdiff_t from, 
         for (ptrdiff_t k = 1; k <= volterra_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void volterra_locate(const volterra_solver *s, volterra_row *row)
+/* The whole row. */
+static inline volterra_row volterra_row_of(const volterra_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
-    row->colour = 0;
-    row->swept = 0;
+    volterra_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    row.swept = 0;
+    return row;
 }
 
 enum { volterra_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -122,19 +125,13 @@ static size_t volterra_units(const volterra_solver *s)
     return s->length < 2 * volterra_PIECE ? 1 : (size_t)s->length / volterra_PIECE;
 }
 
-typedef struct {
-    volterra_row row;
-    ptrdiff_t from, to;
-} volterra_piece;
-
-/* The piece of that number, or the row. */
-static inline volterra_piece volterra_piece_of(const volterra_solver *s, size_t unit)
+/* The piece of that number. */
+static inline volterra_row volterra_piece_of(const volterra_solver *s, size_t unit)
 {
-    volterra_piece piece;
-    volterra_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * volterra_PIECE;
-    piece.to = unit == volterra_units(s) - 1 ? s->length : piece.from + volterra_PIECE;
-    return piece;
+    volterra_row row = volterra_row_of(s);
+    row.from = (ptrdiff_t)unit * volterra_PIECE;
+    if (unit + 1 < volterra_units(s)) row.to = row.from + volterra_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -175,12 +172,12 @@ static inline double volterra_expm1_lane(double u)
 
 /* the flow of H_1 = sum of a: a scaled
    the flow of H_2 = sum of a: a scaled */
-static inline void volterra_sweep_a(const double *coef, const volterra_row *row, ptrdiff_t from, ptrdiff_t to)
+static inline void volterra_sweep_a(const double *coef, const volterra_row *row)
 {
     const double c0 = coef[0];
     double *a_row = row->x[0];
     volterra_EACH_SITE
-    for (ptrdiff_t i = volterra_first(row, row->swept, from); i < to; i += 2) {
+    for (ptrdiff_t i = volterra_first(row, row->swept, row->from), to = row->to; i < to; i += 2) {
         const double a = a_row[i];
         a_row[i] = a + a * volterra_expm1_lane(c0 * (a_row[i + 1] - a_row[i - 1]));
     }
@@ -189,56 +186,50 @@ static inline void volterra_sweep_a(const double *coef, const volterra_row *row,
 /* The flow of a part of H, for a piece of a row. */
 static void volterra_sweep_piece(const volterra_solver *s, int part, const double *coef, size_t unit)
 {
-    volterra_piece at = volterra_piece_of(s, unit);
+    volterra_row row = volterra_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        at.row.swept = 1;
-        volterra_sweep_a(coef, &at.row, at.from, at.to);
-        volterra_ends(s->x[0], s->length, at.from, at.to);
+        row.swept = 1;
+        volterra_sweep_a(coef, &row);
+        volterra_ends(s->x[0], s->length, row.from, row.to);
         break;
     default: /* H_2 */
-        volterra_sweep_a(coef, &at.row, at.from, at.to);
-        volterra_ends(s->x[0], s->length, at.from, at.to);
+        volterra_sweep_a(coef, &row);
+        volterra_ends(s->x[0], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void volterra_energy_row(const volterra_params *params, const volterra_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void volterra_energy_row(const volterra_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict a_row = row->x[0];
     volterra_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i];
-        out[i - from] = a;
+        out[i - row->from] = a;
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void volterra_casimirs_row(const volterra_params *params, const volterra_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void volterra_casimirs_row(const volterra_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict a_row = row->x[0];
     volterra_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i];
-        out[i - from] = a;
+        out[i - row->from] = a;
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void volterra_vector_field_row(const volterra_params *params, const volterra_row *row, ptrdiff_t from,
-    ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void volterra_vector_field_row(const volterra_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict a_row = row->x[0];
     volterra_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double a = a_row[i];
-        out[i - from] = a * a_row[i + 1] - a * a_row[i - 1];
+        out[i - row->from] = a * a_row[i + 1] - a * a_row[i - 1];
     }
 }
 
@@ -445,12 +436,12 @@ volterra_status volterra_resume(volterra_solver *s, double h, const double *x, s
 double volterra_hamiltonian(const volterra_solver *s)
 {
     double density[volterra_BUFFER], sum = 0.0, rest = 0.0;
-    volterra_row row;
-    volterra_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += volterra_BUFFER) {
-        const ptrdiff_t to = s->length - from > volterra_BUFFER ? from + volterra_BUFFER : s->length;
-        volterra_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    volterra_row row = volterra_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > volterra_BUFFER ? row.from + volterra_BUFFER : s->length;
+        volterra_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -460,14 +451,11 @@ double volterra_hamiltonian(const volterra_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void volterra_kernel(const volterra_params *, const volterra_row *, ptrdiff_t, ptrdiff_t,
-    double *restrict, size_t);
-
-static void volterra_fill(const volterra_solver *s, volterra_kernel *kernel, double *out)
+static void volterra_fill(const volterra_solver *s, void kernel(const volterra_row *, double *restrict),
+    double *out)
 {
-    volterra_row row;
-    volterra_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const volterra_row row = volterra_row_of(s);
+    kernel(&row, out);
 }
 
 void volterra_density(const volterra_solver *s, double *out) { volterra_fill(s, volterra_energy_row, out); }

@@ -12,7 +12,7 @@
  * SPDX-License-Identifier: 0BSD
  * This file belongs to whoever generated it; phigen claims no rights in it.
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: d47b12009554c19bff9f82b8b897db19391d7f002bfcf91a8d6c33ecb7f28d4d
+ * body-sha256: 0274a0a0f2d8f0739e9e7ccba465d7fe114700f101fa752845aa004bc0082309
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -73,10 +73,11 @@ static void xxz_disorder_prepare(const xxz_disorder_params *params, double h, do
 }
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
-    double *const *x; /* see xxz_disorder_solver */
-    ptrdiff_t length; /* sites of a row */
+    const xxz_disorder_solver *s;
+    double *const *x;   /* see xxz_disorder_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
 } xxz_disorder_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -100,11 +101,15 @@ static inline void xxz_disorder_ends(double *row, ptrdiff_t length, ptrdiff_t fr
         for (ptrdiff_t k = 1; k <= xxz_disorder_HALO; ++k) row[-k] = row[length - k];
 }
 
-/* What kernels are told of a row. */
-static inline void xxz_disorder_locate(const xxz_disorder_solver *s, xxz_disorder_row *row)
+/* The whole row. */
+static inline xxz_disorder_row xxz_disorder_row_of(const xxz_disorder_solver *s)
 {
-    row->x = s->x;
-    row->length = s->length;
+    xxz_disorder_row row;
+    row.s = s;
+    row.x = s->x;
+    row.from = 0;
+    row.to = s->length;
+    return row;
 }
 
 enum { xxz_disorder_PIECE = 1024 }; /* sites that are worked at in one go, with any number of threads */
@@ -115,19 +120,13 @@ static size_t xxz_disorder_units(const xxz_disorder_solver *s)
     return s->length < 2 * xxz_disorder_PIECE ? 1 : (size_t)s->length / xxz_disorder_PIECE;
 }
 
-typedef struct {
-    xxz_disorder_row row;
-    ptrdiff_t from, to;
-} xxz_disorder_piece;
-
-/* The piece of that number, or the row. */
-static inline xxz_disorder_piece xxz_disorder_piece_of(const xxz_disorder_solver *s, size_t unit)
+/* The piece of that number. */
+static inline xxz_disorder_row xxz_disorder_piece_of(const xxz_disorder_solver *s, size_t unit)
 {
-    xxz_disorder_piece piece;
-    xxz_disorder_locate(s, &piece.row);
-    piece.from = (ptrdiff_t)unit * xxz_disorder_PIECE;
-    piece.to = unit == xxz_disorder_units(s) - 1 ? s->length : piece.from + xxz_disorder_PIECE;
-    return piece;
+    xxz_disorder_row row = xxz_disorder_row_of(s);
+    row.from = (ptrdiff_t)unit * xxz_disorder_PIECE;
+    if (unit + 1 < xxz_disorder_units(s)) row.to = row.from + xxz_disorder_PIECE;
+    return row;
 }
 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
@@ -165,14 +164,13 @@ static inline double xxz_disorder_sin_lane(double u) { return xxz_disorder_turne
 
 /* the flow of H_1 = sum of J*(y*y[i+1]): x, z turned
    the flow of H_2 = sum of J*(x*x[i+1]): y, z turned, where x, y, z stand for its z, x, y */
-static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder_row *row)
 {
     const double c0 = coef[0];
     double *x_row = row->x[0], *z_row = row->x[2];
     const double *restrict y_row = row->x[1];
     xxz_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], z = z_row[i];
         const double t1 = c0 * (y_row[i + 1] + y_row[i - 1]);
         const double t2 = xxz_disorder_sin_lane(t1);
@@ -185,14 +183,13 @@ static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder
 }
 
 /* the flow of H_3 = sum of B*z + J*(z[i+1]*(delta*z)): x, y turned */
-static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_row *row, ptrdiff_t from,
-    ptrdiff_t to)
+static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
     const double *restrict B_row = row->x[3], *restrict z_row = row->x[2];
     double *x_row = row->x[0], *y_row = row->x[1];
     xxz_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i];
         const double t1 = c2 * (c1 * z_row[i - 1] + (B + c1 * z_row[i + 1]));
         const double t2 = xxz_disorder_sin_lane(t1);
@@ -208,72 +205,68 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
 static void xxz_disorder_sweep_piece(const xxz_disorder_solver *s, int part, const double *coef, size_t unit)
 {
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3] };
-    xxz_disorder_piece at = xxz_disorder_piece_of(s, unit);
+    xxz_disorder_row row = xxz_disorder_piece_of(s, unit);
     switch (part) {
     case 1: /* H_1 */
-        xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
-        xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
-        xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
+        xxz_disorder_sweep_x_z(coef, &row);
+        xxz_disorder_ends(s->x[0], s->length, row.from, row.to);
+        xxz_disorder_ends(s->x[2], s->length, row.from, row.to);
         break;
     case 2: /* H_2 */
-        at.row.x = z_x_y;
-        xxz_disorder_sweep_x_z(coef, &at.row, at.from, at.to);
-        xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
-        xxz_disorder_ends(s->x[2], s->length, at.from, at.to);
+        row.x = z_x_y;
+        xxz_disorder_sweep_x_z(coef, &row);
+        xxz_disorder_ends(s->x[1], s->length, row.from, row.to);
+        xxz_disorder_ends(s->x[2], s->length, row.from, row.to);
         break;
     default: /* H_3 */
-        xxz_disorder_sweep3(coef, &at.row, at.from, at.to);
-        xxz_disorder_ends(s->x[0], s->length, at.from, at.to);
-        xxz_disorder_ends(s->x[1], s->length, at.from, at.to);
+        xxz_disorder_sweep3(coef, &row);
+        xxz_disorder_ends(s->x[0], s->length, row.from, row.to);
+        xxz_disorder_ends(s->x[1], s->length, row.from, row.to);
         break;
     }
 }
 
-/* the density of the Hamiltonian, of the sites of a row: out[k * apart + i - from] */
-static void xxz_disorder_energy_row(const xxz_disorder_params *params, const xxz_disorder_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the density of the Hamiltonian, of sites of a row */
+static void xxz_disorder_energy_row(const xxz_disorder_row *row, double *restrict out)
 {
-    (void)apart;
-    const double J = params->J, delta = params->delta;
+    const double J = row->s->params.J, delta = row->s->params.delta;
     const double *restrict B_row = row->x[3], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
         *restrict z_row = row->x[2];
     xxz_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = J * (y * y_row[i + 1]) + J * (x * x_row[i + 1])
+        out[i - row->from] = J * (y * y_row[i + 1]) + J * (x * x_row[i + 1])
             + (B * z + J * (z_row[i + 1] * (delta * z)));
     }
 }
 
-/* the densities of the Casimirs, of the sites of a row: out[k * apart + i - from] */
-static void xxz_disorder_casimirs_row(const xxz_disorder_params *params, const xxz_disorder_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* the densities of the Casimirs, of sites of a row */
+static void xxz_disorder_casimirs_row(const xxz_disorder_row *row, double *restrict out)
 {
-    (void)params, (void)apart;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
     xxz_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        out[i - from] = z * z + (x * x + y * y);
+        out[i - row->from] = z * z + (x * x + y * y);
     }
 }
 
-/* pi grad H, of the sites of a row: out[k * apart + i - from] */
-static void xxz_disorder_vector_field_row(const xxz_disorder_params *params, const xxz_disorder_row *row,
-    ptrdiff_t from, ptrdiff_t to, double *restrict out, size_t apart)
+/* pi grad H, of sites of a row */
+static void xxz_disorder_vector_field_row(const xxz_disorder_row *row, double *restrict out)
 {
-    const double J = params->J, delta = params->delta;
+    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
+    const double J = row->s->params.J, delta = row->s->params.delta;
     const double *restrict B_row = row->x[3], *restrict x_row = row->x[0], *restrict y_row = row->x[1],
         *restrict z_row = row->x[2];
     xxz_disorder_EACH_SITE
-    for (ptrdiff_t i = from; i < to; ++i) {
+    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double B = B_row[i], x = x_row[i], y = y_row[i], z = z_row[i];
         const double t1 = J * y_row[i - 1] + J * y_row[i + 1];
         const double t2 = J * (delta * z_row[i - 1]) + (B + delta * (J * z_row[i + 1]));
         const double t3 = J * x_row[i - 1] + J * x_row[i + 1];
-        out[i - from] = z * t1 - y * t2;
-        out[(ptrdiff_t)apart + i - from] = x * t2 - z * t3;
-        out[2 * (ptrdiff_t)apart + i - from] = y * t3 - x * t1;
+        out[i - row->from] = z * t1 - y * t2;
+        out[apart + i - row->from] = x * t2 - z * t3;
+        out[2 * apart + i - row->from] = y * t3 - x * t1;
     }
 }
 
@@ -504,12 +497,12 @@ xxz_disorder_status xxz_disorder_resume(xxz_disorder_solver *s, double h, const 
 double xxz_disorder_hamiltonian(const xxz_disorder_solver *s)
 {
     double density[xxz_disorder_BUFFER], sum = 0.0, rest = 0.0;
-    xxz_disorder_row row;
-    xxz_disorder_locate(s, &row);
-    for (ptrdiff_t from = 0; from < s->length; from += xxz_disorder_BUFFER) {
-        const ptrdiff_t to = s->length - from > xxz_disorder_BUFFER ? from + xxz_disorder_BUFFER : s->length;
-        xxz_disorder_energy_row(&s->params, &row, from, to, density, 0);
-        for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+    xxz_disorder_row row = xxz_disorder_row_of(s);
+    for (row.to = 0; row.to < s->length;) {
+        row.from = row.to;
+        row.to = s->length - row.from > xxz_disorder_BUFFER ? row.from + xxz_disorder_BUFFER : s->length;
+        xxz_disorder_energy_row(&row, density);
+        for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
             const double total = sum + density[i];
             rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
             sum = total;
@@ -519,14 +512,11 @@ double xxz_disorder_hamiltonian(const xxz_disorder_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void xxz_disorder_kernel(const xxz_disorder_params *, const xxz_disorder_row *, ptrdiff_t, ptrdiff_t,
-    double *restrict, size_t);
-
-static void xxz_disorder_fill(const xxz_disorder_solver *s, xxz_disorder_kernel *kernel, double *out)
+static void xxz_disorder_fill(const xxz_disorder_solver *s, void kernel(const xxz_disorder_row *,
+    double *restrict), double *out)
 {
-    xxz_disorder_row row;
-    xxz_disorder_locate(s, &row);
-    kernel(&s->params, &row, 0, s->length, out, s->sites);
+    const xxz_disorder_row row = xxz_disorder_row_of(s);
+    kernel(&row, out);
 }
 
 void xxz_disorder_density(const xxz_disorder_solver *s, double *out)

@@ -33,9 +33,9 @@ _STAGES = re.compile(r"typedef struct \{ phi_model stage\[PHI_STAGES\]; \}| *phi
 _OVER_ROWS = re.compile(r"^( *)for \(size_t r = 0; r < s->rows; \+\+r\)(?: (.*))?$")
 _ONE_ROW = (
     (re.compile(r" \+ \(ptrdiff_t\)r \* s->width| \+ r \* \(size_t\)s->length"), ""),
-    (re.compile(r" \+ at\.row\.at\[0\]|at\.row\.at\[0\] \+ "), ""),
+    (re.compile(r" \+ row\.at\[0\]|row\.at\[0\] \+ "), ""),
     (re.compile(r"(?:\(ptrdiff_t\))?s->rows \* (?=(?:\(size_t\))?s->width)"), ""),
-    (re.compile(r"phi_locate\(s, (?:r|0), "), "phi_locate(s, "),
+    (re.compile(r"phi_piece_of\(s, r\)"), "phi_row_of(s)"),
     (re.compile(r"sizes\[PHI_AXES - 1\]"), "sizes[0]"),
 )
 

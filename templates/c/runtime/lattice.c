@@ -517,13 +517,13 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
 double phi_hamiltonian(const phi_solver *s)
 {
     double density[PHI_BUFFER], sum = 0.0, rest = 0.0;
-    phi_row row;
     for (size_t r = 0; r < s->rows; ++r) {
-        phi_locate(s, r, &row);
-        for (ptrdiff_t from = 0; from < s->length; from += PHI_BUFFER) {
-            const ptrdiff_t to = s->length - from > PHI_BUFFER ? from + PHI_BUFFER : s->length;
-            phi_energy_row(&s->params, &row, from, to, density, 0);
-            for (ptrdiff_t i = 0; i < to - from; ++i) { /* compensated, after A. Neumaier */
+        phi_row row = phi_piece_of(s, r);
+        for (row.to = 0; row.to < s->length;) {
+            row.from = row.to;
+            row.to = s->length - row.from > PHI_BUFFER ? row.from + PHI_BUFFER : s->length;
+            phi_energy_row(&row, density);
+            for (ptrdiff_t i = 0; i < row.to - row.from; ++i) { /* compensated, after A. Neumaier */
                 const double total = sum + density[i];
                 rest += fabs(sum) >= fabs(density[i]) ? (sum - total) + density[i] : (density[i] - total) + sum;
                 sum = total;
@@ -534,14 +534,11 @@ double phi_hamiltonian(const phi_solver *s)
 }
 
 /* A kernel that fills arrays over the sites, for all rows. */
-typedef void phi_kernel(const phi_params *, const phi_row *, ptrdiff_t, ptrdiff_t, double *restrict, size_t);
-
-static void phi_fill(const phi_solver *s, phi_kernel *kernel, double *out)
+static void phi_fill(const phi_solver *s, void kernel(const phi_row *, double *restrict), double *out)
 {
-    phi_row row;
     for (size_t r = 0; r < s->rows; ++r) {
-        phi_locate(s, r, &row);
-        kernel(&s->params, &row, 0, s->length, out + r * (size_t)s->length, s->sites);
+        const phi_row row = phi_piece_of(s, r);
+        kernel(&row, out + r * (size_t)s->length);
     }
 }
 

@@ -161,11 +161,11 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
         if (PHI_FLOWS > 1) phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, NULL, x, g->row_bar);
         size_t first, end = phi_share(phi_units(s), &first);
         for (size_t unit = first; unit < end; ++unit) {
-            const phi_piece at = phi_piece_of(s, unit);
+            const phi_row row = phi_piece_of(s, unit);
             for (int f = 0; f < PHI_DIM; ++f) {
-                const double *restrict from = g->row_bar[f] + at.row.at[0];
-                double *restrict to = g->bar[f] + at.row.at[0];
-                for (ptrdiff_t i = at.from; i < at.to; ++i) to[i] += from[i];
+                const double *restrict from = g->row_bar[f] + row.at[0];
+                double *restrict to = g->bar[f] + row.at[0];
+                for (ptrdiff_t i = row.from; i < row.to; ++i) to[i] += from[i];
             }
         }
     }

@@ -66,10 +66,10 @@ static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, d
     double *const *to, size_t first, size_t end)
 {
     for (size_t unit = first; unit < end && from != to; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
+        const phi_row row = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_DIM; ++k) {
-            double *sum = to[k] + at.row.at[0];
-            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][at.row.at[0] + i];
+            double *sum = to[k] + row.at[0];
+            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][row.at[0] + i];
         }
     }
     phi_back_rows(s, kernel, coef, s->wide, v, to, s->shares + (coef - s->coef), first, end);

@@ -19,15 +19,15 @@ static double phi_product(const phi_solver *s, double *const *x, double *const *
     double sum = 0.0;
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
-        const ptrdiff_t whole = at.to - (at.to - at.from) % PHI_WIDTH;
+        const phi_row row = phi_piece_of(s, unit);
+        const ptrdiff_t whole = row.to - (row.to - row.from) % PHI_WIDTH;
         s->sums[unit] = 0.0;
         for (int k = 0; k < PHI_DIM; ++k) {
-            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
+            const double *one = x[k] + row.at[0], *other = y[k] + row.at[0];
             double lanes[PHI_WIDTH] = { 0.0 };
-            for (ptrdiff_t i = at.from; i < whole; i += PHI_WIDTH)
+            for (ptrdiff_t i = row.from; i < whole; i += PHI_WIDTH)
                 for (int l = 0; l < PHI_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
-            for (ptrdiff_t i = whole; i < at.to; ++i) *lanes += one[i] * other[i];
+            for (ptrdiff_t i = whole; i < row.to; ++i) *lanes += one[i] * other[i];
             for (int l = 1; l < PHI_WIDTH; ++l) *lanes += lanes[l];
             s->sums[unit] += *lanes / s->usual[k] / s->usual[k];
         }
@@ -42,14 +42,14 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
     const size_t units = phi_units(s);
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
+        const phi_row row = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_DIM; ++k) {
-            const double *one = x[k] + at.row.at[0], *other = y[k] + at.row.at[0];
-            double *sum = to[k] + at.row.at[0];
+            const double *one = x[k] + row.at[0], *other = y[k] + row.at[0];
+            double *sum = to[k] + row.at[0];
             PHI_EACH_SITE
-            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = a * one[i] + b * other[i];
+            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = a * one[i] + b * other[i];
 #if PHI_HALO
-            phi_ends(sum, s->length, at.from, at.to);
+            phi_ends(sum, s->length, row.from, row.to);
 #endif
         }
     }
@@ -112,18 +112,18 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
     const size_t units = phi_units(s);
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
+        const phi_row row = phi_piece_of(s, unit);
 #if PHI_ADJOINT
         phi_own_slope_piece(s, coef, s->y[s->side != NULL ? 2 : now], s->block, unit);
 #else
         phi_own_slope_piece(s, coef, s->y[now], s->block, unit);
 #endif
-        for (ptrdiff_t i = at.from; i < at.to; ++i) {
+        for (ptrdiff_t i = row.from; i < row.to; ++i) {
             double b[PHI_DIM][PHI_DIM];
             for (int k = 0; k < PHI_DIM * PHI_DIM; ++k)
-                b[k / PHI_DIM][k % PHI_DIM] = (k % (PHI_DIM + 1) == 0) - s->block[k][at.row.at[0] + i];
+                b[k / PHI_DIM][k % PHI_DIM] = (k % (PHI_DIM + 1) == 0) - s->block[k][row.at[0] + i];
             phi_invert_block(b);
-            for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) s->block[k][at.row.at[0] + i] = b[k / PHI_DIM][k % PHI_DIM];
+            for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) s->block[k][row.at[0] + i] = b[k / PHI_DIM][k % PHI_DIM];
         }
     }
 }
@@ -134,22 +134,22 @@ static void phi_apply_blocks(const phi_solver *s, double *const *v, double *cons
     const size_t units = phi_units(s);
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        const phi_piece at = phi_piece_of(s, unit);
+        const phi_row row = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_DIM; ++k) {
-            double *sum = to[k] + at.row.at[0];
-            for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][at.row.at[0] + i];
+            double *sum = to[k] + row.at[0];
+            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][row.at[0] + i];
             for (int l = 0; l < PHI_DIM; ++l) {
 #if PHI_ADJOINT
                 const int entry = s->side != NULL ? l * PHI_DIM + k : k * PHI_DIM + l;
 #else
                 const int entry = k * PHI_DIM + l;
 #endif
-                const double *one = v[l] + at.row.at[0], *by = s->block[entry] + at.row.at[0];
+                const double *one = v[l] + row.at[0], *by = s->block[entry] + row.at[0];
                 PHI_EACH_SITE
-                for (ptrdiff_t i = at.from; i < at.to; ++i) sum[i] += by[i] * one[i];
+                for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] += by[i] * one[i];
             }
 #if PHI_HALO
-            phi_ends(sum, s->length, at.from, at.to);
+            phi_ends(sum, s->length, row.from, row.to);
 #endif
         }
     }

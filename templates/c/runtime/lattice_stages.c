@@ -18,17 +18,17 @@ static inline void phi_raise(double *largest, double value) { *largest = value >
 /* Takes what y was and is in a piece into the largest change and the largest y of each field; what is no number is left out. */
 static void phi_measure(const phi_solver *s, int now, size_t unit, double *change, double *size)
 {
-    const phi_piece at = phi_piece_of(s, unit);
-    const ptrdiff_t whole = at.to - (at.to - at.from) % PHI_WIDTH;
+    const phi_row row = phi_piece_of(s, unit);
+    const ptrdiff_t whole = row.to - (row.to - row.from) % PHI_WIDTH;
     for (int k = 0; k < PHI_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + at.row.at[0], *restrict after = s->y[1 - now][k] + at.row.at[0];
+        const double *restrict before = s->y[now][k] + row.at[0], *restrict after = s->y[1 - now][k] + row.at[0];
         double changes[PHI_WIDTH] = { 0.0 }, sizes[PHI_WIDTH] = { 0.0 };
-        for (ptrdiff_t i = at.from; i < whole; i += PHI_WIDTH)
+        for (ptrdiff_t i = row.from; i < whole; i += PHI_WIDTH)
             for (int l = 0; l < PHI_WIDTH; ++l) {
                 phi_raise(changes + l, fabs(after[i + l] - before[i + l]));
                 phi_raise(sizes + l, fabs(after[i + l]));
             }
-        for (ptrdiff_t i = whole; i < at.to; ++i) {
+        for (ptrdiff_t i = whole; i < row.to; ++i) {
             phi_raise(changes, fabs(after[i] - before[i]));
             phi_raise(sizes, fabs(after[i]));
         }

@@ -6,45 +6,36 @@
 #include "model.h"
 
 /* ---- Rows of sites ---- */
-/* Where one row is. */
+/* A piece of a row, and what loops over its sites are told. */
 typedef struct {
+    const phi_solver *s;
     double *const *x;             /* see phi_solver */
 #if !PHI_ONE_ROW
     const ptrdiff_t *at;          /* the row itself and those beside it, from the first row on */
 #endif
-    ptrdiff_t length;             /* sites of a row */
-#if PHI_TIMED
-    double t;                     /* the time */
-#endif
+    ptrdiff_t from, to;           /* its sites, to not among them */
 #if PHI_SERIES
     double *const *start, *const *out; /* where a stage starts, and where what is computed goes; x is y there */
 #endif
 #if PHI_SERIES || PHI_TANGENT
     double *const *varied;        /* a variation of x */
 #endif
-#if PHI_GATHER
-    double *const *gathered;      /* see phi_solver */
-#endif
-#if PHI_COMPENSATED
-    double *const *carry;         /* see phi_solver */
-#endif
 #if PHI_ADJOINT
     double *const *bar, *const *handed; /* see phi_transpose */
 #endif
-#if PHI_GRAPH
-    const int *bonds, *middle, *other;
+#if PHI_GIVERS
+    ptrdiff_t givers[PHI_LINES];  /* the rows that hand something to this one, where they have been found */
+#endif
 #if PHI_BOND_PARAMETERS
-    double *const *at_bonds;
+    double *const *at_bonds;      /* see phi_solver */
 #if PHI_SIDED
     double side;                  /* 1, or -1 where a loop is told of bonds as if they ran the other way */
 #endif
 #endif
 #if PHI_BY_COLOUR
-    const int *colours;
     int chosen;                   /* the colour that a part of H belongs to */
 #if PHI_ACROSS
     int across;                   /* whether it is that of the other ends of bonds, where a loop is told */
-#endif
 #endif
 #endif
 #if PHI_OPEN && !PHI_ONE_ROW
@@ -54,7 +45,9 @@ typedef struct {
 #endif
 #endif
 #if PHI_COLOURS
+#if !PHI_ONE_ROW
     int colour;                   /* of the first site */
+#endif
 #if PHI_SWEPT
     int swept;                    /* that of the sites which are swept */
 #endif
@@ -77,8 +70,12 @@ typedef struct {
 static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
 {
     for (ptrdiff_t i = from; i < from + PHI_COLOUR_COUNT; ++i)
+#if PHI_ONE_ROW
+        if ((int)(i % PHI_COLOUR_COUNT) * PHI_COLOUR_STRIDE % PHI_COLOUR_COUNT == colour) return i;
+#else
         if ((row->colour + (int)(i % PHI_COLOUR_COUNT) * PHI_COLOUR_STRIDE) % PHI_COLOUR_COUNT == colour) return i;
-    return row->length;
+#endif
+    return row->to;
 }
 
 #endif
@@ -114,55 +111,46 @@ static inline void phi_place(const phi_solver *s, size_t index, ptrdiff_t place[
 }
 
 #endif
-/* What kernels are told of a row. */
 #if PHI_ONE_ROW
-static inline void phi_locate(const phi_solver *s, phi_row *row)
+/* The whole row. */
+static inline phi_row phi_row_of(const phi_solver *s)
 #else
-static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
+/* The row of that number, which is worked at in one go. */
+static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 #endif
 {
-    row->x = s->x;
+    phi_row row;
+    row.s = s;
+    row.x = s->x;
 #if !PHI_ONE_ROW
-    row->at = s->lines + index * PHI_LINES;
+    row.at = s->lines + index * PHI_LINES;
 #endif
-    row->length = s->length;
-#if PHI_TIMED
-    row->t = s->now;
-#endif
+    row.from = 0;
+    row.to = s->length;
 #if PHI_SERIES
-    row->start = row->out = s->x;
-#endif
-#if PHI_GATHER
-    row->gathered = s->gathered;
-#endif
-#if PHI_COMPENSATED
-    row->carry = s->carry;
+    row.start = row.out = s->x;
 #endif
 #if PHI_ADJOINT
-    row->bar = row->handed = NULL;
+    row.bar = row.handed = NULL;
 #endif
-#if PHI_GRAPH
-    row->bonds = s->bonds;
-    row->middle = s->middle;
-    row->other = s->other;
 #if PHI_BOND_PARAMETERS
-    row->at_bonds = s->at_bonds;
+    row.at_bonds = s->at_bonds;
 #if PHI_SIDED
-    row->side = 1.0;
+    row.side = 1.0;
 #endif
 #endif
 #if PHI_BY_COLOUR
-    row->colours = s->colours;
-    row->chosen = 0;
+    row.chosen = 0;
 #if PHI_ACROSS
-    row->across = 0;
-#endif
+    row.across = 0;
 #endif
 #endif
 #if PHI_COLOURS
-    row->colour = 0;
+#if !PHI_ONE_ROW
+    row.colour = 0;
+#endif
 #if PHI_SWEPT
-    row->swept = 0;
+    row.swept = 0;
 #endif
 #endif
 #if !PHI_ONE_ROW && PHI_OPEN || !PHI_ONE_ROW && PHI_COLOURS
@@ -171,23 +159,23 @@ static inline void phi_locate(const phi_solver *s, size_t index, phi_row *row)
 #endif
 #if !PHI_ONE_ROW && PHI_OPEN
 #if PHI_BESIDE
-    row->whole = 1;
+    row.whole = 1;
 #endif
     for (int k = 0; k < PHI_WEIGHTS; ++k) {
         int there = 1;
         for (int a = 0; a < PHI_AXES - 1; ++a)
             there = there && place[a] + phi_weights[k][a][0] >= 0 &&
                 place[a] + phi_weights[k][a][1] < (ptrdiff_t)s->sizes[a];
-        row->present[k] = there ? 1.0 : 0.0;
+        row.present[k] = there ? 1.0 : 0.0;
 #if PHI_BESIDE
-        row->whole = row->whole && there;
+        row.whole = row.whole && there;
 #endif
     }
 #endif
 #if !PHI_ONE_ROW && PHI_COLOURS
-    for (int a = 0; a < PHI_AXES - 1; ++a)
-        row->colour = (int)((row->colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
+    for (int a = 0; a < PHI_AXES - 1; ++a) row.colour = (int)((row.colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
 #endif
+    return row;
 }
 
 #if PHI_ONE_ROW
@@ -203,41 +191,36 @@ static size_t phi_units(const phi_solver *s)
     return s->length < 2 * PHI_PIECE ? 1 : (size_t)s->length / PHI_PIECE;
 }
 
+/* The piece of that number. */
+static inline phi_row phi_piece_of(const phi_solver *s, size_t unit)
+{
+    phi_row row = phi_row_of(s);
+    row.from = (ptrdiff_t)unit * PHI_PIECE;
+    if (unit + 1 < phi_units(s)) row.to = row.from + PHI_PIECE;
+#if PHI_BY_HAND
+    if (row.from < s->from) row.from = s->from;
+    if (row.to > s->to) row.to = s->to;
+#endif
+    return row;
+}
 #else
 static size_t phi_units(const phi_solver *s) { return s->rows; } /* what is worked at in one go */
+#endif
+#if PHI_BETWEEN
 
-#endif
-typedef struct {
-    phi_row row;
-    ptrdiff_t from, to;
-#if !PHI_ONE_ROW
-    ptrdiff_t wide; /* the end of the last vector of 8 sites, which may lie in the copies beside the row */
-#if PHI_GIVERS
-    ptrdiff_t givers[PHI_LINES]; /* the rows that hand something to this one, where they have been found */
-#endif
-#endif
-} phi_piece;
-
-/* The piece of that number, or the row. */
-static inline phi_piece phi_piece_of(const phi_solver *s, size_t unit)
-{
-    phi_piece piece;
 #if PHI_ONE_ROW
-    phi_locate(s, 0, &piece.row);
-    piece.from = (ptrdiff_t)unit * PHI_PIECE;
-    piece.to = unit == phi_units(s) - 1 ? s->length : piece.from + PHI_PIECE;
-#if PHI_BY_HAND
-    if (piece.from < s->from) piece.from = s->from;
-    if (piece.to > s->to) piece.to = s->to;
-#endif
+/* The sites from one on, before another. */
 #else
-    phi_locate(s, unit, &piece.row);
-    piece.from = 0;
-    piece.to = s->length;
-    piece.wide = (s->length + 7) & ~(ptrdiff_t)7;
+/* The sites from one on, before another: as far as to the end of the last vector of 8, which may lie in the copies beside a row,
+   where these are made anew. */
 #endif
-    return piece;
+static inline const phi_row *phi_between(phi_row *row, ptrdiff_t from, ptrdiff_t to)
+{
+    row->from = from;
+    row->to = to;
+    return row;
 }
+#endif
 #if PHI_BANDED
 
 /* Unknowns are numbered site by site. The matrix 1 - (what a sweep does to a variation of y) has a band; what couples the

@@ -24,7 +24,7 @@ from phigen.targets.c.lattice.layout import Layout, givers, layout_of, starts_ar
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
-from phigen.targets.c.lattice.parts import Case, call_forms, calls_over_sites, either, over_rows
+from phigen.targets.c.lattice.parts import Case, at, call_forms, calls_over_sites, either, over_rows
 from phigen.targets.rendering import render
 
 
@@ -62,7 +62,7 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     else:
         parts = [*_of_parts(program, layout, rows, kernels)]
         chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(parts))]
-        setups = [(*_SETUP, *["at.row.chosen = colour;"] * own) for own in chosen]
+        setups = [(*_SETUP, *["row.chosen = colour;"] * own) for own in chosen]
     found += [loop.text(program) for part in parts for loop in part.loops]
     back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
@@ -77,9 +77,9 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     return "\n".join([_tables(program, step, parts, adjoint.steps), *found, _added(program, step, layout)])
 
 
-_SETUP = ("at.row.x = x;", "at.row.bar = bar;", "at.row.handed = handed;")
-_VARIED = "at.row.varied = v;"
-_SETUP_OF_STAGES = ("at.row.x = s->y[2];", _VARIED, "at.row.bar = bar;", "at.row.handed = s->handed;")
+_SETUP = ("row.x = x;", "row.bar = bar;", "row.handed = handed;")
+_VARIED = "row.varied = v;"
+_SETUP_OF_STAGES = ("row.x = s->y[2];", _VARIED, "row.bar = bar;", "row.handed = s->handed;")
 
 
 def _has_ends(calls: Sequence[str]) -> bool:
@@ -112,7 +112,7 @@ def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[
             (e, restricted(layout, fields, kernels[e.kernel.name + BACK], wanted, f"{e.kernel.name}_{name}"))
             for e in (gather.ends if read else ())
         )
-        before = (f"{program.name}_{e.kernel.name}(&s->params, &at.row, at.from, at.to);" for e in gather.ends)
+        before = (f"{program.name}_{e.kernel.name}(&row);" for e in gather.ends)
         pulled = _Pulled(kernel, seeds, read, ends, () if number else tuple(before))
         yield _back(program, layout, rows, name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
@@ -122,9 +122,9 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
     loops, first, second = list[Loop](), list[str](), list[str]()
     beside, given = list[Handed](), 0
 
-    def called(loop: Loop, sites: str = "at.from, at.to") -> str:
-        source, sums = ("&s->params", "numbers") if "*params" in loop.arguments else ("coef", "sums")
-        return f"{program.name}_{loop.name}({source}, &at.row, {sites}, {sums} + unit * {program.name}_SUMS);"
+    def called(loop: Loop, sites: str = "") -> str:
+        source, sums = ("coef, ", "sums") if "*coef" in loop.arguments else ("", "numbers")
+        return f"{program.name}_{loop.name}({source}{at(program, sites)}, {sums} + unit * {program.name}_SUMS);"
 
     for one in pulled:
         sums = one.gather.names if one.gather else ()
@@ -147,7 +147,7 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
     first += copied_ends(program, layout, beside)
     if beside:
         loop = handing(program, layout, name, whom, beside)
-        second.append(f"{program.name}_{loop.name}(&at.row, at.from, at.to);")
+        second.append(f"{program.name}_{loop.name}(&row);")
         loops.append(loop)
     return Back(tuple(loops), tuple(first), tuple(second), given)
 
@@ -159,7 +159,7 @@ def _gathered(program: Program, layout: Layout, sweep: Sweep) -> Iterator[str]:
         for loop in gathering(program, layout, other.gather, "coef") if other.gather else ():
             names.setdefault(loop.code, loop.name)
     for loop in gathering(program, layout, sweep.gather, "coef") if sweep.gather else ():
-        yield f"{program.name}_{names[loop.code]}(coef, &at.row, at.from, at.to);"
+        yield f"{program.name}_{names[loop.code]}(coef, &row);"
 
 
 def _over(
@@ -227,8 +227,8 @@ def _sums(program: Program, step: Sweeps) -> str:
 def _givers(program: Program) -> list[str]:
     name = program.name
     return [
-        f"{name}_find_givers(s, unit, at.givers);",
-        "at.row.at = at.givers;",
+        f"{name}_find_givers(s, unit, row.givers);",
+        "row.at = row.givers;",
     ]
 
 

@@ -10,7 +10,7 @@ from phigen.scheme.program import Program
 from phigen.symbolic.symbols import COEFFICIENT, Symbol
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.loops import Loop
-from phigen.targets.c.lattice.names import SiteNames, beside
+from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, beside, told
 from phigen.targets.code import Code, Store, lower
 
 
@@ -93,13 +93,13 @@ def first_loop(
     for array in given:
         head.append(f"    double *restrict handed_{array} = row->handed[{array}]{layout.at(0)};")
         if layout.leaves_out(seeds.colour):
-            head.append(f"    memset(handed_{array} + from, 0, (size_t)(to - from) * sizeof *handed_{array});")
+            whole = f"(size_t)(row->to - row->from) * sizeof *handed_{array}"
+            head.append(f"    memset(handed_{array} + row->from, 0, {whole});")
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     body += [*stores, *(f"share{k}[i - begin] += {value};" for k, (_, value) in enumerate(shares))]
     text = _looped(name, layout, seeds.colour, [*head, *(f"    {line}" for line in names.pointers())], body, shares)
-    arguments = f"const double *coef, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
-    return Loop(kernel.name + form, kernel.purpose, arguments, text)
+    return Loop(kernel.name + form, kernel.purpose, f"{told(program)}, double *sums", text)
 
 
 def _looped(
@@ -112,19 +112,20 @@ def _looped(
 ) -> str:
     """The loop over sites; where they have shares in sums, over so many of them at once that these are kept apart."""
     coloured = layout.leaves_out(colour)
-    begin, end = ("begin", "end") if shares else ("from", "to")
+    begin, end = ("begin", "") if shares else ("row->from", ", end = row->to")
     start = f"{name}_first(row, {colour}, {begin})" if coloured else begin
     onward = f"i += {layout.colour_step}" if coloured else "++i"
-    loop = [f"{name}_EACH_SITE", f"for (ptrdiff_t i = {start}; i < {end}; {onward}) {{"]
+    loop = [f"{name}_EACH_SITE", f"for (ptrdiff_t i = {start}{end}; i < end; {onward}) {{"]
     loop += [*(f"    {line}" for line in body), "}"]
     if not shares:
         return "\n".join([*head, "    (void)sums;", *(f"    {line}" for line in loop)]) + "\n"
     kept = ", ".join(f"share{k}[{name}_ADDED]" for k in range(len(shares)))
-    inner = [f"const ptrdiff_t end = to - begin < {name}_ADDED ? to : begin + {name}_ADDED;"]
+    inner = [f"const ptrdiff_t end = row->to - begin < {name}_ADDED ? row->to : begin + {name}_ADDED;"]
     inner += loop
-    lines = [f"const ptrdiff_t apart = to - from < {name}_ADDED ? to - from : {name}_ADDED;", f"double {kept};"]
+    count = "row->to - row->from"
+    lines = [f"const ptrdiff_t apart = {count} < {name}_ADDED ? {count} : {name}_ADDED;", f"double {kept};"]
     lines += [f"memset(share{k}, 0, (size_t)apart * sizeof *share{k});" for k in range(len(shares))]
-    lines.append(f"for (ptrdiff_t begin = from; begin < to; begin += {name}_ADDED) {{")
+    lines.append(f"for (ptrdiff_t begin = row->from; begin < row->to; begin += {name}_ADDED) {{")
     lines += [*(f"    {line}" for line in inner), "}"]
     lines += [f"sums[{c}] += {name}_added(share{k}, apart);" for k, (c, _) in enumerate(shares)]
     return "\n".join([*head, *(f"    {line}" for line in lines)]) + "\n"
@@ -146,7 +147,7 @@ def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> I
     if layout.step.sites.open[-1]:
         return
     for array in sorted({h.array for h in handed if h.offset[-1]}):
-        yield f"{program.name}_ends(at.row.handed[{array}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);"
+        yield f"{program.name}_ends(row.handed[{array}]{layout.at(0, 'row.')}, s->length, {layout.swept()});"
 
 
 def handing(program: Program, layout: Layout, name: str, whom: str, handed: Sequence[Handed]) -> Loop:
@@ -161,8 +162,7 @@ def handing(program: Program, layout: Layout, name: str, whom: str, handed: Sequ
         sums.setdefault(h.base, []).append(beside(pointer, back[-1]))
     lines = [f"    {text}" for text in pointers.values()]
     lines += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sums]
-    lines += [f"    {program.name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines += [f"    {program.name}_EACH_SITE", f"    {OVER_SITES} {{"]
     lines += [f"        bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]
     purpose = f"what sites are handed by those around that {whom}"
-    arguments = f"const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
-    return Loop(name, purpose, arguments, "\n".join([*lines, "    }"]) + "\n")
+    return Loop(name, purpose, told(program, "params"), "\n".join([*lines, "    }"]) + "\n")

@@ -9,7 +9,7 @@ from phigen.lattice.adjoint import BACK
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
-from phigen.scheme.steps import VARIED, Gather, Partners, Sweeps
+from phigen.scheme.steps import VARIED, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 
@@ -41,6 +41,10 @@ class Layout:
     def at(self, line: int, row: str = "row->") -> str:
         """What is added to the beginning of an array for a line beside a row; with one axis there is but one row."""
         return f" + {row}at[{line}]" if len(self.step.sites.axes) > 1 else ""
+
+    def swept(self, piece: str = "row.from, row.to") -> str:
+        """The bounds of the sites that were swept, as the copies of ends beside a row need them: of many rows all."""
+        return "0, s->length" if len(self.step.sites.axes) > 1 else piece
 
     def place(self, line: int) -> str:
         """Where a line is, beside the row that is worked at."""
@@ -125,6 +129,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "OPEN": bool(layout.weights),
         "SPREAD": program.profile == "fast",
         "BESIDE": bool(layout.weights) and program.profile == "fast",
+        "BETWEEN": (bool(layout.weights) and program.profile == "fast")
+        or any(wide(layout, sweep) for part in step.parts for sweep in part),
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "COLOURS": step.sites.colours > 1,
@@ -155,6 +161,12 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "ONE_ROW": len(step.sites.axes) == 1,
         "GUESSES": step.equation is not None and program.offers("recurrences"),
     }
+
+
+def wide(layout: Layout, sweep: Sweep) -> bool:
+    """Whether a sweep over a row may go on to the end of its last vector, since what lies beside is copied afresh."""
+    sites = layout.step.sites
+    return len(sites.axes) > 1 and sites.colours == 1 and not sweep.gather and not sweep.is_tangent
 
 
 def chosen_ends(step: Sweeps) -> set[str]:

@@ -16,7 +16,7 @@ from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
 from phigen.targets.c.kernels import FUNCTIONS, lane_calls
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.names import SiteNames, pointers
+from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, lower
 from phigen.targets.header import plain
@@ -130,29 +130,25 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     elif program.compensated:
         for k, (f, value) in enumerate(stores):
             carry, field = names.scope[Symbol("carry", f)], f"{names.pointer(f, 0)}[i]"
-            head.append(f"    double *{carry} = row->carry[{program.coordinates.index(f)}]{here};")
+            head.append(f"    double *{carry} = row->s->carry[{program.coordinates.index(f)}]{here};")
             body += [f"const double add{k} = {carry}[i] + {value}, sum{k} = {field} + add{k};"]
             body += [f"{carry}[i] = add{k} - (sum{k} - {field});", f"{field} = sum{k};"]
     else:
         body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
     coloured = layout.leaves_out(sweep.colour)
     swept = sweep.colour if program.profile == "fast" or sweep.is_tangent else "row->swept"
-    start = f"{name}_first(row, {swept}, from)" if coloured else "from"
-    onward = f"i += {layout.colour_step}" if coloured else "++i"
-    text = _looped(head, names, body, name, f"ptrdiff_t i = {start}; i < to; {onward}")
+    first = f"{name}_first(row, {swept}, row->from)"
+    over = f"for (ptrdiff_t i = {first}, to = row->to; i < to; i += {layout.colour_step})" if coloured else OVER_SITES
+    text = _looped(head, names, body, name, over)
     shared = (
         "_".join(["tangent" if sweep.is_tangent else "sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
     )
-    return Loop(kernel.name + form, _purpose(kernel, form), _arguments(program), text, shared)
+    return Loop(kernel.name + form, _purpose(kernel, form), told(program), text, shared)
 
 
 def _purpose(kernel: Kernel, form: str) -> str:
     other = {"_far": "the same for large arguments of functions", "_end": "the same beside open ends"}
     return next((text for key, text in other.items() if form.endswith(key)), kernel.purpose)
-
-
-def _arguments(program: Program) -> str:
-    return f"const double *coef, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
 
 
 def _unused(code: Code) -> list[str]:
@@ -177,8 +173,8 @@ def middle_loop(
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     body += [f"{out[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
-    text = _looped(head, names, body, program.name, "ptrdiff_t i = from; i < to; ++i")
-    return Loop(kernel.name + form, _purpose(kernel, form), _arguments(program), text)
+    text = _looped(head, names, body, program.name)
+    return Loop(kernel.name + form, _purpose(kernel, form), told(program), text)
 
 
 def _added(name: str, read: bool, value: str) -> str:
@@ -191,31 +187,24 @@ def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
     name, code, partners = program.name, lower(kernel), layout.partners
     calls = seen_calls(program)
     names = SiteNames(program, layout, kernel, code, set(), calls, partners.field.names)
-    head = [*comment(f"/* {plain(kernel.purpose)}, of the sites of a row: out[k * apart + i - from] */", "")]
-    head.append(
-        f"static void {name}_{kernel.name}_row(const {name}_params *params, const {name}_row *row, ptrdiff_t from, "
-        f"ptrdiff_t to, double *restrict out, size_t apart)\n{{"
-    )
+    head = comment(f"/* {plain(kernel.purpose)}, of sites of a row */")
+    head.append(f"static void {name}_{kernel.name}_row(const {name}_row *row, double *restrict out)\n{{")
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     early = list[str]()
     gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
     for own, _ in over_ends(gather) if gather else ():
-        early.append(f"    {name}_{own.kernel.name}(params, row, from, to);")
-    shared = " + 0.5 * row->gathered[0][i]" * bool(kernel.name == "energy" and early)
+        early.append(f"    {name}_{own.kernel.name}(row);")
+    shared = " + 0.5 * row->s->gathered[0][i]" * bool(kernel.name == "energy" and early)
     for s in code.stores:
-        place = {0: "i - from", 1: "(ptrdiff_t)apart + i - from"}.get(
-            s.index, f"{s.index} * (ptrdiff_t)apart + i - from"
-        )
-        body.append(f"out[{place}] = {f'{names.show(s.value)}{shared}'.removeprefix('0.0 + ')};")
-    unused = [] if early or any(s in code.used for s in kernel.inputs["params"]) else ["params"]
-    unused += [] if len(code.stores) > 1 else ["apart"]
-    head += ["    " + ", ".join(f"(void){u}" for u in unused) + ";"] if unused else []
-    text = _looped([*head, *early], names, body, name, "ptrdiff_t i = from; i < to; ++i")
+        place = f"{s.index} * apart + ".removeprefix("1 * ") * (s.index > 0)
+        body.append(f"out[{place}i - row->from] = {f'{names.show(s.value)}{shared}'.removeprefix('0.0 + ')};")
+    apart = ["    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;"] * (len(code.stores) > 1)
+    text = _looped([*head, *early, *apart], names, body, name)
     return text + "}\n"
 
 
-def _looped(head: list[str], names: SiteNames, body: list[str], name: str, loop: str) -> str:
+def _looped(head: list[str], names: SiteNames, body: list[str], name: str, over: str = OVER_SITES) -> str:
     lines = [*head, *(f"    {line}" for line in names.pointers())]
-    lines += [f"    {name}_EACH_SITE", f"    for ({loop}) {{", *(f"        {line}" for line in body), "    }"]
+    lines += [f"    {name}_EACH_SITE", f"    {over} {{", *(f"        {line}" for line in body), "    }"]
     return "\n".join(lines) + "\n"

@@ -15,7 +15,16 @@ from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "params", "row", "from", "to", "out", "apart", "i", "j", "k", "side", "part", "far", "now"})
+_OWN = frozenset({"coef", "row", "to", "out", "apart", "i", "j", "k", "side"})
+
+
+#: The loop over the sites of a piece of a row.
+OVER_SITES = "for (ptrdiff_t i = row->from, to = row->to; i < to; ++i)"
+
+
+def told(program: Program, source: str = "coef") -> str:
+    """The arguments of a loop over sites: coefficients, unless it goes by the parameters of the solver; and the row."""
+    return "const double *coef, " * (source == "coef") + f"const {program.name}_row *row"
 
 
 class SiteNames:
@@ -55,9 +64,9 @@ class SiteNames:
                 self.scope.bind(s, named)
                 self._first.append(f"{named} = coef[{s.key[0]}]")
             elif isinstance(s, Symbol) and s.kind == GATHERED:
-                self.scope.bind(s, f"row->gathered[{list(sums).index(s)}][i]")
+                self.scope.bind(s, f"row->s->gathered[{list(sums).index(s)}][i]")
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
-                self.scope.bind(s, "(row->colours[i] == row->chosen ? 1.0 : 0.0)")
+                self.scope.bind(s, "(row->s->colours[i] == row->chosen ? 1.0 : 0.0)")
             elif isinstance(s, Symbol) and s.kind == VARIATION:
                 self._bind_variation(s, str(s.key[0]))
             elif isinstance(s, Symbol) and s.kind == INITIAL:
@@ -71,7 +80,7 @@ class SiteNames:
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
             elif s == program.time:
-                self.scope.bind(s, "row->t")
+                self._first.append(f"{self.scope[s]} = row->s->now")
             elif s in layout.step.sites.ends:
                 self._bind_end(s)
             elif s in layout.step.sites.places:
@@ -80,7 +89,7 @@ class SiteNames:
                 side = "side * " if s in opposite else ""
                 self._other.append(f"{self.scope[s]} = {side}row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
             else:
-                self._first.append(f"{self.scope[s]} = params->{member[s]}")
+                self._first.append(f"{self.scope[s]} = row->s->params.{member[s]}")
 
     def _bind_end(self, s: str) -> None:
         base, end = self.layout.step.sites.ends[s]
@@ -122,7 +131,7 @@ class SiteNames:
         named = f"w{k}"
         self.scope.bind(s, named)
         low, high = bounds(s)[-1]
-        tests = [f"i + {-low * -1} >= 0".replace("+ -", "- ")] * (low < 0) + [f"i + {high} < row->length"] * (high > 0)
+        tests = [f"i - {-low} >= 0"] * (low < 0) + [f"i + {high} < row->s->length"] * (high > 0)
         if tests:
             there = f"row->present[{k}]" if len(self.layout.step.sites.axes) > 1 else "1.0"
             self._weights.append(f"const double {named} = {' && '.join(tests)} ? {there} : 0.0;")

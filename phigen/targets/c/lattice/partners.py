@@ -10,7 +10,7 @@ from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, switches
 from phigen.targets.c.lattice.loops import Loop, in_loops, seen_calls
-from phigen.targets.c.lattice.names import SiteNames, pointers
+from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
 from phigen.targets.code import lower
 
 
@@ -24,33 +24,31 @@ def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> 
     """What all bonds, or pairs with other sites, add up at some sites, from ``coef`` or ``params``."""
     seen = source == "params" and gather in (layout.partners.energy, layout.partners.field)
     calls = seen_calls(program) if seen else in_loops(program)
-    kind = "double" if source == "coef" else f"{program.name}_params"
-    arguments = f"const {kind} *{source}, const {program.name}_row *row, ptrdiff_t from, ptrdiff_t to"
     for number, (ends, opposite) in enumerate(over_ends(gather)):
-        unused = [] if set(ends.kernel.inputs[source]) & lower(ends.kernel).used else [f"(void){source};"]
+        unused = ["(void)coef;"] * (source == "coef" and lower(ends.kernel).used.isdisjoint(ends.kernel.inputs["coef"]))
         if layout.graph:
             text = _over_bonds(program, layout, ends, calls, unused, first=number == 0, opposite=opposite)
         else:
             targets = [f"g{k}" for k in range(len(gather.names))]
-            sums = pointers([("double *restrict ", f"{t} = row->gathered[{k}]") for k, t in enumerate(targets)])
+            sums = pointers([("double *restrict ", f"{t} = row->s->gathered[{k}]") for k, t in enumerate(targets)])
             body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
-            begin = [f"for (ptrdiff_t i = from; i < to; ++i) {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
+            begin = [f"{OVER_SITES} {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
             text = _over_pairs(program, layout, ends.kernel, calls, [*unused, *sums, *begin], body)
-        yield Loop(ends.kernel.name, ends.kernel.purpose, arguments, text)
+        yield Loop(ends.kernel.name, ends.kernel.purpose, told(program, source), text)
 
 
 #: The bonds of a site i, by the end that it has; and which of them are passed over.
-_BONDS = {"": "row->bonds[i]; k < row->bonds[i + 1]", "a": "row->bonds[i]; k < row->middle[i]",
-          "b": "row->middle[i]; k < row->bonds[i + 1]"}  # fmt: skip
-_PASSED = {"there": "row->colours[row->other[k]] != row->chosen"}
-_TOLD = "row->colours[row->across ? row->other[k] : i] != row->chosen"
+_BONDS = {"": "row->s->bonds[i]; k < row->s->bonds[i + 1]", "a": "row->s->bonds[i]; k < row->s->middle[i]",
+          "b": "row->s->middle[i]; k < row->s->bonds[i + 1]"}  # fmt: skip
+_PASSED = {"there": "row->s->colours[row->s->other[k]] != row->chosen"}
+_TOLD = "row->s->colours[row->across ? row->s->other[k] : i] != row->chosen"
 
 
 def bonds_of(ends: Ends, *, told: bool = False) -> tuple[str, list[str]]:
     """The loop over the bonds of a site i that are meant, and the statement that passes some of them over; it may be
     ``told`` at which of their ends there are sites of the colour that is chosen."""
     told = told and ends.chosen != ""
-    wanted = "row->colours[i] == row->chosen && " if ends.chosen == "here" and not told else ""
+    wanted = "row->s->colours[i] == row->chosen && " if ends.chosen == "here" and not told else ""
     bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
     meant = _TOLD if told else _PASSED.get(ends.chosen)
     passed = [f"if ({meant}) continue;"] if meant else []
@@ -82,16 +80,16 @@ def _over_bonds(
     sums = [f"double {', '.join(f'sum{k} = 0.0' for k in range(count))};"]
     values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     added = [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
-    out = [f"row->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
+    out = [f"row->s->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
     one = "row->side" if program.profile == "small" and layout.step.parts else "1.0"
     loop, passed = bonds_of(ends, told=is_told_ends(program, layout))
-    reads = [f"{'const ptrdiff_t j = row->other[k];'}"] if other else []
-    reads += [f"const double side = k < row->middle[i] ? {one} : -{one};"] * bool(opposite)
+    reads = [f"{'const ptrdiff_t j = row->s->other[k];'}"] if other else []
+    reads += [f"const double side = k < row->s->middle[i] ? {one} : -{one};"] * bool(opposite)
     inner = [*passed, *reads, *other, *values, *added]
     return "\n".join(
         [
             *(f"    {line}" for line in [*begin, *names.pointers()]),
-            "    for (ptrdiff_t i = from; i < to; ++i) {",
+            f"    {OVER_SITES} {{",
             *(f"        {line}" for line in [*own, *sums]),
             f"        {loop}",
             *(f"            {line}" for line in inner),
@@ -119,10 +117,10 @@ def _over_pairs(
     return "\n".join(
         [
             *(f"    {line}" for line in [*names.pointers(), *begin]),
-            "    for (ptrdiff_t j = 0; j < row->length; ++j) {",
+            "    for (ptrdiff_t j = 0; j < row->s->length; ++j) {",
             *(f"        {line}" for line in other),
             f"        {name}_EACH_SITE",
-            "        for (ptrdiff_t i = from; i < to; ++i) {",
+            f"        {OVER_SITES} {{",
             *(f"            {line}" for line in lines),
             "        }",
             "    }\n",

@@ -15,7 +15,7 @@ from phigen.scheme.steps import Ends
 from phigen.symbolic.expression import ZERO
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.loops import Loop, in_loops
-from phigen.targets.c.lattice.names import SiteNames
+from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, told
 from phigen.targets.c.lattice.partners import bonds_of
 from phigen.targets.code import Store, lower
 
@@ -61,15 +61,14 @@ def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str
     head += [f"double *bar_{k} = row->bar[{k}];" for k in sorted(set(bars.values()))]
     source = "params" if "params" in kernel.inputs else "coef"
     head += ["(void)sums;"] * all(s.array != f"{source}_bar" for s in stores)
-    head += [f"(void){source};"] * code.used.isdisjoint(kernel.inputs[source])
+    head += ["(void)coef;"] * (source == "coef" and code.used.isdisjoint(kernel.inputs["coef"]))
     values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     shown = [names.show(s.value) for s in stores]
     if layout.graph:
         text = _over_bonds(layout, ends, stores, shown, bars, head, own, [*other, *values])
     else:
         text = _over_pairs(name, stores, shown, bars, head, own, other, values)
-    kind = "double" if source == "coef" else f"{name}_params"
-    arguments = f"const {kind} *{source}, const {name}_row *row, ptrdiff_t from, ptrdiff_t to, double *sums"
+    arguments = f"{told(program, source)}, double *sums"
     said = "the site where the sum is" if end == "a" else "the other site"
     return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
 
@@ -94,11 +93,11 @@ def _over_bonds(
     loop, passed = bonds_of(ends)
     shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
     sites = [k for k, s in enumerate(stores) if s.array == "site_bar"]
-    inner = [*passed, "const ptrdiff_t j = row->other[k];" * any("[j]" in v for v in values), *values]
+    inner = [*passed, "const ptrdiff_t j = row->s->other[k];" * any("[j]" in v for v in values), *values]
     for k, (store, value) in enumerate(zip(stores, shown, strict=True)):
         kept = {**dict.fromkeys(_SUMS, f"share{k}"), "site_bar": f"own{k}"}
         inner.append(f"{kept.get(store.array, f'bar_{bars.get(k)}[k]')} += {value};")
-    lines = [*head, *(f"double share{k} = 0.0;" for k in shares), "for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines = [*head, *(f"double share{k} = 0.0;" for k in shares), f"{OVER_SITES} {{"]
     lines += [f"    {line}" for line in [*own, *(f"double own{k} = 0.0;" for k in sites), loop]]
     lines += [*(f"        {line}" for line in inner if line), "    }"]
     lines += [*(f"    bar_{bars[k]}[i] += own{k};" for k in sites), "}"]
@@ -120,10 +119,10 @@ def _over_pairs(
     shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
     inner = [*own, *values]
     for k, value in enumerate(shown):
-        inner.append(f"{f'share{k}[i - from]' if k in shares else f'bar_{bars[k]}[i]'} += i == j ? 0.0 : {value};")
+        inner.append(f"{f'share{k}[i - row->from]' if k in shares else f'bar_{bars[k]}[i]'} += i == j ? 0.0 : {value};")
     lines = [*head, *(f"double share{k}[{name}_ADDED] = {{ 0.0 }};" for k in shares)]
-    lines += ["for (ptrdiff_t j = 0; j < row->length; ++j) {", *(f"    {line}" for line in other)]
-    lines += [f"    {name}_EACH_SITE", "    for (ptrdiff_t i = from; i < to; ++i) {"]
+    lines += ["for (ptrdiff_t j = 0; j < row->s->length; ++j) {", *(f"    {line}" for line in other)]
+    lines += [f"    {name}_EACH_SITE", f"    {OVER_SITES} {{"]
     lines += [*(f"        {line}" for line in inner), "    }", "}"]
-    lines += [f"sums[{stores[k].index}] += {name}_added(share{k}, to - from);" for k in shares]
+    lines += [f"sums[{stores[k].index}] += {name}_added(share{k}, row->to - row->from);" for k in shares]
     return "".join(f"    {line}\n" for line in lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,7 @@ from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
 from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches
+from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches, wide
 from phigen.targets.c.lattice.loops import (
     BLOCK,
     Loop,
@@ -183,7 +184,7 @@ def _case(
     coloured, varied = layout.step.by_colour, any(sweep.is_tangent for sweep in part)
     lines = {form: [*_called(program, called, names)] for form, called in forms.items()}
     moved = sorted({f for sweep in part for f in sweep.moved})
-    setup = ["at.row.varied = v;"] * varied + (["at.row.chosen = colour;"] if coloured and coloured[k] else [])
+    setup = ["row.varied = v;"] * varied + (["row.chosen = colour;"] if coloured and coloured[k] else [])
     all_called = [call for called in forms.values() for call in called]
     orders = [*_reordered(layout, [call.order for call in all_called])]
     orders += _other_bonds(layout, [call.bonds for call in all_called])
@@ -206,13 +207,13 @@ class Case:
 
 @dataclass(frozen=True)
 class _Call:
-    """A loop for some sites of a piece: the text of the last two arguments; the ``colour`` that it is told, if any; the
+    """A loop for some sites of a piece: their bounds, if not all of them; the ``colour`` that it is told, if any; the
     fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
     likewise, and the ``side`` that bonds are seen from; whether the colour that is chosen lies ``across`` them;
     ``others`` would do the same."""
 
     loop: Loop
-    sites: str = "at.from, at.to"
+    sites: str = ""
     colour: int | None = None
     order: tuple[str, ...] = ()
     bonds: tuple[str, ...] | None = None
@@ -238,20 +239,20 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
     for call in called:
         if call.bonds not in (bonds, None):
             bonds = call.bonds
-            yield f"at.row.at_bonds = {'_'.join(bonds) or 's->at_bonds'};"
+            yield f"row.at_bonds = {'_'.join(bonds) or 's->at_bonds'};"
         if call.side not in (side, None):
             side = call.side
-            yield f"at.row.side = {side!r};"
+            yield f"row.side = {side!r};"
         if call.across not in (across, None):
             across = call.across
-            yield f"at.row.across = {int(across)};"
+            yield f"row.across = {int(across)};"
         if call.colour not in (colour, None):
             colour = call.colour
-            yield f"at.row.swept = {colour};"
+            yield f"row.swept = {colour};"
         if call.order != order:
             order = call.order
-            yield f"at.row.x = {'_'.join(order) or 's->x'};"
-        yield f"{program.name}_{names[call.loop.code]}(coef, &at.row, {call.sites});"
+            yield f"row.x = {'_'.join(order) or 's->x'};"
+        yield f"{program.name}_{names[call.loop.code]}(coef, {at(program, call.sites)});"
 
 
 def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...] | None]) -> Iterator[str]:
@@ -289,9 +290,8 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
         sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
         for kernel, more in forms_of(program, sweep.kernel)
     ]
-    plain = len(loops) == 1 and layout.step.sites.colours == 1 and not sweep.gather and not sweep.is_tangent
-    if plain and len(layout.step.sites.axes) > 1:
-        yield _Call(loops[0], "at.from, at.wide")  # whole vectors: what lies beside a row is copied afresh
+    if len(loops) == 1 and wide(layout, sweep):
+        yield _Call(loops[0], "0, (s->length + 7) & ~(ptrdiff_t)7")
     else:
         told = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
         yield from (replace(call, colour=sweep.colour if told else None) for call in calls_over_sites(loops))
@@ -303,7 +303,12 @@ def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
         yield _Call(loops[0])
         return
     inside, end = loops
-    yield from (_Call(end, "at.from, second"), _Call(inside, "second, third"), _Call(end, "third, at.to"))
+    yield from (_Call(end, "begin, second"), _Call(inside, "second, third"), _Call(end, "third, stop"))
+
+
+def at(program: Program, sites: str) -> str:
+    """The argument that is a piece of a row, or some sites of it."""
+    return f"{program.name}_between(&row, {sites})" if sites else "&row"
 
 
 def either(lines: Mapping[str, Sequence[str]]) -> list[str]:
@@ -316,10 +321,10 @@ def either(lines: Mapping[str, Sequence[str]]) -> list[str]:
     return ["if (far) {", *indented["_far"], "} else {", *indented["_near"], "}"]
 
 
-def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], where: str) -> list[str]:
+def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], case: Case) -> list[str]:
     """What copies the ends of a row of some fields that were changed."""
-    found = [f"{program.name}_ends({where}[{f}]{layout.at(0, 'at.row.')}, s->length, at.from, at.to);" for f in fields]
-    return found if layout.halo else []
+    place, swept = layout.at(0, "row."), layout.swept("begin, stop" if case.beside else "row.from, row.to")
+    return [f"{program.name}_ends({case.where}[{f}]{place}, s->length, {swept});" for f in fields if layout.halo]
 
 
 def _of_equation(
@@ -330,7 +335,7 @@ def _of_equation(
     name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
     varied = kernel.name in VARIED
     gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
-    gathered = [f"{name}_{own.kernel.name}(&s->params, &at.row, at.from, at.to);" for own, _ in gathers]
+    gathered = [f"{name}_{own.kernel.name}(&row);" for own, _ in gathers]
     lines = {}
     for form, calls in forms.items():
         loops = [
@@ -338,8 +343,8 @@ def _of_equation(
             for one, more in forms_of(program, kernel)
         ]
         yield from (loop.text(program) for loop in loops)
-        lines[form] = [f"{name}_{call.loop.name}(coef, &at.row, {call.sites});" for call in calls_over_sites(loops)]
-    reads = ["at.row.start = s->x;"] * ("start" in kernel.inputs) + ["at.row.varied = v;"] * varied
+        lines[form] = [f"{name}_{call.loop.name}(coef, {at(program, call.sites)});" for call in calls_over_sites(loops)]
+    reads = ["row.start = s->x;"] * ("start" in kernel.inputs) + ["row.varied = v;"] * varied
     titles = {
         "relax": "A sweep",
         "increment": "The end of a stage",
@@ -349,7 +354,7 @@ def _of_equation(
         "follow": "How the end of a stage follows y along v, added",
     }
     moved = range(program.dimension) if relaxing or moves or kernel.name == "follow" else ()
-    setup = ["at.row.x = y;", *reads, "at.row.out = to;"]
+    setup = ["row.x = y;", *reads, "row.out = to;"]
     yield over_rows(
         program,
         layout,
@@ -381,7 +386,7 @@ def over_rows(
     low, one_row = max([0, *(-low for low, _ in last)]), len(layout.step.sites.axes) == 1
     values = {
         "NAME": program.name,
-        "low": low if one_row else f"at.row.whole ? {low} : s->length",
+        "low": low if one_row else f"row.whole ? {low} : s->length",
         "high": max([0, *(high for _, high in last)]),
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
         "alone": alone,
@@ -399,25 +404,23 @@ def _over_pieces(
     What lies beside the open ends of a single row is read by their pieces alone: short code copies it of all fields.
     """
     pieces = [case for case in cases if isinstance(case, Case)]
-    ends = [_copied_ends(program, layout, case.moved, case.where) for case in pieces]
+    ends = [_copied_ends(program, layout, case.moved, case) for case in pieces]
     own, last = [[*case.setup, *case.calls] for case in pieces], list[str]()
     if layout.step.sites.open == (True,) and any(ends):
-        (line,) = _copied_ends(program, layout, ["k"], pieces[0].where)
+        (line,) = _copied_ends(program, layout, ["k"], pieces[0])
         last = [f"for (int k = 0; k < {program.name}_DIM; ++k) {line}"]
     else:
         own = [[*lines, *copied] for lines, copied in zip(own, ends, strict=True)]
-    if len(own) > 1 and program.profile == "small" and all(lines[0].startswith(("at.", program.name)) for lines in own):
-        changed = ["row"] * any("at.row." in line.split(" = ")[0] for lines in own for line in lines)
+    if len(own) > 1 and program.profile == "small":
         calls = ["switch (part) {", *_cases(own, labels), "}", *last]
-        return _piece(values, Case(calls, (), beside=False), changed)
+        return _piece(values, Case(calls, (), beside=False))
     whole = iter([replace(case, calls=[*case.calls, *copied]) for case, copied in zip(pieces, ends, strict=True)])
-    loops = [
-        [case] if isinstance(case, str) else _piece(values, next(whole), [*case.setup, *case.orders]) for case in cases
-    ]
+    loops = [[case] if isinstance(case, str) else _piece(values, next(whole)) for case in cases]
     return loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels), "}"]
 
 
-def _piece(values: Mapping[str, object], case: Case, changed: Sequence[str]) -> list[str]:
+def _piece(values: Mapping[str, object], case: Case) -> list[str]:
+    changed = any(re.search(r"\brow\.\w+ = |_between\(", line) for line in (*case.setup, *case.calls))
     lines = render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
     each = "for (size_t unit = first; unit < end; ++unit) {"
     return lines if values["alone"] else [each, *(f"    {line}" for line in lines), "}"]
