@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 2328ac8041f43bf1fea539f6215c96fd9a938268d3d1dcf3c3c970df2ea3fb92
+ * body-sha256: 3c0b6f29ad7b54cfc5c3671eced65f6ff59ce7ddbe791b5279ce731c282abf91
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -2729,13 +2729,27 @@ static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_l
     kowalevski_top_take(model, delta, size);
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
-   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
-   what the last pass left. */
-static double kowalevski_top_remaining(double size, double bend, double bound)
+/* Corrections below the first go on with the matrices of the last pass. After the square of so small a
+   correction as the second, there is rounding only, if the next is below the third. */
+#define kowalevski_top_FROZEN 1e-4
+#define kowalevski_top_SMALL 1e-8
+#define kowalevski_top_ROUNDING 1e-10
+/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
+#define kowalevski_top_CAUTION 4.0
+
+/* What corrections of this size leave, after those of the size before: the first leave their square, later
+   ones the part of themselves that they are of those before, or less. Nothing, where all that is left is
+   rounding. */
+static void kowalevski_top_leave(const kowalevski_top_lanes size, const kowalevski_top_lanes before,
+    kowalevski_top_lanes left)
 {
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
+    kowalevski_top_EACH_LANE
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
+        const double part = before[lane] < HUGE_VAL ? kowalevski_top_CAUTION * size[lane] / before[lane]
+            : size[lane];
+        left[lane] = before[lane] < kowalevski_top_SMALL && size[lane] < kowalevski_top_ROUNDING ? 0.0
+            : part * size[lane];
+    }
 }
 
 /* Invert the matrices of all lanes in place by elimination without pivoting: they are I + O(h). Infinite
@@ -2806,9 +2820,9 @@ static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevsk
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. */
-static double kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevski_top_DIM],
-    double carry[kowalevski_top_DIM])
+   apart. most is the largest correction in each lane. */
+static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevski_top_DIM],
+    double carry[kowalevski_top_DIM], kowalevski_top_lanes most)
 {
     double residual[kowalevski_top_DIM], sum[kowalevski_top_DIM], small[kowalevski_top_DIM];
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
@@ -2840,9 +2854,7 @@ static double kowalevski_top_chain(kowalevski_top_model *model, double x[kowalev
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    kowalevski_top_lanes largest;
-    kowalevski_top_correct(model, largest);
-    return kowalevski_top_largest(largest);
+    kowalevski_top_correct(model, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -2974,36 +2986,30 @@ static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *
     return kowalevski_top_near_lanes(model, s->x);
 }
 
-/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
-   After the square of so small a correction as the second, there is rounding only, if the next is below the
-   third. */
-#define kowalevski_top_FROZEN 1e-5
-#define kowalevski_top_SMALL 1e-8
-#define kowalevski_top_ROUNDING 1e-10
-
 /* kowalevski_top_LANES steps at once: guess the points of all, and correct them together until the error that
    remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
    it takes more than most. */
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_model model;
-    double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL, bend = 0.0,
-        bound = HUGE_VAL;
+    kowalevski_top_lanes size, before, left;
+    double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!kowalevski_top_guess(s, table, &model)) return 0;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > kowalevski_top_FROZEN;
         kowalevski_top_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        const double size = kowalevski_top_chain(&model, x, carry);
+        memcpy(before, size, sizeof before);
+        kowalevski_top_chain(&model, x, carry, size);
         s->evaluations += kowalevski_top_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = kowalevski_top_remaining(size, bend, bound);
-        solved = bound <= kowalevski_top_TOLERANCE || (previous < kowalevski_top_SMALL
-            && size < kowalevski_top_ROUNDING);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
+        kowalevski_top_leave(size, before, left);
+        solved = kowalevski_top_largest(left) <= kowalevski_top_TOLERANCE;
+        const double largest = kowalevski_top_largest(size);
+        if ((++passes >= most || !(largest < previous)) && !solved) return 0;
+        previous = largest;
     }
     if (!kowalevski_top_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < kowalevski_top_DIM; ++i)
@@ -3335,21 +3341,16 @@ static void kowalevski_top_stay_near(kowalevski_top_lanes y[restrict kowalevski_
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
-   the group. bound is what remains in each lane. */
+/* How many lanes are still to be solved after corrections of this size, by what they leave; those where
+   nothing is finite leave the group. */
 static int kowalevski_top_group_open(kowalevski_top_group *group, const kowalevski_top_lanes size,
-    const kowalevski_top_lanes previous, double bend, kowalevski_top_lanes bound)
+    const kowalevski_top_lanes left)
 {
     int open = 0;
-    kowalevski_top_EACH_LANE
-    for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-        bound[lane] = kowalevski_top_remaining(size[lane], bend, bound[lane]);
-    if (kowalevski_top_largest(bound) <= kowalevski_top_TOLERANCE) return 0;
+    if (kowalevski_top_largest(left) <= kowalevski_top_TOLERANCE) return 0;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-        const int solved = bound[lane] <= kowalevski_top_TOLERANCE || (previous[lane] < kowalevski_top_SMALL
-            && size[lane] < kowalevski_top_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
+        open += group->active[lane] && !(left[lane] <= kowalevski_top_TOLERANCE);
     }
     return open;
 }
@@ -3367,15 +3368,14 @@ static void kowalevski_top_group_predict(kowalevski_top_group *group,
    most allowed, lanes that are not solved leave the group. */
 static int kowalevski_top_group_solve(kowalevski_top_group *group, kowalevski_top_model *model)
 {
-    kowalevski_top_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
+    kowalevski_top_lanes size, before, left;
+    double largest = HUGE_VAL;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = HUGE_VAL;
     kowalevski_top_group_predict(group, model->y);
     for (; open > 0 && iterations < kowalevski_top_MAX_ITERATIONS; ++iterations) {
-        memcpy(previous, size, sizeof size);
+        memcpy(before, size, sizeof size);
         kowalevski_top_update(group->coef, model, largest > kowalevski_top_FROZEN);
-        bend = largest > kowalevski_top_FROZEN ? 0.0 : bend + largest;
         for (int i = 0; i < kowalevski_top_DIM; ++i) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
@@ -3384,11 +3384,12 @@ static int kowalevski_top_group_solve(kowalevski_top_group *group, kowalevski_to
                         - group->carry[i][lane];
         }
         kowalevski_top_correct(model, size);
-        open = kowalevski_top_group_open(group, size, previous, bend, bound);
+        kowalevski_top_leave(size, before, left);
+        open = kowalevski_top_group_open(group, size, left);
         largest = kowalevski_top_largest(size);
     }
     for (int lane = 0; lane < kowalevski_top_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= kowalevski_top_TOLERANCE;
+        group->active[lane] = group->active[lane] && left[lane] <= kowalevski_top_TOLERANCE;
     return iterations;
 }
 

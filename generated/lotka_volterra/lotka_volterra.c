@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 6db97a161550765412167d1fb00b537b18523a02cafd2ce1de0b0d4f385eb5e7
+ * body-sha256: d092cb48bd44d7f3f4a5dfc35f271bdc6a710aa8da2f4b9653ac705268d526c3
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -880,13 +880,27 @@ static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_l
     lotka_volterra_take(model, delta, size);
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
-   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
-   what the last pass left. */
-static double lotka_volterra_remaining(double size, double bend, double bound)
+/* Corrections below the first go on with the matrices of the last pass. After the square of so small a
+   correction as the second, there is rounding only, if the next is below the third. */
+#define lotka_volterra_FROZEN 1e-4
+#define lotka_volterra_SMALL 1e-8
+#define lotka_volterra_ROUNDING 1e-10
+/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
+#define lotka_volterra_CAUTION 4.0
+
+/* What corrections of this size leave, after those of the size before: the first leave their square, later
+   ones the part of themselves that they are of those before, or less. Nothing, where all that is left is
+   rounding. */
+static void lotka_volterra_leave(const lotka_volterra_lanes size, const lotka_volterra_lanes before,
+    lotka_volterra_lanes left)
 {
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
+    lotka_volterra_EACH_LANE
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
+        const double part = before[lane] < HUGE_VAL ? lotka_volterra_CAUTION * size[lane] / before[lane]
+            : size[lane];
+        left[lane] = before[lane] < lotka_volterra_SMALL && size[lane] < lotka_volterra_ROUNDING ? 0.0
+            : part * size[lane];
+    }
 }
 
 /* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is
@@ -920,9 +934,9 @@ static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_vol
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. */
-static double lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_volterra_DIM],
-    double carry[lotka_volterra_DIM])
+   apart. most is the largest correction in each lane. */
+static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_volterra_DIM],
+    double carry[lotka_volterra_DIM], lotka_volterra_lanes most)
 {
     double residual[lotka_volterra_DIM], sum[lotka_volterra_DIM], small[lotka_volterra_DIM];
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
@@ -954,9 +968,7 @@ static double lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_v
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    lotka_volterra_lanes largest;
-    lotka_volterra_correct(model, largest);
-    return lotka_volterra_largest(largest);
+    lotka_volterra_correct(model, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1088,36 +1100,30 @@ static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *
     return lotka_volterra_near_lanes(model, s->x);
 }
 
-/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
-   After the square of so small a correction as the second, there is rounding only, if the next is below the
-   third. */
-#define lotka_volterra_FROZEN 1e-5
-#define lotka_volterra_SMALL 1e-8
-#define lotka_volterra_ROUNDING 1e-10
-
 /* lotka_volterra_LANES steps at once: guess the points of all, and correct them together until the error that
    remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
    it takes more than most. */
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
     lotka_volterra_model model;
-    double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL, bend = 0.0,
-        bound = HUGE_VAL;
+    lotka_volterra_lanes size, before, left;
+    double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!lotka_volterra_guess(s, table, &model)) return 0;
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > lotka_volterra_FROZEN;
         lotka_volterra_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        const double size = lotka_volterra_chain(&model, x, carry);
+        memcpy(before, size, sizeof before);
+        lotka_volterra_chain(&model, x, carry, size);
         s->evaluations += lotka_volterra_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = lotka_volterra_remaining(size, bend, bound);
-        solved = bound <= lotka_volterra_TOLERANCE || (previous < lotka_volterra_SMALL
-            && size < lotka_volterra_ROUNDING);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
+        lotka_volterra_leave(size, before, left);
+        solved = lotka_volterra_largest(left) <= lotka_volterra_TOLERANCE;
+        const double largest = lotka_volterra_largest(size);
+        if ((++passes >= most || !(largest < previous)) && !solved) return 0;
+        previous = largest;
     }
     if (!lotka_volterra_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < lotka_volterra_DIM; ++i)
@@ -1449,21 +1455,16 @@ static void lotka_volterra_stay_near(lotka_volterra_lanes y[restrict lotka_volte
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
-   the group. bound is what remains in each lane. */
+/* How many lanes are still to be solved after corrections of this size, by what they leave; those where
+   nothing is finite leave the group. */
 static int lotka_volterra_group_open(lotka_volterra_group *group, const lotka_volterra_lanes size,
-    const lotka_volterra_lanes previous, double bend, lotka_volterra_lanes bound)
+    const lotka_volterra_lanes left)
 {
     int open = 0;
-    lotka_volterra_EACH_LANE
-    for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-        bound[lane] = lotka_volterra_remaining(size[lane], bend, bound[lane]);
-    if (lotka_volterra_largest(bound) <= lotka_volterra_TOLERANCE) return 0;
+    if (lotka_volterra_largest(left) <= lotka_volterra_TOLERANCE) return 0;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-        const int solved = bound[lane] <= lotka_volterra_TOLERANCE || (previous[lane] < lotka_volterra_SMALL
-            && size[lane] < lotka_volterra_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
+        open += group->active[lane] && !(left[lane] <= lotka_volterra_TOLERANCE);
     }
     return open;
 }
@@ -1481,15 +1482,14 @@ static void lotka_volterra_group_predict(lotka_volterra_group *group,
    most allowed, lanes that are not solved leave the group. */
 static int lotka_volterra_group_solve(lotka_volterra_group *group, lotka_volterra_model *model)
 {
-    lotka_volterra_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
+    lotka_volterra_lanes size, before, left;
+    double largest = HUGE_VAL;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = HUGE_VAL;
     lotka_volterra_group_predict(group, model->y);
     for (; open > 0 && iterations < lotka_volterra_MAX_ITERATIONS; ++iterations) {
-        memcpy(previous, size, sizeof size);
+        memcpy(before, size, sizeof size);
         lotka_volterra_update(group->coef, model, largest > lotka_volterra_FROZEN);
-        bend = largest > lotka_volterra_FROZEN ? 0.0 : bend + largest;
         for (int i = 0; i < lotka_volterra_DIM; ++i) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
@@ -1498,11 +1498,12 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, lotka_volterr
                         - group->carry[i][lane];
         }
         lotka_volterra_correct(model, size);
-        open = lotka_volterra_group_open(group, size, previous, bend, bound);
+        lotka_volterra_leave(size, before, left);
+        open = lotka_volterra_group_open(group, size, left);
         largest = lotka_volterra_largest(size);
     }
     for (int lane = 0; lane < lotka_volterra_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= lotka_volterra_TOLERANCE;
+        group->active[lane] = group->active[lane] && left[lane] <= lotka_volterra_TOLERANCE;
     return iterations;
 }
 

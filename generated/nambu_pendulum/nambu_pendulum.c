@@ -14,7 +14,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: bb0d7f4239369c5fd1103c5be68bea61045d8436e8572889a1209a0732d444d8
+ * body-sha256: b678e5dc5b5377c045400596b777837742c30a609b75cd8a1bfbb4d90b505667
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1198,13 +1198,27 @@ static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_l
     nambu_pendulum_take(model, delta, size);
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
-   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
-   what the last pass left. */
-static double nambu_pendulum_remaining(double size, double bend, double bound)
+/* Corrections below the first go on with the matrices of the last pass. After the square of so small a
+   correction as the second, there is rounding only, if the next is below the third. */
+#define nambu_pendulum_FROZEN 1e-4
+#define nambu_pendulum_SMALL 1e-8
+#define nambu_pendulum_ROUNDING 1e-10
+/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
+#define nambu_pendulum_CAUTION 4.0
+
+/* What corrections of this size leave, after those of the size before: the first leave their square, later
+   ones the part of themselves that they are of those before, or less. Nothing, where all that is left is
+   rounding. */
+static void nambu_pendulum_leave(const nambu_pendulum_lanes size, const nambu_pendulum_lanes before,
+    nambu_pendulum_lanes left)
 {
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
+    nambu_pendulum_EACH_LANE
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
+        const double part = before[lane] < HUGE_VAL ? nambu_pendulum_CAUTION * size[lane] / before[lane]
+            : size[lane];
+        left[lane] = before[lane] < nambu_pendulum_SMALL && size[lane] < nambu_pendulum_ROUNDING ? 0.0
+            : part * size[lane];
+    }
 }
 
 /* ---- Paths in lanes ---- */
@@ -1667,9 +1681,9 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. */
-static double nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pendulum_DIM],
-    double carry[nambu_pendulum_DIM])
+   apart. most is the largest correction in each lane. */
+static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pendulum_DIM],
+    double carry[nambu_pendulum_DIM], nambu_pendulum_lanes most)
 {
     double residual[nambu_pendulum_DIM], sum[nambu_pendulum_DIM], small[nambu_pendulum_DIM];
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
@@ -1701,9 +1715,7 @@ static double nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_p
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    nambu_pendulum_lanes largest;
-    nambu_pendulum_correct(model, largest);
-    return nambu_pendulum_largest(largest);
+    nambu_pendulum_correct(model, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1835,36 +1847,30 @@ static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *
     return nambu_pendulum_near_lanes(model, s->x);
 }
 
-/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
-   After the square of so small a correction as the second, there is rounding only, if the next is below the
-   third. */
-#define nambu_pendulum_FROZEN 1e-5
-#define nambu_pendulum_SMALL 1e-8
-#define nambu_pendulum_ROUNDING 1e-10
-
 /* nambu_pendulum_LANES steps at once: guess the points of all, and correct them together until the error that
    remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
    it takes more than most. */
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
     nambu_pendulum_model model;
-    double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL, bend = 0.0,
-        bound = HUGE_VAL;
+    nambu_pendulum_lanes size, before, left;
+    double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!nambu_pendulum_guess(s, table, &model)) return 0;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > nambu_pendulum_FROZEN;
         nambu_pendulum_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        const double size = nambu_pendulum_chain(&model, x, carry);
+        memcpy(before, size, sizeof before);
+        nambu_pendulum_chain(&model, x, carry, size);
         s->evaluations += nambu_pendulum_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = nambu_pendulum_remaining(size, bend, bound);
-        solved = bound <= nambu_pendulum_TOLERANCE || (previous < nambu_pendulum_SMALL
-            && size < nambu_pendulum_ROUNDING);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
+        nambu_pendulum_leave(size, before, left);
+        solved = nambu_pendulum_largest(left) <= nambu_pendulum_TOLERANCE;
+        const double largest = nambu_pendulum_largest(size);
+        if ((++passes >= most || !(largest < previous)) && !solved) return 0;
+        previous = largest;
     }
     if (!nambu_pendulum_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < nambu_pendulum_DIM; ++i)
@@ -2196,21 +2202,16 @@ static void nambu_pendulum_stay_near(nambu_pendulum_lanes y[restrict nambu_pendu
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
-   the group. bound is what remains in each lane. */
+/* How many lanes are still to be solved after corrections of this size, by what they leave; those where
+   nothing is finite leave the group. */
 static int nambu_pendulum_group_open(nambu_pendulum_group *group, const nambu_pendulum_lanes size,
-    const nambu_pendulum_lanes previous, double bend, nambu_pendulum_lanes bound)
+    const nambu_pendulum_lanes left)
 {
     int open = 0;
-    nambu_pendulum_EACH_LANE
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-        bound[lane] = nambu_pendulum_remaining(size[lane], bend, bound[lane]);
-    if (nambu_pendulum_largest(bound) <= nambu_pendulum_TOLERANCE) return 0;
+    if (nambu_pendulum_largest(left) <= nambu_pendulum_TOLERANCE) return 0;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-        const int solved = bound[lane] <= nambu_pendulum_TOLERANCE || (previous[lane] < nambu_pendulum_SMALL
-            && size[lane] < nambu_pendulum_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
+        open += group->active[lane] && !(left[lane] <= nambu_pendulum_TOLERANCE);
     }
     return open;
 }
@@ -2228,15 +2229,14 @@ static void nambu_pendulum_group_predict(nambu_pendulum_group *group,
    most allowed, lanes that are not solved leave the group. */
 static int nambu_pendulum_group_solve(nambu_pendulum_group *group, nambu_pendulum_model *model)
 {
-    nambu_pendulum_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
+    nambu_pendulum_lanes size, before, left;
+    double largest = HUGE_VAL;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] = HUGE_VAL;
     nambu_pendulum_group_predict(group, model->y);
     for (; open > 0 && iterations < nambu_pendulum_MAX_ITERATIONS; ++iterations) {
-        memcpy(previous, size, sizeof size);
+        memcpy(before, size, sizeof size);
         nambu_pendulum_update(group->coef, model, largest > nambu_pendulum_FROZEN);
-        bend = largest > nambu_pendulum_FROZEN ? 0.0 : bend + largest;
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
@@ -2245,11 +2245,12 @@ static int nambu_pendulum_group_solve(nambu_pendulum_group *group, nambu_pendulu
                         - group->carry[i][lane];
         }
         nambu_pendulum_correct(model, size);
-        open = nambu_pendulum_group_open(group, size, previous, bend, bound);
+        nambu_pendulum_leave(size, before, left);
+        open = nambu_pendulum_group_open(group, size, left);
         largest = nambu_pendulum_largest(size);
     }
     for (int lane = 0; lane < nambu_pendulum_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= nambu_pendulum_TOLERANCE;
+        group->active[lane] = group->active[lane] && left[lane] <= nambu_pendulum_TOLERANCE;
     return iterations;
 }
 

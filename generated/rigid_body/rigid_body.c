@@ -15,7 +15,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: b6300df4ae08b2e361e01d690e60f9a5703a71d9af4d2fb2cd626a50f6de3ce2
+ * body-sha256: 7ea5b2b90925a9a0b92d21a41f5c3e78afd7eca91974517c608d0dc289fb29bf
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1267,13 +1267,27 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
     rigid_body_take(model, delta, size);
 }
 
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points
-   corrected; where they are of points further off, by bend, also of the order of size times bend. bound is
-   what the last pass left. */
-static double rigid_body_remaining(double size, double bend, double bound)
+/* Corrections below the first go on with the matrices of the last pass. After the square of so small a
+   correction as the second, there is rounding only, if the next is below the third. */
+#define rigid_body_FROZEN 1e-4
+#define rigid_body_SMALL 1e-8
+#define rigid_body_ROUNDING 1e-10
+/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
+#define rigid_body_CAUTION 4.0
+
+/* What corrections of this size leave, after those of the size before: the first leave their square, later
+   ones the part of themselves that they are of those before, or less. Nothing, where all that is left is
+   rounding. */
+static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes before,
+    rigid_body_lanes left)
 {
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
+    rigid_body_EACH_LANE
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) {
+        const double part = before[lane] < HUGE_VAL ? rigid_body_CAUTION * size[lane] / before[lane]
+            : size[lane];
+        left[lane] = before[lane] < rigid_body_SMALL && size[lane] < rigid_body_ROUNDING ? 0.0
+            : part * size[lane];
+    }
 }
 
 /* Linearise a stage around the points y. The matrices are I + O(h): where a pivot is far from 1, all is
@@ -1306,9 +1320,9 @@ static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model 
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. */
-static double rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM],
-    double carry[rigid_body_DIM])
+   apart. most is the largest correction in each lane. */
+static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], double carry[rigid_body_DIM],
+    rigid_body_lanes most)
 {
     double residual[rigid_body_DIM], sum[rigid_body_DIM], small[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
@@ -1340,9 +1354,7 @@ static double rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM]
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    rigid_body_lanes largest;
-    rigid_body_correct(model, largest);
-    return rigid_body_largest(largest);
+    rigid_body_correct(model, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1470,34 +1482,30 @@ static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid
     return rigid_body_near_lanes(model, s->x);
 }
 
-/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order.
-   After the square of so small a correction as the second, there is rounding only, if the next is below the
-   third. */
-#define rigid_body_FROZEN 1e-5
-#define rigid_body_SMALL 1e-8
-#define rigid_body_ROUNDING 1e-10
-
 /* rigid_body_LANES steps at once: guess the points of all, and correct them together until the error that
    remains is as small as after a single step. How many passes that took; 0, and the solver as before, where
    it takes more than most. */
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
     rigid_body_model model;
-    double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    rigid_body_lanes size, before, left;
+    double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!rigid_body_guess(s, table, &model)) return 0;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > rigid_body_FROZEN;
         rigid_body_update(table->coef, &model, matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-        const double size = rigid_body_chain(&model, x, carry);
+        memcpy(before, size, sizeof before);
+        rigid_body_chain(&model, x, carry, size);
         s->evaluations += rigid_body_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = rigid_body_remaining(size, bend, bound);
-        solved = bound <= rigid_body_TOLERANCE || (previous < rigid_body_SMALL && size < rigid_body_ROUNDING);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
+        rigid_body_leave(size, before, left);
+        solved = rigid_body_largest(left) <= rigid_body_TOLERANCE;
+        const double largest = rigid_body_largest(size);
+        if ((++passes >= most || !(largest < previous)) && !solved) return 0;
+        previous = largest;
     }
     if (!rigid_body_near_lanes(&model, s->x)) return 0;
     for (int i = 0; i < rigid_body_DIM; ++i)
@@ -1819,21 +1827,16 @@ static void rigid_body_stay_near(rigid_body_lanes y[restrict rigid_body_DIM],
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave
-   the group. bound is what remains in each lane. */
+/* How many lanes are still to be solved after corrections of this size, by what they leave; those where
+   nothing is finite leave the group. */
 static int rigid_body_group_open(rigid_body_group *group, const rigid_body_lanes size,
-    const rigid_body_lanes previous, double bend, rigid_body_lanes bound)
+    const rigid_body_lanes left)
 {
     int open = 0;
-    rigid_body_EACH_LANE
-    for (int lane = 0; lane < rigid_body_LANES; ++lane)
-        bound[lane] = rigid_body_remaining(size[lane], bend, bound[lane]);
-    if (rigid_body_largest(bound) <= rigid_body_TOLERANCE) return 0;
+    if (rigid_body_largest(left) <= rigid_body_TOLERANCE) return 0;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-        const int solved = bound[lane] <= rigid_body_TOLERANCE || (previous[lane] < rigid_body_SMALL
-            && size[lane] < rigid_body_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
+        open += group->active[lane] && !(left[lane] <= rigid_body_TOLERANCE);
     }
     return open;
 }
@@ -1850,15 +1853,14 @@ static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y
    most allowed, lanes that are not solved leave the group. */
 static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *model)
 {
-    rigid_body_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
+    rigid_body_lanes size, before, left;
+    double largest = HUGE_VAL;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = HUGE_VAL;
     rigid_body_group_predict(group, model->y);
     for (; open > 0 && iterations < rigid_body_MAX_ITERATIONS; ++iterations) {
-        memcpy(previous, size, sizeof size);
+        memcpy(before, size, sizeof size);
         rigid_body_update(group->coef, model, largest > rigid_body_FROZEN);
-        bend = largest > rigid_body_FROZEN ? 0.0 : bend + largest;
         for (int i = 0; i < rigid_body_DIM; ++i) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
@@ -1867,11 +1869,12 @@ static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *mod
                         - group->carry[i][lane];
         }
         rigid_body_correct(model, size);
-        open = rigid_body_group_open(group, size, previous, bend, bound);
+        rigid_body_leave(size, before, left);
+        open = rigid_body_group_open(group, size, left);
         largest = rigid_body_largest(size);
     }
     for (int lane = 0; lane < rigid_body_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= rigid_body_TOLERANCE;
+        group->active[lane] = group->active[lane] && left[lane] <= rigid_body_TOLERANCE;
     return iterations;
 }
 

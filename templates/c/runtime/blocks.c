@@ -314,12 +314,6 @@ static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
     return phi_near_lanes(models, s->x);
 }
 
-/* Corrections below the first go on with the matrices of the last pass, as its error is then of third order. After the
-   square of so small a correction as the second, there is rounding only, if the next is below the third. */
-#define PHI_FROZEN 1e-5
-#define PHI_SMALL 1e-8
-#define PHI_ROUNDING 1e-10
-
 #if PHI_MONITOR
 /* The times that the steps of a block take, by the points of their stages, and what their sums lost. 0 unless those of all
    stages have the sign of the stage. */
@@ -398,9 +392,11 @@ static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_models models;
-    double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL, bend = 0.0, bound = HUGE_VAL;
+    phi_lanes size, before, left;
+    double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!phi_guess(s, table, &models)) return 0;
+    for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > PHI_FROZEN;
         for (int stage = 0; stage < PHI_STAGES; ++stage) phi_update(table->coef[stage], &models.stage[stage], matrices);
@@ -409,13 +405,14 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 #if PHI_SWEPT
         if (matrices) phi_turn_residuals(&models);
 #endif
-        const double size = phi_chain(&models, x, carry);
+        memcpy(before, size, sizeof before);
+        phi_chain(&models, x, carry, size);
         s->evaluations += PHI_STAGES * PHI_LANES;
-        bend = matrices ? 0.0 : bend + previous;
-        bound = phi_remaining(size, bend, bound);
-        solved = bound <= PHI_TOLERANCE || (previous < PHI_SMALL && size < PHI_ROUNDING);
-        if ((++passes >= most || !(size < previous)) && !solved) return 0;
-        previous = size;
+        phi_leave(size, before, left);
+        solved = phi_largest(left) <= PHI_TOLERANCE;
+        const double largest = phi_largest(size);
+        if ((++passes >= most || !(largest < previous)) && !solved) return 0;
+        previous = largest;
     }
     if (!phi_near_lanes(&models, s->x)) return 0;
     for (int i = 0; i < PHI_DIM; ++i)

@@ -102,10 +102,11 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 
 /* Correct the points of all stages by the residuals along their linear models, and find where the steps lead. As X, the
    state with its carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
-   apart. The largest correction. */
-static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+   apart. most is the largest correction in each lane. */
+static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {
-    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM], size, largest = { 0.0 };
+    phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM], size;
+    memset(most, 0, PHI_LANES * sizeof most[0]);
     phi_first_residuals(models, x, carry, residual);
     memset(sum, 0, sizeof sum);
     memset(small, 0, sizeof small);
@@ -124,7 +125,7 @@ static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_
             }
         }
         phi_take(this_stage, delta, size);
-        phi_keep_largest(largest, size);
+        phi_keep_largest(most, size);
     }
     for (int i = 0; i < PHI_DIM; ++i) {
         double whole = x[i], rest = carry[i];
@@ -136,15 +137,15 @@ static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_
         x[i] = whole + rest;
         carry[i] = rest - (x[i] - whole);
     }
-    return phi_largest(largest);
 }
 
 #else
 typedef struct { phi_model stage[PHI_STAGES]; } phi_models; /* the stages of a step */
 
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
-   increment - gain residual, the next residual follows from this one; X itself is added up apart. */
-static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM])
+   increment - gain residual, the next residual follows from this one; X itself is added up apart. most is the largest
+   correction in each lane. */
+static void phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {
     double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
 #if PHI_SPARSE
@@ -196,16 +197,15 @@ static double phi_chain(phi_models *models, double x[PHI_DIM], double carry[PHI_
         carry[i] = small[i] - (x[i] - sum[i]);
     }
 #if PHI_COMPOSED
-    phi_lanes size, largest = { 0.0 };
+    phi_lanes size;
+    memset(most, 0, PHI_LANES * sizeof most[0]);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_correct(&models->stage[stage], size);
-        phi_keep_largest(largest, size);
+        phi_keep_largest(most, size);
     }
 #else
-    phi_lanes largest;
-    phi_correct(&models->stage[0], largest);
+    phi_correct(&models->stage[0], most);
 #endif
-    return phi_largest(largest);
 }
 
 #endif

@@ -157,20 +157,15 @@ static void phi_stay_near(phi_lanes y[restrict PHI_DIM], phi_lanes last[restrict
     }
 }
 
-/* Whether lanes are still to be solved after a correction of this size; those where nothing is finite leave the group.
-   bound is what remains in each lane. */
-static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lanes previous,
-    double bend, phi_lanes bound)
+/* How many lanes are still to be solved after corrections of this size, by what they leave; those where nothing is finite
+   leave the group. */
+static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lanes left)
 {
     int open = 0;
-    PHI_EACH_LANE
-    for (int lane = 0; lane < PHI_LANES; ++lane)
-        bound[lane] = phi_remaining(size[lane], bend, bound[lane]);
-    if (phi_largest(bound) <= PHI_TOLERANCE) return 0;
+    if (phi_largest(left) <= PHI_TOLERANCE) return 0;
     for (int lane = 0; lane < PHI_LANES; ++lane) {
-        const int solved = bound[lane] <= PHI_TOLERANCE || (previous[lane] < PHI_SMALL && size[lane] < PHI_ROUNDING);
         if (!isfinite(size[lane])) group->active[lane] = 0;
-        open += group->active[lane] && !solved;
+        open += group->active[lane] && !(left[lane] <= PHI_TOLERANCE);
     }
     return open;
 }
@@ -187,15 +182,14 @@ static void phi_group_predict(phi_group *group, int stage, phi_lanes y[PHI_DIM])
    allowed, lanes that are not solved leave the group. */
 static int phi_group_solve(phi_group *group, int stage, phi_model *model)
 {
-    phi_lanes size, previous, bound;
-    double largest = HUGE_VAL, bend = 0.0;
+    phi_lanes size, before, left;
+    double largest = HUGE_VAL;
     int iterations = 0, open = 1;
-    for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = bound[lane] = HUGE_VAL;
+    for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
     phi_group_predict(group, stage, model->y);
     for (; open > 0 && iterations < PHI_MAX_ITERATIONS; ++iterations) {
-        memcpy(previous, size, sizeof size);
+        memcpy(before, size, sizeof size);
         phi_update(group->coef[stage], model, largest > PHI_FROZEN);
-        bend = largest > PHI_FROZEN ? 0.0 : bend + largest;
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane)
@@ -203,11 +197,12 @@ static int phi_group_solve(phi_group *group, int stage, phi_model *model)
                     ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
         phi_correct(model, size);
-        open = phi_group_open(group, size, previous, bend, bound);
+        phi_leave(size, before, left);
+        open = phi_group_open(group, size, left);
         largest = phi_largest(size);
     }
     for (int lane = 0; lane < PHI_LANES && open > 0; ++lane)
-        group->active[lane] = group->active[lane] && bound[lane] <= PHI_TOLERANCE;
+        group->active[lane] = group->active[lane] && left[lane] <= PHI_TOLERANCE;
     return iterations;
 }
 

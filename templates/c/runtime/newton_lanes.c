@@ -120,12 +120,22 @@ static void phi_correct(phi_model *model, phi_lanes size)
 
 #endif
 #endif
-/* What is left after a correction of this size: quadratic in it, where the matrices are of the points corrected; where
-   they are of points further off, by bend, also of the order of size times bend. bound is what the last pass left. */
-static double phi_remaining(double size, double bend, double bound)
+/* Corrections below the first go on with the matrices of the last pass. After the square of so small a correction as the
+   second, there is rounding only, if the next is below the third. */
+#define PHI_FROZEN 1e-4
+#define PHI_SMALL 1e-8
+#define PHI_ROUNDING 1e-10
+#define PHI_CAUTION 4.0 /* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
+
+/* What corrections of this size leave, after those of the size before: the first leave their square, later ones the part of
+   themselves that they are of those before, or less. Nothing, where all that is left is rounding. */
+static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes left)
 {
-    const double growth = size / bound, left = size * (size + bend);
-    return growth > 1.0 ? growth * left : left;
+    PHI_EACH_LANE
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const double part = before[lane] < HUGE_VAL ? PHI_CAUTION * size[lane] / before[lane] : size[lane];
+        left[lane] = before[lane] < PHI_SMALL && size[lane] < PHI_ROUNDING ? 0.0 : part * size[lane];
+    }
 }
 
 #if PHI_PATH
