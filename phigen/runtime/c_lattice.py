@@ -77,6 +77,9 @@ KEPT = 1 << 18
 #: States that segments of a run begin with for which a pullback has room, however large they are.
 STATES = 8
 
+#: Steps in whose number the trail is measured, since several may keep one state.
+LEGS = 64
+
 #: Bytes of the trail of a run whose segments are all made once more, at most.
 TWICE = 1 << 26
 
@@ -178,9 +181,10 @@ class CLatticeSession:
         given = np.ascontiguousarray(bars[1:], dtype=self._real)
         rows, x0_bar = filled(f"{len(bars)} frames", bars.shape, self._real), np.empty(self._shape, self._real)
         most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
-        state, of_step = x0_bar.nbytes, int(self._c.trail_size(self._address, 2)) - least
+        state, of_step = x0_bar.nbytes, (int(self._c.trail_size(self._address, 1 + LEGS)) - least) // LEGS
         twice = least + 3 * math.isqrt(steps * state * of_step)  # segments that are made once more have room by this
-        room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, twice))
+        wanted = most if of_step < state else twice  # where sweeps are undone, all is worth its room
+        room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, wanted))
         size = max(least, min(most or least, room))
         expect_room("what is kept of steps to go back", size)
         trail = np.empty(size, dtype=np.uint8)

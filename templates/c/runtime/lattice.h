@@ -96,7 +96,7 @@ typedef struct {
     int (*stop)(void);        /* see phi_ask */
 #if PHI_SERIES
     double *kept;             /* where a step keeps the y of its stages, while it does */
-#else
+#elif !PHI_UNDONE
     double *kept;             /* where steps keep what the sweeps of them change, while they do */
 #endif
 #endif

@@ -73,12 +73,16 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
     phi_add_arrays(s, g->bar, params_bar);
 }
 
-/* How many steps the next segment has of those that are left. */
+/* How many steps the next segment has of those that are left, more than the longest; without room for another state all but these. */
 static size_t phi_onward(const phi_transpose *g, size_t left)
 {
     const size_t free = g->most - g->count, parts = free > 1 ? free / 2 + 1 : 2;
-    if (left <= g->longest * (free + 1)) return g->longest;
-    return (left + parts - 1) / parts;
+    const size_t wanted = free == 0 ? left - g->longest : left <= g->longest * (free + 1) ? g->longest : (left + parts - 1) / parts;
+#if PHI_UNDONE
+    return phi_legs(wanted, g->leg) * g->leg;
+#else
+    return wanted;
+#endif
 }
 
 /* Cotangents of rows, pulled back through the steps from done to until, the last of a segment: s stands at its end. */
@@ -88,15 +92,20 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
     phi_status status = PHI_OK;
 #if PHI_SERIES
     phi_forget(s);
-#else
+#elif !PHI_UNDONE
     memcpy(g->x, s->x, sizeof g->x);
 #endif
     for (size_t k = until; k > done && status == PHI_OK; --k) {
         const size_t row = (k - 1) / stride, before = g->first_step + k - 1;
+#if !PHI_UNDONE
         double *kept = g->kept + (k - 1 - done) * g->of_step;
+#endif
         if (k == steps || k % stride == 0) phi_row_back(s, g, before + 1, rows_bar + row * PHI_DIM * s->sites);
 #if PHI_SERIES
         status = phi_step_back(s, g, before, kept);
+#elif PHI_UNDONE
+        phi_step_back(s, g, before, k > 1);
+        if ((k - 1 - done) % g->leg == 0) status = phi_leave_leg(s, g, (k - 1 - done) / g->leg);
 #else
         phi_step_back(s, g, before, k > 1, kept);
 #endif
@@ -120,7 +129,7 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
         done = phi_return(s, g);
         while (end - done > g->longest && status == PHI_OK) {
             const int free = g->count < g->most;
-            const size_t next = free ? done + phi_onward(g, end - done) : end - g->longest;
+            const size_t next = done + phi_onward(g, end - done);
             status = phi_walk(s, g, done, next, stride, steps, made, 0);
             done = next;
             if (free && status == PHI_OK) phi_mark(s, g, done);
@@ -135,7 +144,11 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
         }
         status = phi_segment_back(s, g, done, end, stride, steps, rows_bar, coef_bar);
         if (status == PHI_OK && !phi_all_hold(s, g->bar)) status = PHI_NOT_FINITE;
+#if PHI_UNDONE
+        g->failed = status == PHI_NOT_FINITE && !g->far && !g->lost;
+#else
         g->failed = status != PHI_OK && status != PHI_STOPPED && !g->far;
+#endif
         if (g->count > 1 && done == g->marks[2 * (g->count - 1)]) --g->count;
     }
 #if !PHI_RENEWED
@@ -146,8 +159,9 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
 
 /* The same from where s stands, with cotangents of coefficients that are 0 before. */
 static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, size_t stride, double *rows,
-    const double *rows_bar, double coef_bar[PHI_SUMS])
+    const double *rows_bar, double coef_bar[PHI_SUMS], void *trail, size_t size)
 {
+    phi_place_transpose(s, g, steps, trail, size);
     memset(coef_bar, 0, PHI_SUMS * sizeof *coef_bar);
     g->first_step = s->steps;
 #if PHI_SERIES
@@ -161,6 +175,27 @@ static phi_status phi_attempt(phi_solver *s, phi_transpose *g, size_t steps, siz
     return phi_run_back(s, g, steps, stride, rows, rows_bar, coef_bar);
 }
 
+#if PHI_NEAR || PHI_UNDONE
+/* Whether all is to be done once more, in another way, from where all steps began. */
+static int phi_begins_again(phi_solver *s, phi_transpose *g)
+{
+#if PHI_UNDONE
+    if (!g->failed && !g->lost) return 0;
+    if (g->lost) g->leg = 1;
+    else g->far = 1;
+    g->lost = 0;
+#else
+    if (!g->failed) return 0;
+    g->far = 1;
+#endif
+    g->failed = 0;
+    g->count = 1;
+    phi_return(s, g);
+    g->count = 0;
+    return 1;
+}
+
+#endif
 phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, double *rows, const double *rows_bar,
     double *x0_bar, phi_params_bar *params_bar, void *trail, size_t size)
 {
@@ -169,18 +204,17 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     if (size < phi_trail_size(s, 1)) return PHI_BAD_ARGUMENT;
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
-    phi_transpose g;
+    phi_transpose g = { 0 };
     double coef_bar[PHI_SUMS];
-    phi_place_transpose(s, &g, steps, trail, size);
-    status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar);
-#if PHI_NEAR
-    if (g.failed) {
-        g.count = 1;
-        phi_return(s, &g);
-        phi_place_transpose(s, &g, steps, trail, size);
-        g.far = 1;
-        status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar);
-    }
+#if PHI_UNDONE
+    g.leg = PHI_STRETCH;
+#if !PHI_NEAR
+    g.far = 1; /* there are no others */
+#endif
+#endif
+    status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);
+#if PHI_NEAR || PHI_UNDONE
+    while (phi_begins_again(s, &g)) status = phi_attempt(s, &g, steps, stride, rows, rows_bar, coef_bar, trail, size);
 #endif
     status = phi_settle(s, &g, steps, status);
     if (status != PHI_OK) return status;

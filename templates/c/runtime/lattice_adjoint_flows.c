@@ -1,5 +1,6 @@
 #ifndef PHI_FILE_LATTICE_ADJOINT_FLOWS
 #define PHI_FILE_LATTICE_ADJOINT_FLOWS
+#include <math.h>
 #include <string.h>
 
 #include "lattice.h"
@@ -8,6 +9,7 @@
 #include "lattice_trail.c"
 
 /* ---- The transpose of flows ---- */
+#if !PHI_UNDONE
 /* The sweep of that number in a flow; -1 if there are no more. */
 static int phi_sweep_of(const phi_solver *s, int flow, int number)
 {
@@ -26,6 +28,7 @@ static int phi_sweep_of(const phi_solver *s, int flow, int number)
 #endif
 }
 
+#endif
 /* The part of H that a sweep belongs to, from 0 on. */
 static int phi_part_of(const phi_solver *s, int sweep)
 {
@@ -42,6 +45,7 @@ static int phi_part_of(const phi_solver *s, int sweep)
 /* The sweeps that steps consist of where they are joined: without the last flow, unless that is all. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
+#if !PHI_UNDONE
 /* The numbers that a step keeps. */
 static size_t phi_numbers_kept(const phi_solver *s)
 {
@@ -87,24 +91,98 @@ static void phi_keep_steps(const phi_solver *s, size_t steps)
     }
 }
 
-/* Pull cotangents back through one sweep, x being the fields before it. */
+#endif
+/* Pull cotangents back through one sweep, x being the fields before it, or after it where it is undone. */
 static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int sweep, const double *coef, int row,
     double *const *x, double *const *bar)
 {
     size_t first, end = phi_share(phi_units(s), &first);
     phi_back_rows(s, sweep, coef, g->far, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #if PHI_HANDS
-    if (!phi_hands[phi_part_of(s, sweep)]) return;
+#if PHI_UNDONE
     phi_wait();
+#else
+    if (phi_hands[phi_part_of(s, sweep)]) phi_wait();
+#endif
+    if (!phi_hands[phi_part_of(s, sweep)]) return;
 #if PHI_GATHER
     phi_hand_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #else
     phi_hand_rows(s, sweep, x, bar, g->handed, first, end);
 #endif
     phi_wait();
+#elif PHI_UNDONE
+    phi_wait();
 #endif
 }
 
+#if PHI_UNDONE
+/* Pull cotangents back through a flow in a step after so many; s->x becomes the fields before it. */
+static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number, double *const *bar)
+{
+    const int row = number == PHI_FLOWS ? PHI_JOINED : phi_flow_rows[number];
+    phi_flow flow;
+    phi_find_flow(s, steps, number, &flow);
+    phi_sweep_back(s, g, flow.part, flow.coef, row, s->x, bar);
+}
+
+/* Pull the cotangents of all sweeps of the step after so many back, and undo them. */
+static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int joined)
+{
+    PHI_PARALLEL
+    for (int flow = PHI_OWN_FLOWS - 1; flow >= 0; --flow)
+        phi_flow_back(s, g, steps, flow == 0 && joined ? PHI_FLOWS : flow, g->bar);
+}
+
+/* The state that a leg of a segment begins with. */
+static void phi_fields_of_leg(const phi_transpose *g, size_t leg, double *fields[PHI_DIM])
+{
+    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = g->kept + (leg * PHI_DIM + f) * g->block + PHI_LEAD;
+}
+
+/* The largest value of a field, in an order that lets loops vectorise. */
+static double phi_largest_of(const phi_solver *s, const double *field)
+{
+    double lanes[8] = { 0.0 };
+    const ptrdiff_t whole = s->length - s->length % 8;
+    for (size_t r = 0; r < s->rows; ++r) {
+        const double *row = field + (ptrdiff_t)r * s->width;
+        for (ptrdiff_t i = 0; i < whole; i += 8)
+            for (int l = 0; l < 8; ++l) lanes[l] = fabs(row[i + l]) > lanes[l] ? fabs(row[i + l]) : lanes[l];
+        for (ptrdiff_t i = whole; i < s->length; ++i) lanes[0] = fabs(row[i]) > lanes[0] ? fabs(row[i]) : lanes[0];
+    }
+    for (int l = 1; l < 8; ++l) lanes[0] = lanes[l] > lanes[0] ? lanes[l] : lanes[0];
+    return lanes[0];
+}
+
+/* Whether two fields differ by so little. */
+static int phi_differ_by(const phi_solver *s, const double *one, const double *other, double most)
+{
+    int near = 1;
+    for (size_t r = 0; r < s->rows; ++r) {
+        const double *first = one + (ptrdiff_t)r * s->width, *second = other + (ptrdiff_t)r * s->width;
+        for (ptrdiff_t i = 0; i < s->length; ++i) near &= fabs(first[i] - second[i]) <= most;
+    }
+    return near;
+}
+
+/* Stand where a leg began, of which all steps have been undone, unless that is another state. */
+static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t leg)
+{
+    double *began[PHI_DIM], largest = 0.0;
+    phi_fields_of_leg(g, leg, began);
+    for (size_t f = 0; f < PHI_DIM; ++f) {
+        const double size = phi_largest_of(s, began[f]);
+        largest = size > largest ? size : largest;
+    }
+    if (!phi_all_hold(s, s->x)) return PHI_NOT_FINITE;
+    for (size_t f = 0; f < PHI_DIM; ++f)
+        if (g->leg > 1 && !phi_differ_by(s, s->x[f], began[f], PHI_ASTRAY * largest)) g->lost = 1;
+    phi_copy(s->x, began, s);
+    return g->lost ? PHI_NOT_FINITE : PHI_OK;
+}
+
+#else
 /* Pull cotangents back through a flow in a step after so many; of its sweeps kept has the fields that they change, and
    ends with them; x becomes the fields before it. Returns where what was kept before begins. */
 static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number,
@@ -150,15 +228,25 @@ static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, i
             }
 }
 
+#endif
 /* Pull the cotangent of a row back, which is the state after so many steps, and add it. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
 {
     for (size_t f = 0; f < PHI_DIM; ++f) phi_put(s, g->row_bar[f], row_bar + f * s->sites);
     PHI_PARALLEL
     {
+#if PHI_UNDONE
+        if (PHI_FLOWS > 1) {
+            phi_flow last;
+            phi_find_flow(s, steps - 1, PHI_FLOWS - 1, &last); /* which is made here, to be undone */
+            phi_sweep_part(s, last.part, last.coef, g->far);
+            phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar);
+        }
+#else
         double *x[PHI_ARRAYS];
         memcpy(x, g->x, sizeof x);
         if (PHI_FLOWS > 1) phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, NULL, x, g->row_bar);
+#endif
         size_t first, end = phi_share(phi_units(s), &first);
         for (size_t unit = first; unit < end; ++unit) {
             const phi_row row = phi_piece_of(s, unit);
@@ -172,22 +260,38 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 }
 
 /* Take the steps from done to until, of a run that has not ended before; rows, where not NULL, get the states after stride, 2 stride, ...
-   steps and at the end. What their sweeps change is kept if so wanted. */
+   steps and at the end. What the way back needs is kept if so wanted. */
 static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t until, size_t stride, size_t steps,
     double *rows, int keeping)
 {
     phi_status status = PHI_OK;
+#if PHI_UNDONE
+    const size_t begin = done;
+#else
     s->kept = keeping ? g->kept : NULL;
+#endif
     while (done < until && status == PHI_OK) {
         const size_t row = done / stride + 1, left = until - done, ahead = row * stride - done;
         const size_t most = PHI_UNASKED / s->sites + 1, wanted = rows == NULL || left < ahead ? left : ahead;
+#if PHI_UNDONE
+        const size_t leg = keeping ? g->leg - (done - begin) % g->leg : wanted, less = wanted < leg ? wanted : leg;
+        const size_t now = less < most ? less : most;
+        if (keeping && (done - begin) % g->leg == 0) {
+            double *fields[PHI_DIM];
+            phi_fields_of_leg(g, (done - begin) / g->leg, fields);
+            phi_copy(fields, s->x, s);
+        }
+#else
         const size_t now = wanted < most ? wanted : most;
+#endif
         status = phi_march(s, now);
         done += now;
         if (status == PHI_OK && phi_is_stopped(s, g, now)) status = PHI_STOPPED;
         if (status != PHI_OK || rows == NULL || (done != steps && done % stride != 0)) continue;
+#if !PHI_UNDONE
         double *const kept = s->kept;
         s->kept = NULL;
+#endif
 #if PHI_NEAR
         if (s->open && !phi_close(s)) status = PHI_NOT_FINITE;
 #else
@@ -195,9 +299,13 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
 #endif
         phi_take(s, s->x, rows + (row - 1) * PHI_DIM * s->sites);
         phi_copy(s->x, s->before, s);
+#if !PHI_UNDONE
         s->kept = kept;
+#endif
     }
+#if !PHI_UNDONE
     s->kept = NULL;
+#endif
     return status;
 }
 

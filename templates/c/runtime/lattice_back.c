@@ -27,6 +27,7 @@ static inline double phi_added(const double *values, ptrdiff_t count)
 }
 
 #endif
+#if !PHI_UNDONE
 /* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. */
 static void phi_keep_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
 {
@@ -42,6 +43,7 @@ static void phi_keep_units(const phi_solver *s, const double *from, double *to, 
 #endif
 }
 
+#endif
 #if PHI_GIVERS
 /* The rows from which a row is handed what is its own; beyond open ends a row of zeros after all others. */
 static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_LINES])

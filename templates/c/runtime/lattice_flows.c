@@ -175,7 +175,7 @@ static void phi_steps(const phi_solver *s, size_t steps)
 }
 
 #endif
-#if PHI_ADJOINT
+#if PHI_ADJOINT && !PHI_UNDONE
 static size_t phi_numbers_kept(const phi_solver *s);
 static void phi_keep_steps(const phi_solver *s, size_t steps);
 
@@ -183,7 +183,7 @@ static void phi_keep_steps(const phi_solver *s, size_t steps);
 /* Some steps from the state in s->before; if they lead to what is not finite, none. */
 static int phi_try(phi_solver *s, size_t steps)
 {
-#if PHI_ADJOINT
+#if PHI_ADJOINT && !PHI_UNDONE
     if (s->kept != NULL) phi_keep_steps(s, steps);
     else phi_steps(s, steps);
 #else
@@ -232,7 +232,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         if (phi_try(s, now)) {
             phi_copy(s->before, s->x, s);
             s->steps += now;
-#if PHI_ADJOINT
+#if PHI_ADJOINT && !PHI_UNDONE
             if (s->kept != NULL) s->kept += now * phi_numbers_kept(s);
 #endif
 #if !PHI_NOISE

@@ -18,13 +18,23 @@ typedef struct {
 #if PHI_SERIES
     double *kept;                /* of each step of a segment, and each of its stages, y and what else its transpose reads */
     double *end[PHI_DIM];        /* what steps after the last go on from */
+#elif PHI_UNDONE
+    double *kept;                /* in a segment the states that its legs begin with */
+    size_t leg;                  /* the steps of a leg */
+    int lost;                    /* whether sweeps of a leg were undone to another state than that */
+    double *end[PHI_DIM];        /* what steps after the last go on from, */
+    size_t last_far;             /* and how many of these by functions for large arguments */
 #else
     double *kept;                /* of each step of a segment, and each of its sweeps, the fields before that it changes */
     double *x[PHI_ARRAYS];       /* the fields before what was gone back through last */
     double *end[PHI_DIM];        /* what steps after the last go on from, */
     size_t last_far;             /* and how many of these by functions for large arguments */
 #endif
+#if PHI_UNDONE
+    size_t block;                /* numbers of one field */
+#else
     size_t block, of_step;       /* numbers of one field, and that a step keeps */
+#endif
     double *states;              /* what segments begin with ... */
 #if PHI_SERIES
     size_t *marks;               /* ... and of each the number of its step */
@@ -76,12 +86,32 @@ static size_t phi_state_size(const phi_solver *s)
     return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double) + 2 * sizeof(size_t);
 }
 
+#if PHI_UNDONE
+/* Sweeps are undone on the way back, leg by leg: the state that a leg begins with is kept, so what rounding adds is left behind there.
+   Where it has added much, as where fields grow fast, all is done once more with legs of one step. They are counted from
+   where the run began: segments change no bit. */
+#define PHI_ASTRAY 1e-13 /* of the largest value of all fields */
+
+/* The legs that steps from the beginning of one take. */
+static size_t phi_legs(size_t steps, size_t leg) { return steps / leg + (steps % leg > 0); }
+
+/* The bytes that a leg keeps. */
+static size_t phi_leg_size(const phi_solver *s) { return PHI_DIM * phi_block(s->rows, s->width) * sizeof(double); }
+
+size_t phi_trail_size(const phi_solver *s, size_t steps)
+{
+    const size_t of_leg = phi_leg_size(s), legs = phi_legs(steps, PHI_STRETCH);
+    if (legs > SIZE_MAX / 8 / of_leg) return 0;
+    return phi_always(s) * sizeof(double) + legs * of_leg + phi_state_size(s) + 64;
+}
+#else
 size_t phi_trail_size(const phi_solver *s, size_t steps)
 {
     const size_t of_step = phi_numbers_kept(s) * sizeof(double);
     if (steps > SIZE_MAX / 8 / of_step) return 0;
     return phi_always(s) * sizeof(double) + steps * of_step + phi_state_size(s) + 64;
 }
+#endif
 
 enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes that the caches of a core hold beside the state */
 
@@ -93,10 +123,15 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     const size_t block = phi_block(s->rows, s->width), room = size - 64 - phi_always(s) * sizeof *next;
     const size_t of_state = phi_state_size(s);
     memset(next, 0, phi_always(s) * sizeof *next);
-    memset(g, 0, sizeof *g);
     g->block = block;
+#if PHI_UNDONE
+    const size_t of_step = phi_leg_size(s); /* all is counted in legs */
+    steps = phi_legs(steps, g->leg);
+#else
     g->of_step = phi_numbers_kept(s);
-    const size_t of_step = g->of_step * sizeof *next, fit = (room - of_state) / of_step;
+    const size_t of_step = g->of_step * sizeof *next;
+#endif
+    const size_t fit = (room - of_state) / of_step;
     g->longest = steps > 0 ? steps : 1;
     if (fit < steps) {
         g->longest = of_step < PHI_BESIDE_CORE ? PHI_BESIDE_CORE / of_step : 1;
@@ -114,9 +149,12 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
 #endif
     g->states = next;
     g->kept = next + g->most * PHI_DIM * block;
-    g->sums = g->kept + g->longest * g->of_step;
+    g->sums = g->kept + g->longest * (of_step / sizeof *next);
     g->marks = (size_t *)(void *)(g->sums + phi_units(s) * PHI_SUMS);
     memset(g->sums, 0, phi_units(s) * PHI_SUMS * sizeof *next);
+#if PHI_UNDONE
+    g->longest *= g->leg;
+#endif
 }
 
 enum { PHI_UNASKED = 1 << 22 }; /* updates of sites before it is asked whether to stop */

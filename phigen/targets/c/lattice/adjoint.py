@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from phigen.lanes.lowering import Rows
 from phigen.lattice.adjoint import BACK
+from phigen.lattice.undoing import can_be_undone, undoing
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Ends, Gather, Sweep, Sweeps
@@ -31,24 +32,26 @@ from phigen.targets.rendering import render
 @dataclass(frozen=True)
 class Back:
     """How a part, or a kernel, goes back: its loops, what is called for each piece of a row in the first and in the
-    second go, and how many arrays of values are handed."""
+    second go, how many arrays of values are handed, and the fields that are undone."""
 
     loops: tuple[Loop, ...]
     first: tuple[str, ...]
     second: tuple[str, ...]
     handed: int
+    undone: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
 class _Pulled:
     """A transposed kernel, where its cotangents are, what is gathered for it, and the transposes of the kernels of
-    that; what is called before it, for pieces of rows."""
+    that; what is called before it, for pieces of rows; the fields that it undoes."""
 
     kernel: Kernel
     seeds: Seeds
     gather: Gather | None
     ends: tuple[tuple[Ends, Kernel], ...]
     before: tuple[str, ...] = ()
+    undone: tuple[int, ...] = ()
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
@@ -64,7 +67,10 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
         chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(parts))]
         setups = [(*_SETUP, *["row.chosen = colour;"] * own) for own in chosen]
     found += [loop.text(program) for part in parts for loop in part.loops]
-    back = [Case(p.first, setup, _has_ends(p.first)) for p, setup in zip(parts, setups, strict=True)]
+    back = [
+        Case(p.first, setup, _has_ends(p.first), moved=p.undone, where="x")
+        for p, setup in zip(parts, setups, strict=True)
+    ]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
     found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=bool(rows.limited)))
     where = _givers(program) if givers(step) else []
@@ -89,6 +95,7 @@ def _has_ends(calls: Sequence[str]) -> bool:
 
 def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of all sweeps of each part."""
+    undone = can_be_undone(program, layout.step)
     for number, part in enumerate(layout.step.parts, 1):
         pulled = list[_Pulled]()
         for sweep in part:
@@ -96,7 +103,9 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
             seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
             ends = tuple((e, kernels[e.kernel.name + BACK]) for e in (sweep.gather.ends if sweep.gather else ()))
             before = tuple(_gathered(program, layout, sweep))
-            pulled.append(_Pulled(kernels[sweep.kernel.name + BACK], seeds, sweep.gather, ends, before))
+            kernel = kernels[sweep.kernel.name + BACK]
+            kernel = undoing(program, layout.step, sweep, kernel) if undone else kernel
+            pulled.append(_Pulled(kernel, seeds, sweep.gather, ends, before, sweep.moved if undone else ()))
         yield _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
 
 
@@ -130,10 +139,10 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         sums = one.gather.names if one.gather else ()
         listed = handed_by(layout, one.kernel, given)
         given = max([given, *(h.array + 1 for h in listed)])
-        lines = {}
+        lines, fields = {}, [program.coordinates[f] for f in one.undone]
         for far, calls in call_forms(program, rows, [one.kernel]).items():
             own = [
-                first_loop(program, layout, kernel, form + far, one.seeds, sums, listed, given, calls)
+                first_loop(program, layout, kernel, form + far, one.seeds, sums, listed, given, calls, fields)
                 for kernel, form in forms_of(program, one.kernel)
             ]
             lines[far] = [called(call.loop, call.sites) for call in calls_over_sites(own)]
@@ -149,7 +158,8 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         loop = handing(program, layout, name, whom, beside)
         second.append(f"{program.name}_{loop.name}(&row);")
         loops.append(loop)
-    return Back(tuple(loops), tuple(first), tuple(second), given)
+    undone = sorted({f for one in pulled for f in one.undone})
+    return Back(tuple(loops), tuple(first), tuple(second), given, tuple(undone))
 
 
 def _gathered(program: Program, layout: Layout, sweep: Sweep) -> Iterator[str]:
@@ -203,7 +213,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "kernels": [f"{name.upper()} = {k}" for k, (name, *_) in enumerate(KERNELS, 1)] if step.equation else (),
         "kept": 1 + starts_are_read(step),
         "sums": _sums(program, step),
-        "keeps": ", ".join(f"{{ {row} }}" for row in rows),
+        "keeps": "" if can_be_undone(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
         "handed": max(1, *(part.handed for part in parts)) if parts else 1,
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from phigen.lattice.undoing import UNDONE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.symbols import COEFFICIENT, Symbol
@@ -63,10 +64,13 @@ def first_loop(
     handed: Sequence[Handed],
     begin: int,
     calls: Mapping[str, str],
+    moved: Sequence[str] = (),
 ) -> Loop:
-    """The first go of a kernel; cotangents of ``sums`` over bonds or pairs are handed in arrays from ``begin`` on."""
+    """The first go of a kernel; cotangents of ``sums`` over bonds or pairs are handed in arrays from ``begin`` on.
+
+    ``moved`` are the fields that it finds as they were before the sweep."""
     name, code = program.name, lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), calls, sums, {seeds.kind: seeds.pointers})
+    names = SiteNames(program, layout, kernel, code, {*moved}, calls, sums, {seeds.kind: seeds.pointers})
     head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
     used, given = {*seeds.bars}, dict[int, str]()
     places = {(h.base, h.offset): h.array for h in handed}
@@ -77,6 +81,9 @@ def first_loop(
             continue
         if store.array == "gathered_bar":
             given[begin + sums.index(kernel.inputs["gathered"][store.index])] = value
+            continue
+        if store.array == UNDONE:
+            stores.append(f"{names.pointer(moved[store.index], 0)}[i] = {value};")
             continue
         base, offset = _place(layout, kernel, store)
         number = layout.bar(base)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from phigen.lattice.adjoint import BACK
+from phigen.lattice.undoing import can_be_undone
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
@@ -146,6 +147,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "HANDS": any(hands(step)),
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
+        "UNDONE": can_be_undone(program, step),
         "GIVERS": step.adjoint is not None and givers(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,

@@ -1,0 +1,88 @@
+"""Sweeps that are undone: the fields before a flow, found from those after it by the flow over the time −h.
+
+What a sweep computes is written for −h term by term: what is odd in h changes its sign, what is even stays, so that
+sines, exponentials and forces that the transpose of the sweep reads are computed once. Flows with forces are left out:
+what these damp cannot be found again. So are bonds and pairs, whose sums take most of the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Sweep, Sweeps
+from phigen.symbolic.expression import Expression, fold, neg, rebuild, substitute, symbol, symbols_of
+from phigen.symbolic.functions import FUNCTIONS
+from phigen.symbolic.symbols import coefficient
+
+#: The output of a transpose that is the moved fields before the sweep, and the input of those that it reads for that.
+UNDONE = "undone"
+
+ODD, NEITHER, EVEN = -1, 0, 1
+
+
+def can_be_undone(program: Program, step: Sweeps) -> bool:
+    """Whether the transpose of a step finds the fields before its sweeps from those after them."""
+    if not step.adjoint or step.equation or step.partners or program.forced:
+        return False
+    parities = _of_coefficients(step)
+    used = {s for part in step.parts for sweep in part for s in symbols_of(*sweep.kernel.roots)}
+    return all(parities.get(s, EVEN) for s in used)
+
+
+def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kernel:
+    """The transpose of a sweep that reads the moved fields as they are after it, and finds what they were, `UNDONE`."""
+    moved = [program.coordinates[f] for f in sweep.moved]
+    changes = _turned_back(sweep.kernel.roots, _of_coefficients(step))
+    before = {f: symbol(f) + change for f, change in zip(moved, changes, strict=True)}
+    values = iter(substitute(back.roots, before))
+    outputs = [replace(o, values=tuple(next(values) for _ in o.values)) for o in back.outputs]
+    unread = tuple(f for f in moved if f not in back.inputs["site"])
+    return replace(
+        back,
+        inputs={**back.inputs, UNDONE: unread},
+        outputs=(*outputs, Output(UNDONE, tuple(before.values()))),
+    )
+
+
+def _of_coefficients(step: Sweeps) -> dict[str, int]:
+    """How the coefficients of a flow follow the sign of its time."""
+    found = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]
+    if step.refresh:
+        slots: dict[str, int] = {coefficient(k): parity for k, parity in enumerate(found)}
+        found += [parity for parity, _ in _parities(step.refresh.roots, slots)]
+    return {coefficient(k): parity for k, parity in enumerate(found)}
+
+
+def _turned_back(values: Sequence[Expression], parities: Mapping[str, int]) -> list[Expression]:
+    """The values over the time −h."""
+    return [turned for _, turned in _parities(values, parities)]
+
+
+def _parities(values: Sequence[Expression], of_symbols: Mapping[str, int]) -> list[tuple[int, Expression]]:
+    """Whether values are odd or even in the time, and what they are over −h; symbols that are not listed are even."""
+
+    def visit(node: Expression, args: list[tuple[int, Expression]]) -> tuple[int, Expression]:
+        parity = of_symbols.get(node.value, EVEN) if node.op == "symbol" else _parity(node, [p for p, _ in args])
+        if parity == NEITHER:
+            return parity, rebuild(node, [turned for _, turned in args])
+        return parity, node if parity == EVEN else neg(node)
+
+    return fold(values, visit)
+
+
+def _parity(node: Expression, of_args: Sequence[int]) -> int:
+    """That of a number, a sum, a product, a power or a value of a function."""
+    if all(parity == EVEN for parity in of_args):
+        return EVEN
+    first = of_args[0]
+    if node.op in ("add", "sub", "neg"):
+        return first if len({*of_args}) == 1 else NEITHER
+    if node.op == "mul":
+        return first * of_args[1]
+    if node.op == "pow":
+        return first ** int(node.value) if node.value.denominator == 1 and first else NEITHER
+    known = {"odd": ODD, "even": EVEN}.get(FUNCTIONS[node.op].parity, NEITHER) if node.op in FUNCTIONS else NEITHER
+    return known if first == ODD else NEITHER
