@@ -125,13 +125,15 @@ class _Reader:
             drawn = random.normal(size=shape) if values.random == "normal" else random.uniform(-1, 1, size=shape)
             found = float(values.scale) * drawn
         else:
-            assert values.formula is not None
-            found = np.broadcast_to(evaluate([values.formula], self.indices)[0], shape).copy()
+            found = np.zeros(shape)
+        if values.formula is not None:
+            found += evaluate([values.formula], self.indices)[0]
+        where = "parameters" if name in {p.name for p in self.spec.parameters} else "initial"
         if found.shape != shape:
             wanted, has = "×".join(map(str, shape)), "×".join(map(str, found.shape))
-            raise self._error(name if name == "initial" else "parameters", f"{name} has {has} values, not {wanted}")
+            raise self._error(where, f"{name} has {has} values, not {wanted}")
         if not np.all(np.isfinite(found)):
-            raise self._error(name if name == "initial" else "parameters", f"{name}: not all values are finite")
+            raise self._error(where, f"{name}: not all values are finite")
         return found
 
     def _loaded(self, file: str, name: str) -> Floats:

@@ -207,9 +207,9 @@ def _array(spec: Spec, run: Run, start: Start, p: Parameter) -> dict[str, Any]:
 
 
 def _given(values: Values, start: Start, name: str, spec: Spec) -> dict[str, Any]:
-    if values.random:
+    if values.random and values.formula is None:
         return {"random": values.random, "seed": values.seed, "scale": float(values.scale)}
-    if values.formula is not None:
+    if values.formula is not None and not values.random:
         return {"formula": True}
     if name in start.parameters:
         return {"listed": _listed(start.parameters[name])}
@@ -232,7 +232,7 @@ def _formulas(spec: Spec, run: Run) -> str:
     arrays = {**{p.name: _source(run, p) for p in spec.parameters}, **_initial(spec, run)}
     assert spec.lattice is not None
     indices = spec.lattice.indices
-    listed = {n: v.formula for n, v in arrays.items() if v is not None and v.formula is not None}
+    listed = {n: v.formula for n, v in arrays.items() if v is not None and v.formula is not None and not v.random}
     return ", ".join(f"{json.dumps(name)}: {_function(formula, indices)}" for name, formula in listed.items())
 
 

@@ -47,7 +47,7 @@ MATRIX = ListOf(ListOf(FORMULA, least=1), least=1)
 BASIS = Name(r"E[1-9][0-9]*", "the name of a basis element", "basis elements are E1, E2, …")
 
 RANDOM = MapOf(NAME, CONSTANT, least=1)
-#: A number, a formula of the indices or a file; a list; {random: …, seed: …, scale: …}.
+#: A number, a formula of the indices or a file; a list; {random: …, seed: …, scale: …, mean: …}.
 VALUES = Either({Scalar: CONSTANT, Sequence: ListOf(CONSTANT, least=1), Mapping: RANDOM})
 PARAMETER = Record(
     "a parameter",

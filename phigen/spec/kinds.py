@@ -11,7 +11,7 @@ are known. A value with an error is reported and reads as ``None``, which is nev
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
@@ -325,8 +325,8 @@ class Record(Kind):
         values = {}
         for name, (key, item) in node.entries.items():
             if name not in known:
-                reader.error(key, f"{self.what} has no key {shown(name)}", self._hint(name, known))
-                if meant := intended(name, known, MEANT):  # so that nobody says it is missing
+                reader.error(key, f"{self.what} has no key {shown(name)}", self._hint(name, node))
+                if meant := self._meant(name, node):  # so that nobody says it is missing
                     reader.locations.setdefault((*path, meant), key.location)
             else:
                 inner = (*path, name)
@@ -337,11 +337,20 @@ class Record(Kind):
         self.check_presence(node, reader)
         return values
 
-    def _hint(self, name: str, known: Iterable[str]) -> str:
+    def _meant(self, name: str, node: MappingNode) -> str:
+        """The key that a name which is none stands for, of those that are like it one that is not there; or ""."""
+        known = [f.key for f in self.fields]
+        found = intended(name, known, MEANT)
+        if found in node.entries and found != MEANT.get(name):
+            found = intended(name, [k for k in known if k not in node.entries], MEANT) or found
+        return found
+
+    def _hint(self, name: str, node: MappingNode) -> str:
         """What is meant by the name of a key that is none."""
-        meant = MEANT.get(name, name)
+        meant, known = MEANT.get(name, name), [f.key for f in self.fields]
         misplaced = "" if meant in known else self.elsewhere.get(name) or self.elsewhere.get(meant, "")
-        return misplaced or did_you_mean(name, known, MEANT) or self.instructions()
+        found = self._meant(name, node)
+        return misplaced or (f"did you mean {found!r}?" if found else "") or self.instructions()
 
     def instructions(self, node: Node | None = None) -> str:
         """How the mapping is written, for who wrote something else: where that is the name of a key, with this key."""
@@ -355,7 +364,7 @@ class Record(Kind):
         """Report missing keys, and keys that exclude each other."""
         known = [f.key for f in self.fields]
         strange = set(node.entries) - set(known)  # reported already
-        given = {*node.entries, *(intended(name, known, MEANT) for name in strange)}
+        given = {*node.entries, *(self._meant(name, node) for name in strange)}
         for wanted in self.fields:
             if wanted.required and wanted.key not in given:
                 reader.error(

@@ -28,11 +28,12 @@ Matrix = tuple[tuple[Expression, ...], ...]
 
 @dataclass(frozen=True)
 class Values:
-    """An array over the sites, or the bonds, of a lattice; exactly one of its sources is given.
+    """An array over the sites, or the bonds, of a lattice.
 
     ``formula`` uses the symbols of the indices and sizes, ``i`` and ``N_i``. ``listed`` is in the order of the array,
     the last axis fastest. ``file`` is a path from the folder of the spec. ``random`` names a distribution: ``normal``,
-    ``uniform`` between −1 and 1, or, for all fields of a site together, ``sphere``; it is multiplied by ``scale``.
+    ``uniform`` between −1 and 1, or, for all fields of a site together, ``sphere``; it is
+    multiplied by ``scale``, and the formula, if there is one, added. Else exactly one of these sources is given.
     """
 
     formula: Expression | None = None

@@ -33,6 +33,7 @@ def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = M
         return others[word]
     close = (
         [c for c in choices if c.lower() == word.lower()]
+        or [c for c in choices if c.startswith(f"{word}_")]
         or _numbered(word, choices)
         or difflib.get_close_matches(word, choices, n=1)
     )

@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 from phigen.spec.model import Values
-from phigen.spec.problems import one_of
+from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.yaml_source import Scalar
 
 if TYPE_CHECKING:
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 DISTRIBUTIONS = ("normal", "uniform", "sphere")
 FILES = (".npy", ".csv")
+RANDOM_KEYS = ("random", "seed", "scale", "mean")
 
 
 def values(given: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
@@ -41,9 +42,10 @@ def values(given: Any, declared: Declarations, *, whole: bool = False) -> Values
 def _random(given: Mapping[str, Any], declared: Declarations, whole: bool) -> Values | None:
     reader, read = declared.reader, {key: node for key, (_, node) in given.items()}
     for key, (node, _) in given.items():
-        if key not in ("random", "seed", "scale"):
-            reader.error(node, f"random values have no key {key!r}", "keys: random, seed, scale")
-    kind, seed, scale = read.get("random"), read.get("seed"), read.get("scale")
+        if key not in RANDOM_KEYS:
+            hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
+            reader.error(node, f"random values have no key {shown(key)}", hint)
+    kind, seed, scale, mean = map(read.get, RANDOM_KEYS)
     if not isinstance(kind, Scalar):
         first = next(iter(given.values()))[0] if given else None
         return first and reader.error(first, "values are a number, a formula, a list, or {random: …, seed: …}")
@@ -53,5 +55,9 @@ def _random(given: Mapping[str, Any], declared: Declarations, whole: bool) -> Va
         return reader.error(kind, "random: sphere is for all fields of a site together", "initial: {random: sphere}")
     if seed is not None and not (isinstance(seed, Scalar) and seed.text.isdigit() and len(seed.text) < 10):
         return reader.error(seed, "seed: expected a whole number below 10⁹")
+    if mean is not None and kind.text == "sphere":
+        return reader.error(mean, "mean: a sphere is that around 0")
     factor = declared.number(scale, declared.numbers()) if isinstance(scale, Scalar) else Fraction(1)
-    return Values(random=kind.text, seed=int(seed.text) if seed else 0, scale=factor or Fraction(1))
+    around = declared.formula(mean, declared.site_numbers()) if isinstance(mean, Scalar) else None
+    number = int(seed.text) if seed else 0
+    return Values(random=kind.text, seed=number, scale=factor or Fraction(1), formula=around)

@@ -167,9 +167,11 @@ def _parameter(p: Parameter) -> str:
 def _values(values: Values) -> str:
     if values.listed:
         return f"[{', '.join(map(_number, values.listed))}]"
-    if values.formula is not None:
-        return _quoted(infix(values.formula))
-    return values.file or f"{{random: {values.random}, seed: {values.seed}, scale: {_number(values.scale)}}}"
+    formula = _quoted(infix(values.formula)) if values.formula is not None else ""
+    if values.random:
+        mean = f", mean: {formula}" if formula else ""
+        return f"{{random: {values.random}, seed: {values.seed}, scale: {_number(values.scale)}{mean}}}"
+    return values.file or formula
 
 
 def _run(run: Run) -> Iterator[str]:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fractions import Fraction
 
+import numpy as np
 import pytest
 
 from phigen.errors import LimitError, SpecError
+from phigen.lattice.states import start_of
 from phigen.spec import loads
 from phigen.spec.model import MatrixForm, Values
 from phigen.spec.quoting import quoted
@@ -68,6 +71,10 @@ def test_initial_values_are_formulas_of_the_indices_or_random() -> None:
     assert run.sizes == (16,)
     assert run.state["a"] == Values(formula=number(1) + symbol("i") / symbol("N_i"))
     assert run.state["b"] == Values(random="normal", seed=3, scale=Fraction(1, 10))
+    around = loads(TODA.replace("scale: 0.1", "scale: 0.1, mean: 2*i"))
+    assert around.runs["waves"].lattice.state["b"] == replace(run.state["b"], formula=2 * symbol("i"))
+    drawn = [start_of(spec, spec.runs["waves"]).state[1] for spec in (loads(TODA), around)]
+    np.testing.assert_allclose(drawn[1] - drawn[0], 2 * np.arange(16))
 
 
 def test_graphs_have_densities_of_sites_and_bonds_and_brackets_along_bonds() -> None:
