@@ -24,16 +24,25 @@ _HINT = "that of a spin has one where H is linear or quadratic along an axis in 
 
 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """The flows of damping. `SpecError` that says why there are none in closed form."""
+    """The flows of damping. `SpecError` that says why there are none in closed form; `TogetherError` by the colours."""
     try:
         return tuple(_flows(cell, colouring))
     except _NoFlowError as error:
         message = f"scheme splitting: the damping has no elementary flow on the lattice: {error}"
-        raise SpecError([Diagnostic(message, host.locations.get(("damping",)), _HINT)]) from None
+        kind = TogetherError if isinstance(error, _TogetherError) else SpecError
+        raise kind([Diagnostic(message, host.locations.get(("damping",)), _HINT)]) from None
+
+
+class TogetherError(SpecError):
+    """With these colours neighbours are damped together; with others they may not be."""
 
 
 class _NoFlowError(Exception):
     """The text says what is in the way."""
+
+
+class _TogetherError(_NoFlowError):
+    """Colours are in the way."""
 
 
 def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
@@ -41,6 +50,7 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
         raise _NoFlowError("brackets couple sites" if not cell.is_local else "every site is a neighbour of all others")
     still, rest = _slopes(cell)
     sums = _sums(cell)
+    _flow(cell, still, [0], sums)  # what has no flow has none by any colours
     for colour in _colours(cell, colouring, still):
         yield _flow(cell, still, [colour], sums)
     if any(not e.is_zero for e in rest.values()):
@@ -83,7 +93,7 @@ def _colours(cell: Cell, colouring: Colouring, still: Covector) -> list[int | No
     if not reached:
         return [None] if colouring.count > 1 else [0]
     if any(colouring.at(0, offset) == 0 for offset in reached):
-        raise _NoFlowError("neighbours are damped together, which colours of sites must forbid")
+        raise _TogetherError("neighbours are damped together, whatever the colours of sites")
     return [*range(colouring.count)]
 
 

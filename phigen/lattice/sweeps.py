@@ -12,6 +12,7 @@ from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
 from phigen.lattice.building import MisfitError, least_sizes, misfits
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
+from phigen.lattice.damping import TogetherError
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
 from phigen.lattice.kernels import site_kernel
 from phigen.lattice.kicks import cell_kicks
@@ -159,9 +160,7 @@ def _coloured(
     for parts in splittings(cell, host.locations.get(("hamiltonian",)), search):
         try:
             made = parts, force_flows(cell, parts.colouring, host)
-        except SpecError as error:
-            if cell.forces.damping is None:  # the flows of other forces are the same whatever the colours
-                raise
+        except TogetherError as error:
             refused = refused or error
             continue
         wrong = misfits(spec, cell.axes, parts.colouring.periods(cell.boundary)) if spec else []

@@ -370,6 +370,12 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
         (TEXTS["bath"].replace("hamiltonian: x,", 'hamiltonian: "x*x[i+1]",'), "names no neighbours"),
         (f"order: 4\n{TEXTS['bath']}", "a step is not composed of others"),
         ("scheme: splitting\n" + TEXTS["damped"].replace("damping: l", "damping: l*z"), "damping has no elementary"),
+        # with any colours, but it is not these that are in the way; and what colours cannot part
+        (f"scheme: splitting\nlattice: {{axes: [i]}}\ndamping: 0.1\n{CANONICAL}"
+         'hamiltonian: "q*q[i+1] + (q**2 + p**2)**2"',
+         "on the lattice: phigen cannot solve the equation of q"),
+        (f"scheme: splitting\nlattice: {{axes: [i]}}\ndamping: 0.1\n{SPINS}"
+         'hamiltonian: "-x*x[i+1] - x*x[i+2] - z*z[i+3] - y*y[i+4]"', "neighbours are damped together"),
         (TEXTS["free"].replace("hamiltonian: x,", "hamiltonian: x*y + z**3,"), "needs the flow of the noise x"),
         ("damping: 0.1\nlattice: {graph: b}\ncoordinates: [x]\npoisson: {bonds: {'x[a]': {'x[b]': 1}}}\n"
          "hamiltonian: {sites: x**2}", "damping: not with brackets along bonds"),
