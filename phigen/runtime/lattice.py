@@ -580,7 +580,19 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         if error.members:
             where += f" for {len(error.members)} member(s) of the ensemble ({', '.join(map(str, error.members[:5]))})"
         advice = "the state left the range of the formulas; a smaller step helps, unless the solution ends here"
+        if error.step == 0 and error.status == "NOT_FINITE" and (so_far is not None or not self.interface.time):
+            advice = self._undefined(error.states[-1], values, None if so_far is None else float(so_far.t[0])) or advice
         return StepError(f"{name}: {where}: {error.status}, {advice}", **told)
+
+    def _undefined(self, x: Floats, values: Mapping[str, Any], t: float | None) -> str:
+        """At which site H is not finite, "" if it is everywhere."""
+        density = self.density(x, t if self.interface.time else None, parameters=values)
+        sites = np.argwhere(~np.isfinite(density))
+        if not len(sites):
+            return ""
+        site = tuple(sites[0].tolist())
+        there = ", ".join(f"{f} = {float(x[(k, *site)])!r}" for k, f in enumerate(self.coordinates))
+        return f"since H is not finite at the start: at the site ({', '.join(map(str, site))}), where {there}"
 
     def _trajectory(self, t: Floats, x: Floats, energy: Floats, steps: int, at: Beginning) -> LatticeTrajectory:
         about = self.interface

@@ -133,7 +133,8 @@ class NumpyLatticeSession:
 
     def density(self) -> Floats:
         """The density of H at the sites (*sizes)."""
-        return np.asarray(self._module._energy(self._sites.parameters, self._x, self._sites)[0])
+        with np.errstate(all="ignore"):  # what is not finite says so
+            return np.asarray(self._module._energy(self._sites.parameters, self._x, self._sites)[0])
 
     def casimirs(self) -> Floats:
         """The densities of the Casimirs (Casimirs, *sizes)."""

@@ -94,7 +94,8 @@ def value_and_terms(
 ) -> tuple[Floats, Floats]:
     """Q and Σ |x_i ∂_i Q|, at one state or at each of a trajectory."""
     value, *slopes = evaluate([quantity, *gradient(quantity, coordinates)], values)
-    return value, np.asarray(sum(np.abs(values[c] * slope) for c, slope in zip(coordinates, slopes, strict=True)))
+    with np.errstate(all="ignore"):
+        return value, np.asarray(sum(np.abs(values[c] * slope) for c, slope in zip(coordinates, slopes, strict=True)))
 
 
 def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:

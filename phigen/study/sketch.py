@@ -93,7 +93,8 @@ class Sketch:
         first = self._peaks["first"]
         windows = (numbered[:, 0] * WINDOWS // max(self._of, 1)).astype(np.int64).clip(0, WINDOWS - 1)
         for k, values in enumerate(numbered[:, self._quantities].T):
-            errors = np.abs(values - first[self._quantities][k])
+            with np.errstate(invalid="ignore"):  # ∞ − ∞
+                errors = np.abs(values - first[self._quantities][k])
             for window in np.unique(windows):
                 part = np.flatnonzero(windows == window)
                 best = part[np.argmax(errors[part])]

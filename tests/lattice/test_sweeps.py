@@ -500,6 +500,15 @@ def test_a_failing_step_leaves_the_state_before_it() -> None:
     assert len(run) >= 1
 
 
+def test_a_start_where_h_is_not_defined_is_said_with_its_site() -> None:
+    x = np.ones((1, 8))
+    x[0, 5] = -1.5
+    text = "lattice: {axes: [i]}\ncoordinates: [a]\nhamiltonian: a + log(a)**2\n"
+    made = compile_text(f'{text}poisson: {{brackets: {{a: {{"a[i+1]": "a*a[i+1]"}}}}}}\n')
+    with pytest.raises(StepError, match=r"H is not finite at the start: at the site \(5\), where a = -1.5"):
+        lattice_solver_of(made, "numpy").integrate(x, 0.1, 2)
+
+
 @pytest.mark.parametrize(
     ("x", "more", "error", "said"),
     [
