@@ -7,7 +7,6 @@ import pytest
 from support import run, tool
 
 from phigen import resources
-from phigen.targets.c.amalgamation import one_stage
 from phigen.targets.c.layout import WIDTH, fitted
 
 BY_HAND = Path(__file__).with_name("pendulum_by_hand")
@@ -130,30 +129,6 @@ def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
 def test_attitudes_compile_with_every_kind_of_group(more, tmp_path):
     switches = defined(("NEWTON", "COMPOSED", "FAST", "ATTITUDE", "ATTITUDES", *more))
     run([tool("gcc"), *STRICT, "-fsyntax-only", *switches, *INCLUDED, RUNTIME / "runtime.c"], tmp_path)
-
-
-def test_one_stage_leaves_no_loops_over_stages():
-    several = """\
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        phi_prepare(phi_fractions[stage] * h, s->coef[stage]);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        for (int stage = 0; stage < PHI_STAGES; ++stage) phi_fit(s, stage);
-        x[0] = model.stage[0].y[0];
-    }
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        if (good) {
-            again(s->history[stage].count, stage, h);
-        }
-    done();"""
-    one = """\
-    phi_prepare(h, s->coef);
-    phi_fit(s);
-    x[0] = model.stage.y[0];
-    if (good) {
-        again(s->history.count, h);
-    }
-    done();"""
-    assert "\n".join(one_stage(several.split("\n"))) == one
 
 
 def test_long_lines_are_broken_where_a_reader_would():

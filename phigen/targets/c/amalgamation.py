@@ -2,7 +2,8 @@
 
 The files of ``templates/c/runtime`` are C99 as they lie there, with the prefix ``phi_`` and with switches and sizes
 (``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. What a reader of the output should not see is resolved here, as a
-preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards. All other directives stay.
+preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards, and macros that files in ``macros``
+define. All other directives stay.
 """
 
 from __future__ import annotations
@@ -12,22 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen import resources
-
-#: Loops over stages, arrays with a place for each, and arguments that say which: what a solver with one stage lacks.
-_FORTH, _BACK = r"0; stage < PHI_STAGES; \+\+stage", "PHI_STAGES - 1; stage >= 0; --stage"
-_OVER_STAGES = re.compile(rf"^( *)for \(int stage = (?:{_FORTH}|{_BACK})\)(?: (.*))?$")
-_ONE_STAGE = (
-    (re.compile(r"phi_fractions\[stage\] \* |PHI_STAGES \* | \+ stage \* PHI_ROW"), ""),
-    (re.compile(r"\[(?:stage|PHI_STAGES)\]"), ""),
-    (re.compile(r"((?:->|\.)(?:coef|history|stage|use_recurrences|weight))\[0\]"), r"\1"),
-    (re.compile(r", (?:int )?stage(?=[,)])"), ""),
-    (re.compile(r"&models->stage\b|\b(?:this|next)_stage(?=->)"), "model"),
-    (re.compile(r"\bmodels(->|\.)stage\."), r"model\1"),
-    (re.compile(r"\bmodels\.stage\b|\bmodels(?=[;,)])"), "model"),
-    (re.compile(r"\bphi_models\b"), "phi_model"),
-)
-#: What holds the stages of a step, and says which is meant: one stage is the step.
-_STAGES = re.compile(r"typedef struct \{ phi_model stage\[PHI_STAGES\]; \}| *phi_model \*this_stage = ")
 
 #: Loops over the rows of a lattice, and places in them: what a lattice with one axis lacks.
 _OVER_ROWS = re.compile(r"^( *)for \(size_t r = 0; r < s->rows; \+\+r\)(?: (.*))?$")
@@ -54,6 +39,23 @@ _NEVER_FAR = (
 )
 
 
+_NAME = re.compile(r"\bPHI_\w+")
+_DEFINITION = re.compile(r"#define (\w+)(?:\(([^)]*)\))?(?: (.*))?$")
+
+
+@dataclass(frozen=True)
+class Macro:
+    """What ``text`` a name stands for; ``parameters`` are None where it is used without any."""
+
+    parameters: tuple[str, ...] | None
+    text: str
+
+    def of(self, arguments: Sequence[str]) -> str:
+        """The text for arguments; ValueError if they are too many or too few."""
+        given = dict(zip(self.parameters or (), arguments, strict=True))
+        return re.sub(r"\b\w+\b", lambda word: given.get(word[0], word[0]), self.text) if given else self.text
+
+
 @dataclass
 class Amalgam:
     """What is put together: ``switches`` by their names, ``printed`` files by theirs; ``headers`` of the library."""
@@ -63,6 +65,7 @@ class Amalgam:
     printed: Mapping[str, str]
     headers: set[str] = field(default_factory=set)
     _defined: set[str] = field(default_factory=set)
+    _macros: dict[str, Macro] = field(default_factory=dict)
 
     def text(self, file: str) -> str:
         """The file with all that it includes and that was not included before."""
@@ -77,14 +80,16 @@ class Amalgam:
         lines: list[str] = []
         own: list[str] = []
         for line in self._selected((resources.templates() / "c/runtime" / file).read_text(encoding="utf-8")):
-            if line.startswith('#include "'):
-                lines += [*self._own(own), *self._expanded(line.split('"')[1])]
+            if file.startswith("macros/"):
+                self.define(line)
+            elif line.startswith('#include "'):
+                lines += [*self.own(own), *self._expanded(line.split('"')[1])]
                 own = []
             elif line.startswith("#include <"):
                 self.headers.add(line)
             else:
                 own.append(line)
-        return [*lines, *self._own(own)]
+        return [*lines, *self.own(own)]
 
     def _selected(self, text: str) -> list[str]:
         """The lines that the switches choose."""
@@ -123,9 +128,14 @@ class Amalgam:
     def _switch(self, text: str) -> bool:
         return self.switches[text.removeprefix("!").removeprefix("PHI_")] != text.startswith("!")
 
-    def _own(self, lines: Sequence[str]) -> list[str]:
-        """Lines of the runtime with the prefix of the solver."""
-        kept = lines if self.switches["COMPOSED"] else one_stage(lines)
+    def define(self, line: str) -> None:
+        """Keep the macro, if the line defines one."""
+        if found := _DEFINITION.match(line):
+            self._macros[found[1]] = Macro(tuple(found[2].split(", ")) if found[2] else None, found[3] or "")
+
+    def own(self, lines: Sequence[str]) -> list[str]:
+        """Lines of the runtime with what macros stand for, and with the prefix of the solver."""
+        kept = [self._expanded_line(line) for line in self._without_heads(lines)]
         kept = _without_loops(kept, _OVER_ROWS, _ONE_ROW) if self.switches.get("ONE_ROW") else kept
         left_out = [*(() if self.switches.get("NEAR", True) else _NEVER_FAR)]
         left_out += () if self.switches.get("HALO", True) else _NO_HALO
@@ -133,10 +143,40 @@ class Amalgam:
             kept = [pattern.sub(text, line) for line in kept]
         return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
 
+    def _without_heads(self, lines: Sequence[str]) -> list[str]:
+        """The lines without loops whose heads are macros that stand for nothing."""
+        nothing = [name for name, macro in self._macros.items() if macro == Macro(None, "")]
+        over = re.compile(rf"^( *)(?:{'|'.join(nothing)})(?: (.*))?$")
+        return _without_loops(lines, over, ()) if nothing else [*lines]
 
-def one_stage(lines: Sequence[str]) -> list[str]:
-    """The lines for a solver with one stage: no loops over stages, no arrays of one."""
-    return _without_loops([line for line in lines if not _STAGES.match(line)], _OVER_STAGES, _ONE_STAGE)
+    def _expanded_line(self, line: str) -> str:
+        """The line with what macros stand for. A comma, or nothing, has no blank before it."""
+        at = 0
+        while found := _NAME.search(line, at):
+            macro = self._macros.get(found[0])
+            at = found.end()
+            if macro is None:
+                continue
+            arguments, after = ([], at) if macro.parameters is None else _arguments(line, at)
+            text, at = macro.of(arguments), found.start()
+            before = line[:at].rstrip(" ") if text[:1] in ("", ",") else line[:at]
+            line, at = before + text + line[after:], len(before)
+        return line
+
+
+def _arguments(line: str, at: int) -> tuple[list[str], int]:
+    """The arguments of a macro in parentheses, and where these end; ValueError where the line has no such."""
+    if line[at : at + 1] != "(":
+        raise ValueError(f"a macro without its arguments: {line.strip()}")
+    found, depth, begin = [], 0, at + 1
+    for k in range(at, len(line)):
+        depth += (line[k] in "([") - (line[k] in ")]")
+        if depth == 0 or (depth == 1 and line[k] == ","):
+            found.append(line[begin:k].strip())
+            begin = k + 1
+        if depth == 0:
+            return found, k + 1
+    raise ValueError(f"a macro whose arguments do not end on its line: {line.strip()}")
 
 
 def _without_loops(

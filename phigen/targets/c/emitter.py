@@ -42,7 +42,7 @@ Sizes = list[tuple[str, int, str]]
 def emit(program: Program, command: str, *, single_file: bool = False) -> dict[str, str]:
     """File names and their contents; with ``single_file`` only `NAME.c`, which then needs no header."""
     name, lines = program.name, header_lines(program, command)
-    amalgam, header, code = _amalgam(program)
+    amalgam, header, code = runtime_of(program)
     written = single if program.single else str
     declared = written(amalgam.text(header)) + "\n#ifdef __cplusplus\n}\n#endif\n"
     defined = _unrestricted(program, written(amalgam.text(code)))
@@ -64,7 +64,7 @@ def _unrestricted(program: Program, code: str) -> str:
     return render("c", "restrict.c", {"code": code.strip()})
 
 
-def _amalgam(program: Program) -> tuple[Amalgam, str, str]:
+def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     """What is put together, and the files of the runtime to begin with: of a header, and of the code."""
     lanes = in_lanes(program)
     has = switches(program, lanes)

@@ -42,7 +42,7 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
     size_t at = steps; /* the step that s is before */
     memset(g.after, 0, sizeof g.after);
     memset(g.change, 0, sizeof g.change);
-    for (size_t left = PHI_STAGES * steps; left > 0 && status == PHI_OK;) {
+    for (size_t left = PHI_ALL_STAGES(steps); left > 0 && status == PHI_OK;) {
         const int count = left < PHI_LANES ? (int)left : PHI_LANES;
         for (int lane = PHI_LANES - 1; lane >= 0; --lane) { /* lanes without a stage of their own repeat the last */
             const size_t k = left - (size_t)count + (size_t)(lane < count ? lane : count - 1);
@@ -52,7 +52,7 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
             phi_load(&g, lane, s, stage, trail[k / PHI_STAGES][stage]);
 #else
             for (; at > k; --at) phi_go_back(s);
-            for (int stage = 0; stage < PHI_STAGES; ++stage) phi_load(&g, lane, s, stage, trail[k][stage]);
+            PHI_EACH_STAGE phi_load(&g, lane, s PHI_AND_STAGE, PHI_OF(trail[k], stage));
 #endif
         }
         phi_linearise_back(&g);
@@ -64,7 +64,7 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
             status = phi_through(&g, lane, bar, bar->coef[stage]);
 #else
             phi_join(bar, rows_bar, k + 1, steps, stride);
-            for (int stage = 0; stage < PHI_STAGES; ++stage) status = phi_through(&g, lane, bar, bar->coef[stage]);
+            PHI_EACH_STAGE status = phi_through(&g, lane, bar, PHI_OF(bar->coef, stage));
 #endif
         }
         for (int lane = count; lane < PHI_LANES; ++lane) g.wrong[lane] = HUGE_VAL;
@@ -73,7 +73,7 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
 #if PHI_COMPOSED
             phi_gather(&g, slopes, lane, bar->coef[(left - (size_t)count + (size_t)lane) % PHI_STAGES]);
 #else
-            phi_gather(&g, slopes, lane, bar->coef[0]);
+            phi_gather(&g, slopes, lane, bar->coef);
 #endif
         left -= (size_t)count;
     }
@@ -87,18 +87,18 @@ static phi_status phi_back_step(phi_solver *s, phi_kept trail, phi_cotangent *ba
     phi_status status = PHI_OK;
     phi_go_back(s);
 #if PHI_SPLITTING
-    status = phi_stage_adjoint(s->coef[0], trail, bar, bar->coef[0]);
+    status = phi_stage_adjoint(s->coef, trail, bar, bar->coef);
 #else
-    for (int stage = PHI_STAGES - 1; stage >= 0; --stage)
-        if (status == PHI_OK) status = phi_stage_adjoint(s->coef[stage], trail[stage], bar, bar->coef[stage]);
+    PHI_EACH_STAGE_BACK
+        if (status == PHI_OK) status = phi_stage_adjoint(PHI_OF(s->coef, stage), PHI_OF(trail, stage), bar, PHI_OF(bar->coef, stage));
 #endif
 #if PHI_RENEWED
 #if PHI_SPLITTING
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k)
-        phi_early(s->coef[0] + k * PHI_ROW, bar->coef[0] + k * PHI_ROW, s->t + phi_moments[k] * s->h);
+        phi_early(s->coef + k * PHI_ROW, bar->coef + k * PHI_ROW, s->t + phi_moments[k] * s->h);
 #else
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        phi_early(s->coef[stage], bar->coef[stage], s->t + phi_middles[stage] * s->h);
+    PHI_EACH_STAGE
+        phi_early(PHI_OF(s->coef, stage), PHI_OF(bar->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h);
 #endif
 #endif
     return status;
@@ -121,15 +121,15 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
 /* The trail of the last steps, from what the solver remembers of them. 0 if it does not remember all. */
 static int phi_remembered(const phi_solver *s, size_t steps, phi_kept *trail)
 {
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        const phi_history *history = &s->history[stage];
+    PHI_EACH_STAGE {
+        const phi_history *history = &PHI_OF(s->history, stage);
 #if PHI_RECURRENCES
         const size_t count = (size_t)history->count;
         if (count < steps) return 0;
-        for (size_t k = 0; k < steps; ++k) memcpy(trail[k][stage], history->past[count - steps + k], sizeof s->x);
+        for (size_t k = 0; k < steps; ++k) memcpy(PHI_OF(trail[k], stage), history->past[count - steps + k], sizeof s->x);
 #else
         if (steps > 1) return 0;
-        memcpy(trail[0][stage], history->difference[0], sizeof s->x);
+        memcpy(PHI_OF(trail[0], stage), history->difference[0], sizeof s->x);
 #endif
     }
     return 1;
@@ -214,7 +214,7 @@ static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, ph
 #endif
 #if PHI_SPLITTING
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
-        const double *own = bar->coef[0] + k * PHI_ROW;
+        const double *own = bar->coef + k * PHI_ROW;
 #if PHI_KICKS
         const double kick[1] = { phi_multiples[k] * (s->h * s->h) };
         phi_prepare_adjoint(&s->params, phi_times[k] * s->h, kick, own, found);
@@ -224,13 +224,13 @@ static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, ph
         phi_prepare_adjoint(&s->params, phi_times[k] * s->h, own, found);
 #endif
 #else
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    PHI_EACH_STAGE {
 #if PHI_MONITOR
-        phi_prepare_adjoint(&s->params, s->gauge, phi_fractions[stage] * s->h, bar->coef[stage], found, level);
+        phi_prepare_adjoint(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found, level);
 #elif PHI_GAUGE
-        phi_prepare_adjoint(&s->params, s->gauge, phi_fractions[stage] * s->h, bar->coef[stage], found);
+        phi_prepare_adjoint(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found);
 #else
-        phi_prepare_adjoint(&s->params, phi_fractions[stage] * s->h, bar->coef[stage], found);
+        phi_prepare_adjoint(&s->params, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found);
 #endif
 #endif
         for (size_t i = 0; i < sizeof(phi_params) / sizeof(double); ++i) sums[i] += found[i];

@@ -206,12 +206,12 @@ static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFIC
 }
 
 /* Load a stage of the step that at is before, into a lane. */
-static void phi_load(phi_traced *g, int lane, const phi_solver *at, int stage, const double y[PHI_DIM])
+static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_STAGE, const double y[PHI_DIM])
 {
     for (int i = 0; i < PHI_DIM; ++i) g->y[i][lane] = y[i];
-    for (int k = 0; k < PHI_COEFFICIENTS; ++k) g->coef[k][lane] = at->coef[stage][k];
+    for (int k = 0; k < PHI_COEFFICIENTS; ++k) g->coef[k][lane] = PHI_OF(at->coef, stage)[k];
 #if PHI_RENEWED
-    g->t[lane] = at->t + phi_middles[stage] * at->h;
+    g->t[lane] = at->t + PHI_OF(phi_middles, stage) * at->h;
 #endif
 }
 

@@ -19,7 +19,7 @@
    stage. */
 typedef struct {
     double x[PHI_DIM];
-    double coef[PHI_STAGES][PHI_COEFFICIENTS];
+    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];
 #if PHI_PATH
     double end[PHI_DIM]; /* where the state was that x belongs to */
 #endif
@@ -30,7 +30,7 @@ typedef struct {
 #if PHI_SPLITTING
 typedef double phi_kept[PHI_FLOWS][PHI_DIM];
 #else
-typedef double phi_kept[PHI_STAGES][PHI_DIM];
+typedef double PHI_OF(phi_kept, PHI_STAGES)[PHI_DIM];
 #endif
 
 #if PHI_PATH

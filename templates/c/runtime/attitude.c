@@ -205,15 +205,15 @@ static void phi_turn_by(phi_solver *s, const double factor[PHI_ELEMENT])
 
 #if PHI_IMPLICIT
 /* The element of a stage that was solved by y. */
-static inline void phi_turn_stage(phi_solver *s, int stage, const double y[PHI_DIM])
+static inline void phi_turn_stage(phi_solver *s PHI_AND_INT_STAGE, const double y[PHI_DIM])
 {
     double factor[PHI_ELEMENT];
 #if PHI_TURNED_BY_COVECTOR
     double p[PHI_COVECTOR];
-    phi_turn(s->coef[stage], y, p);
+    phi_turn(PHI_OF(s->coef, stage), y, p);
     phi_matrix_exponential(p, factor);
 #else
-    phi_turn(s->coef[stage], y, factor);
+    phi_turn(PHI_OF(s->coef, stage), y, factor);
 #endif
     phi_turn_by(s, factor);
 }

@@ -16,8 +16,8 @@ enum { PHI_PAST = 8 }; /* slopes that a step by Adams' method goes on from */
 #endif
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
 typedef struct {
-    int fits[PHI_STAGES]; /* the fit that weight is of; -1 for none */
-    phi_lanes coef[PHI_STAGES][PHI_COEFFICIENTS], weight[PHI_STAGES][PHI_WINDOW][PHI_DIM];
+    int PHI_OF(fits, PHI_STAGES); /* the fit that weight is of; -1 for none */
+    phi_lanes PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS], PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM];
 #if PHI_COMPOSED && !PHI_PATH
     int marching; /* whether the last steps were a block, with these slopes */
     double slope[PHI_PAST + PHI_LANES][PHI_DIM]; /* where steps begin, the last one last */
@@ -25,16 +25,16 @@ typedef struct {
 } phi_table;
 
 /* phi_near for the points of all stages and lanes, seen from one value. */
-static int phi_near_lanes(phi_models *models, const double last[PHI_DIM])
+static int phi_near_lanes(phi_model *model, const double last[PHI_DIM])
 {
     phi_lanes most = { 0.0 };
     double size = 0.0;
     for (int i = 0; i < PHI_DIM; ++i) size += fabs(last[i]);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    PHI_EACH_STAGE {
         phi_lanes distance = { 0.0 };
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane) distance[lane] += fabs(models->stage[stage].y[i][lane] - last[i]);
+            for (int lane = 0; lane < PHI_LANES; ++lane) distance[lane] += fabs(PHI_IN(model, stage, y)[i][lane] - last[i]);
         }
         phi_keep_largest(most, distance);
     }
@@ -42,14 +42,14 @@ static int phi_near_lanes(phi_models *models, const double last[PHI_DIM])
 }
 
 /* Bring the table of a stage up to date: coefficients, and weights that were fitted since. */
-static void phi_refresh(const phi_solver *s, int stage, phi_table *table)
+static void phi_refresh(const phi_solver *s PHI_AND_INT_STAGE, phi_table *table)
 {
-    if (table->fits[stage] == s->history[stage].fits) return;
-    table->fits[stage] = s->history[stage].fits;
+    if (PHI_OF(table->fits, stage) == PHI_OF(s->history, stage).fits) return;
+    PHI_OF(table->fits, stage) = PHI_OF(s->history, stage).fits;
     for (int k = 0; k < PHI_COEFFICIENTS; ++k)
-        for (int lane = 0; lane < PHI_LANES; ++lane) table->coef[stage][k][lane] = s->coef[stage][k];
-    memcpy(table->weight[stage], s->history[stage].weight,
-        (size_t)s->history[stage].recurrence_terms * PHI_DIM * sizeof(phi_lanes));
+        for (int lane = 0; lane < PHI_LANES; ++lane) PHI_OF(table->coef, stage)[k][lane] = PHI_OF(s->coef, stage)[k];
+    memcpy(PHI_OF(table->weight, stage), PHI_OF(s->history, stage).weight,
+        (size_t)PHI_OF(s->history, stage).recurrence_terms * PHI_DIM * sizeof(phi_lanes));
 }
 
 #if PHI_RENEWED
@@ -58,12 +58,12 @@ static void phi_renew_lanes(const phi_solver *s, phi_table *table)
 {
     const double done = (double)(s->steps - s->steps_before_h);
     double now[PHI_COEFFICIENTS - PHI_PREPARED];
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    PHI_EACH_STAGE {
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double t = s->t_before_h + (done + lane) * s->h;
-            phi_at_time(s->coef[stage], t + phi_middles[stage] * s->h, now);
+            phi_at_time(PHI_OF(s->coef, stage), t + PHI_OF(phi_middles, stage) * s->h, now);
             for (int k = PHI_PREPARED; k < PHI_COEFFICIENTS; ++k)
-                table->coef[stage][k][lane] = now[k - PHI_PREPARED];
+                PHI_OF(table->coef, stage)[k][lane] = now[k - PHI_PREPARED];
         }
     }
 }
@@ -231,12 +231,12 @@ static void phi_go_on(phi_model *model, phi_model *before, double part)
 
 /* Guesses where no recurrence is known. From the beginnings of all steps on each lane makes the stages of its own step, by
    iteration. */
-static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_models *models)
+static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes begin[PHI_DIM];
     phi_march(s, table, begin);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        phi_model *this_stage = &models->stage[stage];
+        phi_model *this_stage = model + stage;
         memcpy(this_stage->y, begin, sizeof begin);
         if (stage > 0) phi_go_on(this_stage, this_stage - 1, 0.5 * phi_fractions[stage] / phi_fractions[stage - 1]);
         for (int meeting = 0; meeting < PHI_MEETINGS; ++meeting) {
@@ -267,7 +267,7 @@ static void phi_from_means(phi_lanes coef[restrict], phi_model *model)
 
 /* Guesses where no recurrence is known: where alpha and beta have the means of steps by the classical Runge-Kutta
    method, to leading order. */
-static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_models *models)
+static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
     double x[PHI_DIM], mean[PHI_DIM];
 #if PHI_TIMED
@@ -277,55 +277,54 @@ static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_models
 #if PHI_COMPOSED
     for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
         const int lane = k / PHI_STAGES;
-        const double h = phi_fractions[k % PHI_STAGES] * s->h;
-        phi_model *this_stage = &models->stage[k % PHI_STAGES];
+        const int stage = k % PHI_STAGES;
+        const double h = phi_fractions[stage] * s->h;
 #else
-    phi_model *this_stage = &models->stage[0];
     const double h = s->h;
     for (int lane = 0; lane < PHI_LANES; ++lane) {
 #endif
-        for (int i = 0; i < PHI_DIM; ++i) this_stage->y[i][lane] = x[i];
+        for (int i = 0; i < PHI_DIM; ++i) PHI_IN(model, stage, y)[i][lane] = x[i];
 #if PHI_TIMED
         phi_runge_kutta(s, begin, h, x, mean);
         begin += h;
 #else
         phi_runge_kutta(s, h, x, mean);
 #endif
-        for (int i = 0; i < PHI_DIM; ++i) this_stage->y[i][lane] += 0.5 * h * mean[i];
+        for (int i = 0; i < PHI_DIM; ++i) PHI_IN(model, stage, y)[i][lane] += 0.5 * h * mean[i];
     }
-    for (int stage = 0; stage < PHI_STAGES; ++stage) phi_from_means(table->coef[stage], &models->stage[stage]);
+    PHI_EACH_STAGE phi_from_means(PHI_OF(table->coef, stage), PHI_TO(model, stage));
 }
 
 #endif
 /* Guess the points of all stages and steps, by recurrences or else by a march. 0 if they are not near the state. */
-static int phi_guess(phi_solver *s, phi_table *table, phi_models *models)
+static int phi_guess(phi_solver *s, phi_table *table, phi_model *model)
 {
 #if PHI_COMPOSED
-    if (!s->blocks.use_recurrences) phi_guess_by_march(s, table, models);
+    if (!s->blocks.use_recurrences) phi_guess_by_march(s, table, model);
 #if !PHI_PATH
     else table->marching = 0;
 #endif
     for (int stage = 0; stage < PHI_STAGES; ++stage)
-        if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], models->stage[stage].y);
+        if (s->blocks.use_recurrences) phi_foresee(&s->history[stage], table->weight[stage], model[stage].y);
 #else
-    if (s->blocks.use_recurrences) phi_foresee(&s->history[0], table->weight[0], models->stage[0].y);
-    else phi_guess_by_march(s, table, models);
+    if (s->blocks.use_recurrences) phi_foresee(&s->history, table->weight, model->y);
+    else phi_guess_by_march(s, table, model);
 #endif
-    return phi_near_lanes(models, s->x);
+    return phi_near_lanes(model, s->x);
 }
 
 #if PHI_MONITOR
 /* The times that the steps of a block take, by the points of their stages, and what their sums lost. 0 unless those of all
    stages have the sign of the stage. */
-static int phi_elapse(const phi_solver *s, phi_table *table, phi_models *models, phi_lanes elapsed, phi_lanes lost)
+static int phi_elapse(const phi_solver *s, phi_table *table, phi_model *model, phi_lanes elapsed, phi_lanes lost)
 {
     phi_lanes wrong = { 0.0 };
     memset(elapsed, 0, PHI_LANES * sizeof elapsed[0]);
     memset(lost, 0, PHI_LANES * sizeof lost[0]);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    PHI_EACH_STAGE {
         phi_lanes one[1];
-        const double size = phi_fractions[stage] * s->h;
-        phi_elapsed_lanes(table->coef[stage], models->stage[stage].y, one);
+        const double size = PHI_FRACTION(s->h);
+        phi_elapsed_lanes(PHI_OF(table->coef, stage), PHI_IN(model, stage, y), one);
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double sum = elapsed[lane] + one[0][lane], added = sum - elapsed[lane];
@@ -340,7 +339,7 @@ static int phi_elapse(const phi_solver *s, phi_table *table, phi_models *models,
 #endif
 #if PHI_ATTITUDE
 /* The elements of a stage in all lanes, each to its place in the sequence. */
-static void phi_take_stage(phi_lanes turns[PHI_ELEMENT], int stage, double sequence[][PHI_ELEMENT])
+static void phi_take_stage(phi_lanes turns[PHI_ELEMENT] PHI_AND_INT_STAGE, double sequence[][PHI_ELEMENT])
 {
     for (int lane = 0; lane < PHI_LANES; ++lane)
 #if PHI_COMPOSED
@@ -369,21 +368,21 @@ static void phi_matrix_exponential_lanes(phi_lanes p[PHI_COVECTOR], phi_lanes el
 
 #endif
 /* The elements of a block that was solved, one after the other. */
-static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
+static void phi_turn_block(phi_solver *s, phi_table *table, phi_model *model)
 {
     phi_lanes turns[PHI_ELEMENT];
-    double sequence[PHI_STAGES * PHI_LANES][PHI_ELEMENT];
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    double sequence[PHI_ALL_STAGES(PHI_LANES)][PHI_ELEMENT];
+    PHI_EACH_STAGE {
 #if PHI_TURNED_BY_COVECTOR
         phi_lanes p[PHI_COVECTOR];
-        phi_turn_lanes(table->coef[stage], models->stage[stage].y, p);
+        phi_turn_lanes(PHI_OF(table->coef, stage), PHI_IN(model, stage, y), p);
         phi_matrix_exponential_lanes(p, turns);
 #else
-        phi_turn_lanes(table->coef[stage], models->stage[stage].y, turns);
+        phi_turn_lanes(PHI_OF(table->coef, stage), PHI_IN(model, stage, y), turns);
 #endif
-        phi_take_stage(turns, stage, sequence);
+        phi_take_stage(turns PHI_AND_STAGE, sequence);
     }
-    phi_turn_sequence(s, sequence, PHI_STAGES * PHI_LANES);
+    phi_turn_sequence(s, sequence, PHI_ALL_STAGES(PHI_LANES));
 }
 
 #endif
@@ -391,35 +390,40 @@ static void phi_turn_block(phi_solver *s, phi_table *table, phi_models *models)
    small as after a single step. How many passes that took; 0, and the solver as before, where it takes more than most. */
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
-    phi_models models;
+    phi_model PHI_OF(model, PHI_STAGES);
     phi_lanes size, before, left;
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
-    if (!phi_guess(s, table, &models)) return 0;
+#if PHI_SWEPT
+    phi_lanes turn[PHI_DIM * PHI_DIM];
+#endif
+    if (!phi_guess(s, table, PHI_ADDRESS(model))) return 0;
     for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
     while (!solved) {
         const int matrices = previous > PHI_FROZEN;
-        for (int stage = 0; stage < PHI_STAGES; ++stage) phi_update(table->coef[stage], &models.stage[stage], matrices);
+        PHI_EACH_STAGE phi_update(PHI_OF(table->coef, stage), &PHI_OF(model, stage), matrices);
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
-#if PHI_SWEPT
-        if (matrices) phi_turn_residuals(&models);
-#endif
         memcpy(before, size, sizeof before);
-        phi_chain(&models, x, carry, size);
-        s->evaluations += PHI_STAGES * PHI_LANES;
+#if PHI_SWEPT
+        if (matrices) phi_turn_residuals(model, turn);
+        phi_chain(model, turn, x, carry, size);
+#else
+        phi_chain(PHI_ADDRESS(model), x, carry, size);
+#endif
+        s->evaluations += PHI_ALL_STAGES(PHI_LANES);
         phi_leave(size, before, left);
         solved = phi_largest(left) <= PHI_TOLERANCE;
         const double largest = phi_largest(size);
         if ((++passes >= most || !(largest < previous)) && !solved) return 0;
         previous = largest;
     }
-    if (!phi_near_lanes(&models, s->x)) return 0;
+    if (!phi_near_lanes(PHI_ADDRESS(model), s->x)) return 0;
     for (int i = 0; i < PHI_DIM; ++i)
         if (!isfinite(x[i])) return 0;
 #if PHI_MONITOR
     phi_lanes elapsed, lost;
-    if (!phi_elapse(s, table, &models, elapsed, lost)) return 0;
+    if (!phi_elapse(s, table, PHI_ADDRESS(model), elapsed, lost)) return 0;
 #endif
     memcpy(s->x, x, sizeof x);
     memcpy(s->carry, carry, sizeof carry);
@@ -431,11 +435,11 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
 #endif
     phi_count(s, PHI_LANES);
 #if PHI_ATTITUDE
-    phi_turn_block(s, table, &models);
+    phi_turn_block(s, table, PHI_ADDRESS(model));
 #endif
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        phi_history *history = &s->history[stage];
-        phi_record_lanes(history, models.stage[stage].y);
+    PHI_EACH_STAGE {
+        phi_history *history = &PHI_OF(s->history, stage);
+        phi_record_lanes(history, PHI_OF(model, stage).y);
         history->slow_steps = passes > 1 ? history->slow_steps + PHI_LANES : 0;
         if (history->slow_steps > history->slow_steps_allowed && s->blocks.use_recurrences) phi_fit(history);
     }
@@ -461,8 +465,8 @@ static void phi_give_up(phi_solver *s)
    have been, to repay that. */
 static void phi_choose_guess(phi_solver *s, size_t steps)
 {
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        if (s->history[stage].count < PHI_REMEMBERED) {
+    PHI_EACH_STAGE
+        if (PHI_OF(s->history, stage).count < PHI_REMEMBERED) {
             s->blocks.use_recurrences = 0;
             return;
         }
@@ -473,7 +477,7 @@ static void phi_choose_guess(phi_solver *s, size_t steps)
     for (int stage = 0; stage < PHI_STAGES; ++stage)
         s->blocks.use_recurrences = s->blocks.use_recurrences && phi_fit(&s->history[stage]);
 #else
-    s->blocks.use_recurrences = phi_fit(&s->history[0]);
+    s->blocks.use_recurrences = phi_fit(&s->history);
 #endif
     s->blocks.single_steps = PHI_LANES;
     if (!s->blocks.use_recurrences) phi_give_up(s);
@@ -521,14 +525,14 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_table table;
     phi_status status = phi_set_step(s, h);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) table.fits[stage] = -1;
+    PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
 #if PHI_COMPOSED && !PHI_PATH
     table.marching = 0;
 #endif
     while (status == PHI_OK && steps > 0) {
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) phi_choose_guess(s, steps);
         if (steps >= PHI_LANES && s->blocks.single_steps == 0) {
-            for (int stage = 0; stage < PHI_STAGES; ++stage) phi_refresh(s, stage, &table);
+            PHI_EACH_STAGE phi_refresh(s PHI_AND_STAGE, &table);
 #if PHI_RENEWED
             phi_renew_lanes(s, &table);
 #endif

@@ -8,10 +8,10 @@
 
 #if PHI_EXPLICIT
 /* One explicit stage: x + increment(x). */
-static phi_status phi_stage(phi_solver *s, int stage)
+static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
     double increment[PHI_DIM];
-    phi_explicit(s->coef[stage], s->x, increment);
+    phi_explicit(PHI_OF(s->coef, stage), s->x, increment);
     ++s->evaluations;
     return phi_advance(s, increment, s->carry) ? PHI_OK : PHI_NOT_FINITE;
 }
@@ -58,14 +58,14 @@ static phi_status phi_stages(phi_solver *s)
     memcpy(moved, s->carry, sizeof s->carry);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef[0], x, moved, start, element, kept);
+    phi_flows(s->coef, x, moved, start, element, kept);
 #elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef[0], x, moved, start, element);
+    phi_flows(s->coef, x, moved, start, element);
 #elif PHI_ADJOINT
-    phi_flows(s->coef[0], x, moved, start, kept);
+    phi_flows(s->coef, x, moved, start, kept);
 #else
-    phi_flows(s->coef[0], x, moved, start);
+    phi_flows(s->coef, x, moved, start);
 #endif
     ++s->evaluations;
     if (!phi_finite(x, PHI_ALONG)) return PHI_NOT_FINITE;
@@ -94,14 +94,14 @@ static phi_status phi_stages(phi_solver *s)
     memcpy(moved, s->carry, sizeof moved);
 #if PHI_ATTITUDE && PHI_ADJOINT
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef[0], x, moved, s->x, element, kept);
+    phi_flows(s->coef, x, moved, s->x, element, kept);
 #elif PHI_ATTITUDE
     double element[PHI_ELEMENT] = { 0.0 };
-    phi_flows(s->coef[0], x, moved, s->x, element);
+    phi_flows(s->coef, x, moved, s->x, element);
 #elif PHI_ADJOINT
-    phi_flows(s->coef[0], x, moved, s->x, kept);
+    phi_flows(s->coef, x, moved, s->x, kept);
 #else
-    phi_flows(s->coef[0], x, moved, s->x);
+    phi_flows(s->coef, x, moved, s->x);
 #endif
     ++s->evaluations;
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;

@@ -17,14 +17,14 @@ enum {
 
 /* Members of an ensemble, each in its lane. */
 typedef struct {
-    phi_lanes x[PHI_DIM], carry[PHI_DIM], coef[PHI_STAGES][PHI_COEFFICIENTS];
-    phi_lanes past[PHI_STAGES][PHI_REMEMBERED][PHI_DIM]; /* solved values, in a ring */
-    phi_lanes weight[PHI_STAGES][PHI_WINDOW][PHI_DIM]; /* of past values, the latest first, for the next */
+    phi_lanes x[PHI_DIM], carry[PHI_DIM], PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];
+    phi_lanes PHI_OF(past, PHI_STAGES)[PHI_REMEMBERED][PHI_DIM]; /* solved values, in a ring */
+    phi_lanes PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM]; /* of past values, the latest first, for the next */
     int latest;     /* the row of the latest values */
     int count;      /* rows in use */
-    int extrapolation_order[PHI_STAGES]; /* how many of them the extrapolation uses */
-    int recurrence_terms[PHI_STAGES];    /* how many of them the recurrences use */
-    int use_recurrences[PHI_STAGES];     /* whether these are the better guess */
+    int PHI_OF(extrapolation_order, PHI_STAGES); /* how many of them the extrapolation uses */
+    int PHI_OF(recurrence_terms, PHI_STAGES);    /* how many of them the recurrences use */
+    int PHI_OF(use_recurrences, PHI_STAGES);     /* whether these are the better guess */
     int fits;               /* how often recurrences have been fitted */
     int slow_steps;         /* how many of the last steps took more than one iteration */
     int slow_steps_allowed; /* how many of those before recurrences are fitted again */
@@ -36,18 +36,18 @@ typedef struct {
 } phi_group;
 
 /* The past values of a stage, the latest for k = 0. */
-static phi_lanes *phi_group_past(phi_group *group, int stage, int k)
+static phi_lanes *phi_group_past(phi_group *group PHI_AND_INT_STAGE, int k)
 {
     const int row = group->latest + k;
-    return group->past[stage][row < PHI_REMEMBERED ? row : row - PHI_REMEMBERED];
+    return PHI_OF(group->past, stage)[row < PHI_REMEMBERED ? row : row - PHI_REMEMBERED];
 }
 
 /* Guess the values of a stage by the recurrences of the members. */
-static void phi_group_foresee(phi_group *group, int stage, phi_lanes y[restrict PHI_DIM])
+static void phi_group_foresee(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[restrict PHI_DIM])
 {
     memset(y, 0, PHI_DIM * sizeof y[0]);
-    for (int k = 0; k < group->recurrence_terms[stage]; ++k) {
-        phi_lanes *past = phi_group_past(group, stage, k), *weight = group->weight[stage][k];
+    for (int k = 0; k < PHI_OF(group->recurrence_terms, stage); ++k) {
+        phi_lanes *past = phi_group_past(group PHI_AND_STAGE, k), *weight = PHI_OF(group->weight, stage)[k];
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) y[i][lane] += weight[i][lane] * past[i][lane];
@@ -56,14 +56,14 @@ static void phi_group_foresee(phi_group *group, int stage, phi_lanes y[restrict 
 }
 
 /* Extrapolate the values of a stage. */
-static void phi_group_extrapolate(phi_group *group, int stage, phi_lanes y[restrict PHI_DIM])
+static void phi_group_extrapolate(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[restrict PHI_DIM])
 {
-    const int order = group->extrapolation_order[stage];
+    const int order = PHI_OF(group->extrapolation_order, stage);
     double binomial = -1.0;
     memcpy(y, group->x, PHI_DIM * sizeof y[0]);
     if (order > 0) memset(y, 0, PHI_DIM * sizeof y[0]);
     for (int k = 0; k < order; ++k) {
-        phi_lanes *past = phi_group_past(group, stage, k);
+        phi_lanes *past = phi_group_past(group PHI_AND_STAGE, k);
         binomial *= -(double)(order - k) / (k + 1);
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
@@ -90,26 +90,26 @@ static void phi_group_subtract(phi_lanes y[restrict PHI_DIM], phi_lanes other[re
 }
 
 /* Choose the guess that would have been best for these values. */
-static void phi_group_judge(phi_group *group, int stage, phi_lanes y[PHI_DIM])
+static void phi_group_judge(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
     phi_lanes row[PHI_HISTORY + 1][PHI_DIM];
     const int rows = group->count < PHI_HISTORY ? group->count : PHI_HISTORY;
     double least = HUGE_VAL;
     memcpy(row[0], y, sizeof row[0]);
-    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], phi_group_past(group, stage, k), sizeof row[0]);
-    if (group->extrapolation_order[stage] == 0) group->extrapolation_order[stage] = 1;
+    for (int k = 0; k < rows; ++k) memcpy(row[k + 1], phi_group_past(group PHI_AND_STAGE, k), sizeof row[0]);
+    if (PHI_OF(group->extrapolation_order, stage) == 0) PHI_OF(group->extrapolation_order, stage) = 1;
     for (int order = 1; order <= rows; ++order) { /* row[0] becomes the backward difference of this order */
         for (int k = 0; k <= rows - order; ++k) phi_group_subtract(row[k], row[k + 1]);
         const double size = phi_group_sum(group, row[0]);
         if (size < least) {
             least = size;
-            group->extrapolation_order[stage] = order;
+            PHI_OF(group->extrapolation_order, stage) = order;
         }
     }
-    if (group->recurrence_terms[stage] == 0) return;
-    phi_group_foresee(group, stage, row[0]);
+    if (PHI_OF(group->recurrence_terms, stage) == 0) return;
+    phi_group_foresee(group PHI_AND_STAGE, row[0]);
     phi_group_subtract(row[0], y);
-    group->use_recurrences[stage] = phi_group_sum(group, row[0]) <= least;
+    PHI_OF(group->use_recurrences, stage) = phi_group_sum(group, row[0]) <= least;
 }
 
 /* Fit the recurrences of all members; with every time, wait longer before it is done again, and for long if it did not
@@ -117,22 +117,22 @@ static void phi_group_judge(phi_group *group, int stage, phi_lanes y[PHI_DIM])
 static void phi_group_fit(phi_group *group)
 {
     phi_history member;
-    const int helped = group->fits == 0 || group->use_recurrences[0];
+    const int helped = group->fits == 0 || PHI_OF(group->use_recurrences, 0);
     member.count = PHI_REMEMBERED;
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    PHI_EACH_STAGE {
         int found = 1;
-        group->recurrence_terms[stage] = 0;
+        PHI_OF(group->recurrence_terms, stage) = 0;
         for (int lane = 0; lane < PHI_LANES; ++lane)
             for (int i = 0; i < PHI_DIM && group->active[lane] && found; ++i) {
                 for (int k = 0; k < PHI_REMEMBERED; ++k)
-                    member.past[PHI_REMEMBERED - 1 - k][i] = phi_group_past(group, stage, k)[i][lane];
+                    member.past[PHI_REMEMBERED - 1 - k][i] = phi_group_past(group PHI_AND_STAGE, k)[i][lane];
                 const int terms = phi_train(&member, i);
                 found = terms > 0;
-                if (terms > group->recurrence_terms[stage]) group->recurrence_terms[stage] = terms;
-                for (int k = 0; k < PHI_WINDOW; ++k) group->weight[stage][k][i][lane] = member.weight[k][i][0];
+                if (terms > PHI_OF(group->recurrence_terms, stage)) PHI_OF(group->recurrence_terms, stage) = terms;
+                for (int k = 0; k < PHI_WINDOW; ++k) PHI_OF(group->weight, stage)[k][i][lane] = member.weight[k][i][0];
             }
-        if (!found) group->recurrence_terms[stage] = 0;
-        group->use_recurrences[stage] = found;
+        if (!found) PHI_OF(group->recurrence_terms, stage) = 0;
+        PHI_OF(group->use_recurrences, stage) = found;
     }
     ++group->fits;
     group->slow_steps = 0;
@@ -171,25 +171,25 @@ static int phi_group_open(phi_group *group, const phi_lanes size, const phi_lane
 }
 
 /* The guess for a stage: recurrences, or extrapolation; the state for members where that is not near. */
-static void phi_group_predict(phi_group *group, int stage, phi_lanes y[PHI_DIM])
+static void phi_group_predict(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PHI_DIM])
 {
-    if (group->use_recurrences[stage]) phi_group_foresee(group, stage, y);
-    else phi_group_extrapolate(group, stage, y);
+    if (PHI_OF(group->use_recurrences, stage)) phi_group_foresee(group PHI_AND_STAGE, y);
+    else phi_group_extrapolate(group PHI_AND_STAGE, y);
     phi_stay_near(y, group->x);
 }
 
 /* Newton's method for a stage, until the slowest lane is solved. The number of iterations; where that is the most
    allowed, lanes that are not solved leave the group. */
-static int phi_group_solve(phi_group *group, int stage, phi_model *model)
+static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
 {
     phi_lanes size, before, left;
     double largest = HUGE_VAL;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
-    phi_group_predict(group, stage, model->y);
+    phi_group_predict(group PHI_AND_STAGE, model->y);
     for (; open > 0 && iterations < PHI_MAX_ITERATIONS; ++iterations) {
         memcpy(before, size, sizeof size);
-        phi_update(group->coef[stage], model, largest > PHI_FROZEN);
+        phi_update(PHI_OF(group->coef, stage), model, largest > PHI_FROZEN);
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane)
@@ -268,13 +268,13 @@ static int phi_group_step(phi_group *group, size_t remaining)
     int slow = 0;
     memcpy(x, group->x, sizeof x);
     memcpy(carry, group->carry, sizeof carry);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        const int iterations = phi_group_solve(group, stage, &model);
+    PHI_EACH_STAGE {
+        const int iterations = phi_group_solve(group PHI_AND_STAGE, &model);
         phi_group_advance(group->x, group->carry, &model);
         slow = slow || iterations > 1;
         if ((iterations > 1 && next % PHI_HISTORY == 0) || group->count < PHI_HISTORY)
-            phi_group_judge(group, stage, model.y);
-        memcpy(group->past[stage][next], model.y, sizeof model.y);
+            phi_group_judge(group PHI_AND_STAGE, model.y);
+        memcpy(PHI_OF(group->past, stage)[next], model.y, sizeof model.y);
     }
     group->latest = next;
     if (group->count < PHI_REMEMBERED) ++group->count;
@@ -292,8 +292,8 @@ static phi_status phi_group_join(phi_group *group, int lane, const phi_members *
     const phi_status status = phi_take_member(all, m, x, &s);
     for (int i = 0; i < PHI_DIM; ++i) group->x[i][lane] = x[i];
     if (status != PHI_OK) return status;
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        for (int k = 0; k < PHI_COEFFICIENTS; ++k) group->coef[stage][k][lane] = s.coef[stage][k];
+    PHI_EACH_STAGE
+        for (int k = 0; k < PHI_COEFFICIENTS; ++k) PHI_OF(group->coef, stage)[k][lane] = PHI_OF(s.coef, stage)[k];
 #if PHI_GAUGE
     memcpy(group->gauge[lane], s.gauge, sizeof s.gauge);
 #endif

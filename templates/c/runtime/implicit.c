@@ -161,7 +161,7 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM])
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
    away, at another energy, that has nothing to do with it. */
-static int phi_plausible(const phi_solver *s, int stage, const double increment[PHI_DIM])
+static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double increment[PHI_DIM])
 {
     double moved = 0.0, size = 0.0, field[PHI_DIM], point[PHI_DIM], H[3];
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -176,9 +176,9 @@ static int phi_plausible(const phi_solver *s, int stage, const double increment[
 #endif
 #if PHI_MONITOR
     const double rate = phi_monitor(&s->params, s->x);
-    for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * rate * field[i]);
+    for (int i = 0; i < PHI_DIM; ++i) size += fabs(PHI_FRACTION(s->h) * rate * field[i]);
 #else
-    for (int i = 0; i < PHI_DIM; ++i) size += fabs(phi_fractions[stage] * s->h * field[i]);
+    for (int i = 0; i < PHI_DIM; ++i) size += fabs(PHI_FRACTION(s->h) * field[i]);
 #endif
 #if PHI_NOISE
     double fields[PHI_SOURCES * PHI_DIM];

@@ -206,9 +206,9 @@ static void phi_place_middle(phi_solver *s, double *memory, size_t block)
 #endif
     memory += PHI_SIDES * PHI_DIM * block;
 #if PHI_GUESSES
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
+    PHI_EACH_STAGE
         for (int d = 0; d < PHI_DIFFERENCES; ++d)
-            for (int k = 0; k < PHI_DIM; ++k, memory += block) s->guess[stage].difference[d][k] = memory;
+            for (int k = 0; k < PHI_DIM; ++k, memory += block) PHI_OF(s->guess, stage).difference[d][k] = memory;
 #endif
 #if PHI_BANDED
     for (int k = 0; k < PHI_DIM; ++k, memory += block) s->v[k] = memory;

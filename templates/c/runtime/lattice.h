@@ -1,6 +1,8 @@
 #ifndef PHI_FILE_LATTICE_H
 #define PHI_FILE_LATTICE_H
 #include "declarations.h"
+#include "macros/guesses.h"
+#include "macros/stages.h"
 #include "status.h"
 
 #if PHI_GUESSES
@@ -60,7 +62,7 @@ typedef struct {
     double *y[3][PHI_ARRAYS]; /* the middle of a stage, before and after a sweep, and varied; with the parameters at sites */
 #endif
 #if PHI_GUESSES
-    phi_guess guess[PHI_STAGES];
+    phi_guess PHI_OF(guess, PHI_STAGES);
 #endif
     size_t sweeps;            /* that stages took since phi_init */
     int stiff;                /* whether sweeps have failed */

@@ -34,9 +34,9 @@ static void phi_add_up_step(const phi_solver *s, phi_transpose *g, size_t steps,
     phi_add_up(s, g, found);
     for (int k = PHI_COEFFICIENTS; k < PHI_SUMS; ++k) coef_bar[k] += found[k];
 #if PHI_SERIES
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        const double *coef = s->coef + stage * PHI_ROW, middle = phi_middles[stage];
-        double *own = found + stage * PHI_ROW, *to = coef_bar + stage * PHI_ROW;
+    PHI_EACH_STAGE {
+        const double *coef = PHI_ROW_OF(s->coef, stage), middle = PHI_OF(phi_middles, stage);
+        double *own = PHI_ROW_OF(found, stage), *to = PHI_ROW_OF(coef_bar, stage);
 #else
     for (int row = 0; row < PHI_ROWS_OF_FLOWS; ++row) {
         double *own = found + row * PHI_ROW, *to = coef_bar + row * PHI_ROW, coef[PHI_ROW];

@@ -23,9 +23,9 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 }
 
 /* Pull cotangents back through a stage, from the y that it has kept. */
-static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept, int stage)
+static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept PHI_AND_INT_STAGE)
 {
-    const double *coef = s->coef + stage * PHI_ROW;
+    const double *coef = PHI_ROW_OF(s->coef, stage);
     double *side[PHI_BARS], *m[PHI_BARS];
     memcpy(side, g->bar, sizeof side);
     memcpy(side, g->row_bar, sizeof *side * PHI_DIM);
@@ -39,18 +39,18 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept, 
     phi_pull(s, PHI_ADVANCE_BACK, coef, g->bar, side, side);
     int now = 0;
     s->side = side;
-    phi_predict(s, side, stage);
+    phi_predict(s, side PHI_AND_GUESS);
     phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, 1, 0.0, &now);
     if (status != PHI_OK) {
         s->stiff = 1;
         now = 0;
-        phi_predict(s, side, stage);
+        phi_predict(s, side PHI_AND_GUESS);
         status = phi_middle(s, coef, 1, HUGE_VAL, &now);
     }
     s->side = NULL;
     if (status != PHI_OK) return PHI_SINGULAR;
 #if PHI_GUESSES
-    phi_remember(s, side, stage, now);
+    phi_remember(s, side PHI_AND_STAGE, now);
 #endif
     memcpy(m, s->y[now], sizeof *m * PHI_DIM);
     phi_pull(s, PHI_RELAX_BACK, coef, m, g->bar, g->bar);
@@ -63,15 +63,15 @@ static phi_status phi_step_back(phi_solver *s, phi_transpose *g, size_t steps, d
     double *x[PHI_DIM], *left = kept + g->of_step;
     phi_status status = PHI_OK;
     memcpy(x, s->x, sizeof x);
-    for (int stage = PHI_STAGES - 1; stage >= 0; --stage) {
+    PHI_EACH_STAGE_BACK {
 #if PHI_TIMED
-        s->now = phi_time_after(s, steps) + phi_middles[stage] * s->h;
+        s->now = phi_time_after(s, steps) + PHI_OF(phi_middles, stage) * s->h;
 #endif
 #if PHI_RENEWED
-        phi_refresh(s->coef + stage * PHI_ROW, s->now, s->coef + stage * PHI_ROW + PHI_PREPARED);
+        phi_refresh(PHI_ROW_OF(s->coef, stage), s->now, PHI_ROW_OF(s->coef, stage) + PHI_PREPARED);
 #endif
         left -= PHI_KEPT * PHI_DIM * g->block;
-        if (status == PHI_OK) status = phi_stage_back(s, g, left, stage);
+        if (status == PHI_OK) status = phi_stage_back(s, g, left PHI_AND_STAGE);
     }
     memcpy(s->x, x, sizeof x);
     (void)steps;

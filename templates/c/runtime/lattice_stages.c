@@ -85,29 +85,29 @@ static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 }
 
 #if !PHI_GUESSES
-#define phi_predict(s, x, stage) phi_copy((s)->y[0], x, s)
+#define phi_predict(s, x) phi_copy((s)->y[0], x, s)
 #define phi_forget(s) ((s)->stiff = 0)
 
 #else
 /* x and the extrapolated y - x into s->y[0], with the copied ends. */
-static void phi_predict(const phi_solver *s, double *const *x, int stage)
+static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
 {
     PHI_EACH_PIECE
     for (size_t row = 0; row < s->rows; ++row)
         for (int k = 0; k < PHI_DIM; ++k) {
             const ptrdiff_t first = (ptrdiff_t)row * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
-            for (int d = 0; d < s->guess[stage].order; ++d) {
-                const double *difference = s->guess[stage].difference[d][k];
+            for (int d = 0; d < PHI_OF(s->guess, stage).order; ++d) {
+                const double *difference = PHI_OF(s->guess, stage).difference[d][k];
                 for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] += difference[i];
             }
         }
 }
 
 /* Take in the y of a stage. The guess of order d missed it by its d-th difference: the next is of the best order. */
-static void phi_remember(phi_solver *s, double *const *from, int stage, int now)
+static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, int now)
 {
-    phi_guess *guess = &s->guess[stage];
+    phi_guess *guess = &PHI_OF(s->guess, stage);
     double size[PHI_DIFFERENCES] = { 0.0 }, least = HUGE_VAL;
     PHI_EACH_PIECE
     for (size_t row = 0; row < s->rows; ++row) {
@@ -145,7 +145,7 @@ static void phi_forget(phi_solver *s)
 #if PHI_BANDED
     s->factored = NULL;
 #endif
-    for (int stage = 0; stage < PHI_STAGES; ++stage) s->guess[stage].count = s->guess[stage].order = 0;
+    PHI_EACH_STAGE PHI_OF(s->guess, stage).count = PHI_OF(s->guess, stage).order = 0;
 }
 
 #endif
@@ -180,26 +180,26 @@ static phi_status phi_stages(phi_solver *s, int far)
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) phi_draw_piece(s, s->steps, 0, unit);
 #endif
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
+    PHI_EACH_STAGE {
 #if PHI_RENEWED
-        double *coef = s->coef + stage * PHI_ROW;
+        double *coef = PHI_ROW_OF(s->coef, stage);
 #else
-        const double *coef = s->coef + stage * PHI_ROW;
+        const double *coef = PHI_ROW_OF(s->coef, stage);
 #endif
 #if PHI_TIMED
-        s->now = s->t + phi_middles[stage] * s->h;
+        s->now = s->t + PHI_OF(phi_middles, stage) * s->h;
 #endif
 #if PHI_RENEWED
         phi_refresh(coef, s->now, coef + PHI_PREPARED);
 #endif
         int now = 0;
-        phi_predict(s, s->x, stage);
+        phi_predict(s, s->x PHI_AND_GUESS);
         phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, 0.0, &now);
         if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
             s->stiff = 1;
             now = 0;
             const double range = phi_range(s, coef);
-            phi_predict(s, s->x, stage);
+            phi_predict(s, s->x PHI_AND_GUESS);
             status = phi_middle(s, coef, far, range, &now);
         }
 #if PHI_TANGENT
@@ -210,7 +210,7 @@ static phi_status phi_stages(phi_solver *s, int far)
         if (kept != NULL) kept = phi_keep_stage(s, now, kept);
 #endif
 #if PHI_GUESSES
-        phi_remember(s, s->x, stage, now);
+        phi_remember(s, s->x PHI_AND_STAGE, now);
 #endif
         PHI_EACH_PIECE
         for (size_t unit = 0; unit < units; ++unit) phi_increment_piece(s, coef, far, s->y[now], s->x, unit);

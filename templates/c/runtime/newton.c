@@ -49,18 +49,18 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The last
    correction changes the increment to first order, without an evaluation: it is accepted if the error that remains,
    quadratic in it, is below PHI_TOLERANCE. */
-static phi_status phi_attempt(phi_solver *s, int stage)
+static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
     double y[PHI_DIM], delta[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM];
     double jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM];
     double previous = HUGE_VAL;
 #if PHI_GUESSED
-    if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
+    if (!phi_predict(&PHI_OF(s->history, stage), y)) memcpy(y, s->x, sizeof y);
 #else
     memcpy(y, s->x, sizeof y);
 #endif
     for (int iteration = 1; iteration <= PHI_MAX_ITERATIONS; ++iteration) {
-        phi_linearise(s->coef[stage], y, displacement, increment, jacobian, slope);
+        phi_linearise(PHI_OF(s->coef, stage), y, displacement, increment, jacobian, slope);
         ++s->evaluations;
         for (int i = 0; i < PHI_DIM; ++i) delta[i] = ((y[i] - s->x[i]) + displacement[i]) - s->carry[i];
         const int regular = phi_solve(jacobian, delta);
@@ -76,23 +76,23 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         for (int i = 0; i < PHI_DIM; ++i)
             for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
         for (int i = 0; i < PHI_DIM; ++i) small[i] += s->carry[i];
-        if (!phi_plausible(s, stage, increment)) return PHI_NO_CONVERGENCE;
+        if (!phi_plausible(s PHI_AND_STAGE, increment)) return PHI_NO_CONVERGENCE;
 #if PHI_MONITOR
         double elapsed[1];
-        phi_elapsed(s->coef[stage], y, elapsed);
-        if (!(elapsed[0] * (phi_fractions[stage] * s->h) > 0.0)) return PHI_NOT_FINITE;
+        phi_elapsed(PHI_OF(s->coef, stage), y, elapsed);
+        if (!(elapsed[0] * (PHI_FRACTION(s->h)) > 0.0)) return PHI_NOT_FINITE;
 #endif
         if (!phi_advance(s, increment, small)) return PHI_NOT_FINITE;
 #if PHI_MONITOR
         phi_pass(s, elapsed[0]);
 #endif
 #if PHI_RECURRENCES
-        phi_remember(&s->history[stage], y, iteration);
+        phi_remember(&PHI_OF(s->history, stage), y, iteration);
 #elif PHI_GUESSED
-        phi_remember(&s->history[stage], y);
+        phi_remember(&PHI_OF(s->history, stage), y);
 #endif
 #if PHI_ATTITUDE
-        phi_turn_stage(s, stage, y);
+        phi_turn_stage(s PHI_AND_STAGE, y);
 #endif
         return PHI_OK;
     }

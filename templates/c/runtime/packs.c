@@ -26,7 +26,7 @@ typedef struct {
 /* Members of an ensemble, in packs. */
 typedef struct {
     phi_pack pack[PHI_PACK_COUNT];
-    phi_lanes coef[PHI_PACK_COUNT][PHI_STAGES][PHI_COEFFICIENTS];
+    phi_lanes PHI_OF(coef[PHI_PACK_COUNT], PHI_STAGES)[PHI_COEFFICIENTS];
     int packs;    /* in use */
     int own;      /* whether each member has coefficients of its own */
     int prepared; /* whether a member has brought coefficients that all have */
@@ -86,8 +86,8 @@ PHI_IN_PLACE static inline void phi_stage_lanes(phi_lanes *coef, int own, phi_pa
 PHI_IN_PLACE static inline void phi_steps_lanes(int own, phi_group *group, int steps)
 {
     for (int step = 0; step < steps; ++step)
-        for (int stage = 0; stage < PHI_STAGES; ++stage)
-            for (int k = 0; k < group->packs; ++k) phi_stage_lanes(group->coef[own * k][stage], own, &group->pack[k]);
+        PHI_EACH_STAGE
+            for (int k = 0; k < group->packs; ++k) phi_stage_lanes(PHI_OF(group->coef[own * k], stage), own, &group->pack[k]);
 }
 
 #else
@@ -205,9 +205,9 @@ static phi_status phi_group_join(phi_group *group, int m, const phi_members *all
     group->steps_left[m] = all->steps;
     group->active[m] = status == PHI_OK;
     if (status != PHI_OK || group->prepared) return status;
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
+    PHI_EACH_STAGE
         for (int k = 0; k < PHI_COEFFICIENTS; ++k)
-            for (int j = from; j < to; ++j) group->coef[j / PHI_LANES][stage][k][j % PHI_LANES] = s.coef[stage][k];
+            for (int j = from; j < to; ++j) PHI_OF(group->coef[j / PHI_LANES], stage)[k][j % PHI_LANES] = PHI_OF(s.coef, stage)[k];
     group->prepared = !all->own;
     return PHI_OK;
 }

@@ -130,12 +130,12 @@ static int phi_differences(phi_solver *s, const double *coef, const double p[PHI
 
 /* Solve p = grad S_h(mean of the path from x under p) and move to the end of that path. Where that takes more than
    PHI_MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing. */
-static phi_status phi_attempt(phi_solver *s, int stage)
+static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 {
-    const double *coef = s->coef[stage];
+    const double *coef = PHI_OF(s->coef, stage);
     double p[PHI_DIM], y[PHI_DIM], residual[PHI_DIM], change[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], previous = HUGE_VAL;
 #if PHI_GUESSED
-    if (!phi_predict(&s->history[stage], y)) memcpy(y, s->x, sizeof y);
+    if (!phi_predict(&PHI_OF(s->history, stage), y)) memcpy(y, s->x, sizeof y);
 #else
     memcpy(y, s->x, sizeof y);
 #endif
@@ -151,23 +151,23 @@ static phi_status phi_attempt(phi_solver *s, int stage)
         size /= norm;
         const int stalled = previous < PHI_NEARLY_SOLVED && size > PHI_SHRINKING * previous;
         if (size <= PHI_SOLVED || stalled) {
-            if (!phi_plausible(s, stage, change)) return PHI_NO_CONVERGENCE;
+            if (!phi_plausible(s PHI_AND_STAGE, change)) return PHI_NO_CONVERGENCE;
 #if PHI_MONITOR
             double elapsed[1];
             phi_elapsed(coef, y, elapsed);
-            if (!(elapsed[0] * (phi_fractions[stage] * s->h) > 0.0)) return PHI_NOT_FINITE;
+            if (!(elapsed[0] * (PHI_FRACTION(s->h)) > 0.0)) return PHI_NOT_FINITE;
 #endif
             if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
 #if PHI_MONITOR
             phi_pass(s, elapsed[0]);
 #endif
 #if PHI_RECURRENCES
-            phi_remember(&s->history[stage], y, iteration);
+            phi_remember(&PHI_OF(s->history, stage), y, iteration);
 #elif PHI_GUESSED
-            phi_remember(&s->history[stage], y);
+            phi_remember(&PHI_OF(s->history, stage), y);
 #endif
 #if PHI_ATTITUDE
-            phi_turn_stage(s, stage, y);
+            phi_turn_stage(s PHI_AND_STAGE, y);
 #endif
             return PHI_OK;
         }

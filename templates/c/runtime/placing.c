@@ -31,8 +31,8 @@ static int phi_take_level(phi_solver *s, const double from[PHI_DIM], const doubl
         return 0;
     }
     memcpy(s->gauge, level, sizeof level);
-    for (int stage = 0; stage < PHI_STAGES; ++stage) /* where s->h is NaN the next step does it again */
-        phi_prepare(&s->params, s->gauge, phi_fractions[stage] * s->h, s->coef[stage]);
+    PHI_EACH_STAGE /* where s->h is NaN the next step does it again */
+        phi_prepare(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(s->coef, stage));
     return 1;
 }
 
@@ -53,8 +53,8 @@ static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
 #endif
     }
     if (!(distance <= PHI_NEAR_BY * size)) s->h = (double)NAN;
-    for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        phi_history *history = &s->history[stage];
+    PHI_EACH_STAGE {
+        phi_history *history = &PHI_OF(s->history, stage);
         const int count = history->count < PHI_HISTORY ? history->count : PHI_HISTORY;
         memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
         for (int k = 0; k < count; ++k)
@@ -97,8 +97,8 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
     phi_move_guesses(s, from);
 #elif PHI_GUESSED
     /* what guesses begin from moves with the state */
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        for (int i = 0; i < PHI_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
+    PHI_EACH_STAGE
+        for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
 #if PHI_RATE_OF_GAUGE
     phi_take_rate(s);
@@ -124,8 +124,8 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
 #elif PHI_GUESSED
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        for (int i = 0; i < PHI_DIM; ++i) s->history[stage].difference[0][i] += s->x[i] - from[i];
+    PHI_EACH_STAGE
+        for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
 #if PHI_RATE_OF_GAUGE
     phi_take_rate(s);

@@ -55,11 +55,11 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 #endif
 #if PHI_PARAMETERS
 #if PHI_GAUGE
-    phi_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef[0]); /* so short a step does not matter */
+    phi_prepare(&fresh.params, fresh.gauge, 1e-100, PHI_OF(fresh.coef, 0)); /* so short a step does not matter */
 #else
-    phi_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
+    phi_prepare(&fresh.params, 1e-100, PHI_OF(fresh.coef, 0)); /* so short a step does not matter */
 #endif
-    if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params) || !phi_finite(fresh.coef[0], PHI_COEFFICIENTS))
+    if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params) || !phi_finite(PHI_OF(fresh.coef, 0), PHI_COEFFICIENTS))
         return PHI_BAD_ARGUMENT;
 #else
     if (!phi_finite(fresh.x, PHI_DIM)) return PHI_BAD_ARGUMENT;
@@ -103,17 +103,17 @@ static phi_status phi_set_step(phi_solver *s, double h)
 {
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
     if (memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
+    PHI_EACH_STAGE
 #if PHI_GAUGE
-        phi_prepare(&s->params, s->gauge, phi_fractions[stage] * h, s->coef[stage]);
+        phi_prepare(&s->params, s->gauge, PHI_FRACTION(h), PHI_OF(s->coef, stage));
 #else
-        phi_prepare(&s->params, phi_fractions[stage] * h, s->coef[stage]);
+        phi_prepare(&s->params, PHI_FRACTION(h), PHI_OF(s->coef, stage));
 #endif
 #if PHI_GUESSED
     memset(&s->history, 0, sizeof s->history);
 #endif
 #if PHI_RECURRENCES
-    for (int stage = 0; stage < PHI_STAGES; ++stage) s->history[stage].slow_steps_allowed = PHI_REPAY;
+    PHI_EACH_STAGE PHI_OF(s->history, stage).slow_steps_allowed = PHI_REPAY;
 #endif
 #if PHI_BLOCKS
     memset(&s->blocks, 0, sizeof s->blocks);
@@ -138,7 +138,7 @@ static void phi_renew(phi_solver *s)
 {
 #if PHI_SPLITTING
     for (int k = 0; k < PHI_ROWS_OF_FLOWS; ++k) {
-        double *row = s->coef[0] + k * PHI_ROW;
+        double *row = s->coef + k * PHI_ROW;
 #if PHI_NOISE
         const int late = k - (PHI_ROWS_OF_FLOWS - PHI_DRAWS); /* in the half after the flows of H */
         const double dw[1] = { k < PHI_SOURCES ? s->dw[k] : late >= PHI_SOURCES ? s->dw[late] : 0.0 };
@@ -152,13 +152,13 @@ static void phi_renew(phi_solver *s)
 #endif
     }
 #else
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
+    PHI_EACH_STAGE
 #if PHI_NOISE && PHI_TIMED
-        phi_at_step(s->coef[stage], s->t + phi_middles[stage] * s->h, s->dw, s->coef[stage] + PHI_PREPARED);
+        phi_at_step(PHI_OF(s->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h, s->dw, PHI_OF(s->coef, stage) + PHI_PREPARED);
 #elif PHI_NOISE
-        phi_at_step(s->coef[stage], s->dw, s->coef[stage] + PHI_PREPARED);
+        phi_at_step(PHI_OF(s->coef, stage), s->dw, PHI_OF(s->coef, stage) + PHI_PREPARED);
 #else
-        phi_at_time(s->coef[stage], s->t + phi_middles[stage] * s->h, s->coef[stage] + PHI_PREPARED);
+        phi_at_time(PHI_OF(s->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h, PHI_OF(s->coef, stage) + PHI_PREPARED);
 #endif
 #endif
 }
@@ -177,17 +177,17 @@ static void phi_count(phi_solver *s, size_t steps)
 #endif
 #if PHI_GUESSED
 /* One stage. A guess from earlier steps may have misled it: then once more without. */
-static phi_status phi_stage(phi_solver *s, int stage)
+static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
-    const phi_status status = phi_attempt(s, stage);
-    if (status == PHI_OK || s->history[stage].count == 0) return status;
-    memset(&s->history[stage], 0, sizeof s->history[stage]);
-    return phi_attempt(s, stage);
+    const phi_status status = phi_attempt(s PHI_AND_STAGE);
+    if (status == PHI_OK || PHI_OF(s->history, stage).count == 0) return status;
+    memset(&PHI_OF(s->history, stage), 0, sizeof PHI_OF(s->history, stage));
+    return phi_attempt(s PHI_AND_STAGE);
 }
 
 #elif PHI_IMPLICIT
 /* One stage. */
-static phi_status phi_stage(phi_solver *s, int stage) { return phi_attempt(s, stage); }
+static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE) { return phi_attempt(s PHI_AND_STAGE); }
 
 #endif
 #if PHI_COMPOSED
@@ -239,7 +239,7 @@ phi_status phi_step(phi_solver *s, double h)
 #if PHI_COMPOSED
     status = phi_stages(s);
 #else
-    for (int stage = 0; stage < PHI_STAGES; ++stage) status = phi_stage(s, stage);
+    PHI_EACH_STAGE status = phi_stage(s PHI_AND_STAGE);
 #endif
     if (status == PHI_OK) phi_count(s, 1);
     return status;
@@ -279,7 +279,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #elif PHI_COMPOSED || PHI_SPLITTING
         status = phi_stages(s);
 #else
-        for (int stage = 0; stage < PHI_STAGES; ++stage) status = phi_stage(s, stage);
+        PHI_EACH_STAGE status = phi_stage(s PHI_AND_STAGE);
 #endif
         if (status != PHI_OK) break;
         ++s->steps;

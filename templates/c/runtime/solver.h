@@ -1,6 +1,7 @@
 #ifndef PHI_FILE_SOLVER_H
 #define PHI_FILE_SOLVER_H
 #include "declarations.h"
+#include "macros/stages.h"
 #include "status.h"
 const char *phi_status_string(phi_status status);
 
@@ -71,11 +72,11 @@ typedef struct {
     double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
 #endif
 #if PHI_NOISE
-    double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* what depends on params and h only, then on dw and the time as well */
+    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* what depends on params and h only, then on dw and the time as well */
 #elif PHI_RENEWED
-    double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* what depends on params and h only, then on the time of the step as well */
+    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* what depends on params and h only, then on the time of the step as well */
 #else
-    double coef[PHI_STAGES][PHI_COEFFICIENTS]; /* all that depends on params and h only */
+    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* all that depends on params and h only */
 #endif
 #if PHI_ATTITUDE
 #if PHI_MATRICES
@@ -102,7 +103,7 @@ typedef struct {
     double t_before_h;
 #endif
 #if PHI_GUESSED
-    phi_history history[PHI_STAGES]; /* for starting guesses */
+    phi_history PHI_OF(history, PHI_STAGES); /* for starting guesses */
 #endif
 #if PHI_BLOCKS
     phi_learnt blocks;

@@ -252,18 +252,18 @@ static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM],
 
 #endif
 /* Move at through one stage of the step that s has made, and multiply product by the derivative. */
-static phi_status phi_tangent_of(const phi_solver *s, int stage, phi_solver *at, double product[PHI_DIM * PHI_DIM])
+static phi_status phi_tangent_of(const phi_solver *s PHI_AND_INT_STAGE, phi_solver *at, double product[PHI_DIM * PHI_DIM])
 {
     double derivative[PHI_DIM * PHI_DIM], both[PHI_DIM * PHI_DIM], change[PHI_DIM];
 #if PHI_RECURRENCES
-    const phi_history *history = &s->history[stage];
+    const phi_history *history = &PHI_OF(s->history, stage);
     const double *value = history->past[history->count - 1];
 #elif PHI_GUESSED
-    const double *value = s->history[stage].difference[0];
+    const double *value = PHI_OF(s->history, stage).difference[0];
 #else
     const double *value = at->x;
 #endif
-    const phi_status status = phi_tangent_stage(s->coef[stage], at->x, at->carry, value, change, derivative);
+    const phi_status status = phi_tangent_stage(PHI_OF(s->coef, stage), at->x, at->carry, value, change, derivative);
     if (status != PHI_OK) return status;
     if (!phi_advance(at, change, at->carry)) return PHI_NOT_FINITE;
     phi_tangent_product(derivative, product, both);
@@ -280,8 +280,8 @@ phi_status phi_step_tangent(phi_solver *s, double h, double tangent[PHI_DIM * PH
     phi_status status = phi_step(s, h);
     memset(product, 0, sizeof product);
     for (int i = 0; i < PHI_DIM; ++i) product[i * PHI_DIM + i] = 1.0;
-    for (int stage = 0; stage < PHI_STAGES; ++stage)
-        if (status == PHI_OK) status = phi_tangent_of(s, stage, &at, product);
+    PHI_EACH_STAGE
+        if (status == PHI_OK) status = phi_tangent_of(s PHI_AND_STAGE, &at, product);
     for (int i = 0; i < PHI_DIM * PHI_DIM && status == PHI_OK; ++i)
         if (!isfinite(product[i])) status = PHI_NOT_FINITE;
     if (status == PHI_OK)

@@ -92,10 +92,8 @@ extern const phi_params phi_default_params;
 
 #if PHI_COMPOSED
 enum { PHI_STAGES = 3 };
-#else
-enum { PHI_STAGES = 1 };
 #endif
-enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING ? 3 : PHI_STAGES) * PHI_DIM };
+enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING || PHI_COMPOSED ? 3 : 1) * PHI_DIM };
 #if PHI_GAUGE
 enum { PHI_GAUGES = 2 };
 #endif

@@ -16,8 +16,6 @@ const phi_params phi_default_params = { 1.5 };
 
 #if PHI_COMPOSED
 static const double phi_fractions[PHI_STAGES] = { 1.3512071919596578, -1.7024143839193153, 1.3512071919596578 };
-#else
-static const double phi_fractions[PHI_STAGES] = { 1.0 };
 #endif
 
 static int phi_allowed(const phi_params *params) { return isfinite(params->g) && params->g > 0.0; }

@@ -146,7 +146,7 @@ static void phi_flows_lanes(int row, int own, phi_group *group)
 {
     for (int k = 0; k < 3 * group->packs; ++k) {
         phi_pack *at = &group->pack[k / 3];
-        phi_lanes change, *coef = group->coef[own * (k / 3)][0] + row * PHI_ROW;
+        phi_lanes change, *coef = group->coef[own * (k / 3)] + row * PHI_ROW;
         const int kick = k % 3 == 1;
         for (int lane = 0; lane < PHI_LANES; ++lane)
             change[lane] = kick ? -coef[PHI_ROW + 1][own * lane] * sin(at->x[0][lane]) : coef[0][own * lane] * at->x[1][lane];

@@ -1,0 +1,110 @@
+"""What is generated of the runtime in C is what a preprocessor makes of it, but for blocks without a head."""
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import pytest
+from support import run, spec_of, tool, write
+
+from phigen import resources
+from phigen.compiler import compile_spec
+from phigen.spec.model import Extras
+from phigen.targets.c.amalgamation import Amalgam
+from phigen.targets.c.emitter import runtime_of
+
+RUNTIME = resources.templates() / "c/runtime"
+
+
+def amalgam(lines, *macros):
+    """The lines with these macros."""
+    made = Amalgam("body", {}, {})
+    for macro in macros:
+        made.define(f"#define PHI_{macro}")
+    return "\n".join(made.own(lines.split("\n")))
+
+
+def test_heads_that_are_nothing_leave_what_is_below_them():
+    text = """\
+    PHI_EACH
+        phi_prepare(h);
+    PHI_EACH {
+        PHI_EACH phi_fit(s);
+        x[0] = y[0];
+    }
+    PHI_EACH
+        if (good) {
+            again();
+        }
+    done();"""
+    left = """\
+    body_prepare(h);
+    body_fit(s);
+    x[0] = y[0];
+    if (good) {
+        again();
+    }
+    done();"""
+    assert amalgam(text, "EACH") == left
+    assert (
+        amalgam("    PHI_EACH {", "EACH for (int k = 0; k < PHI_DIM; ++k)")
+        == "    for (int k = 0; k < body_DIM; ++k) {"
+    )
+
+
+def test_macros_are_expanded_with_their_arguments():
+    assert amalgam("PHI_OF(s->past[k], (i + 1) % n)[j]", "OF(array, k) array[k]") == "s->past[k][(i + 1) % n][j]"
+    assert amalgam("f(PHI_OF(PHI_OF(a, 1), 2))", "OF(array, k) array") == "f(a)"
+    assert amalgam("f(s PHI_AND_K, g(t PHI_AND_K))", "AND_K , k") == "f(s, k, g(t, k))"
+    assert amalgam("f(s PHI_AND_K, t)", "AND_K") == "f(s, t)"
+
+
+def test_macros_that_are_given_too_little_are_no_code():
+    for line in ("PHI_OF", "PHI_OF(a)", "PHI_OF(a, b, c)", "PHI_OF(a,"):
+        with pytest.raises(ValueError, match=r"macro|shorter|longer"):
+            amalgam(line, "OF(array, k) array[k]")
+
+
+@cache
+def with_derivatives(name, composition):
+    """The program of a system of the corpus, with the derivatives of its steps."""
+    extras = Extras(tangent=True, adjoint=True)
+    return compile_spec(replace(spec_of(name), extras=extras, composition=composition), order=4).program
+
+
+@pytest.mark.parametrize(
+    ("name", "composition"),
+    [
+        ("rigid_body", "auto"),
+        ("rigid_body", "suzuki"),
+        ("seasonal_predator_prey", "suzuki"),
+        ("sir_epidemic", "suzuki"),
+        ("kepler", "auto"),
+        ("pendulum_euler", "auto"),
+    ],
+)
+@pytest.mark.parametrize("profile", ["fast", "small"])
+def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, profile, tmp_path):
+    """Names are those of the solver from the beginning, so that printed macros are of use to the runtime too."""
+    made, _, code = runtime_of(replace(with_derivatives(name, composition), profile=profile))
+    own = {str(f.relative_to(RUNTIME)): f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.[ch]")}
+    (tmp_path / "none").mkdir()
+    (tmp_path / "macros").mkdir()
+    write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in own.items()})
+    write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in made.printed.items()})
+    write(tmp_path, {"made.c": made.text(code)})
+    write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(own.values())), ""))
+    switches = [f"-D{made.name}_{switch}={int(on)}" for switch, on in made.switches.items()]
+
+    def tokens(file):
+        text = run([tool("gcc"), "-E", "-P", "-nostdinc", "-I", "none", *switches, file], tmp_path)
+        return re.findall(r"\w+|[^\w\s{}]", re.sub("^#.*$", "", text, flags=re.MULTILINE))
+
+    assert tokens("made.c") == tokens(code)
+
+
+def test_every_macro_of_the_runtime_is_used():
+    text = "".join(file.read_text(encoding="utf-8") for file in RUNTIME.glob("*.[ch]"))
+    for file in (RUNTIME / "macros").glob("*.h"):
+        names = re.findall(r"#define (PHI_(?!FILE)\w+)", file.read_text(encoding="utf-8"))
+        assert set(names) <= set(re.findall(r"\w+", text))
