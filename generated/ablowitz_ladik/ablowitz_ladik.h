@@ -1,8 +1,7 @@
 /*
- * ablowitz_ladik.h: the declarations; ablowitz_ladik.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of ablowitz_ladik.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 66fe7d4e2fb8c093eeec099e7b6df76c0cffb6f2194a11dea154412f6f2e303a
+ * body-sha256: 95583fbae2f01ed0121d4e20a34acaea16d494f87a3a5f2364c7041e576cbec0
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
@@ -27,7 +26,6 @@ extern const ablowitz_ladik_params ablowitz_ladik_default_params;
 enum { ablowitz_ladik_ARRAYS = 2 };         /* arrays over the sites: fields, then parameters */
 enum { ablowitz_ladik_COEFFICIENTS = 104 }; /* numbers that depend on params and h only */
 
-/* How a step ends; ablowitz_ladik_status_string says it in words. */
 typedef enum { ablowitz_ladik_OK = 0, ablowitz_ladik_NO_CONVERGENCE, ablowitz_ladik_SINGULAR,
     ablowitz_ladik_NOT_FINITE, ablowitz_ladik_BAD_ARGUMENT } ablowitz_ladik_status;
 

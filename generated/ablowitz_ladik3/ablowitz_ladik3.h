@@ -1,8 +1,7 @@
 /*
- * ablowitz_ladik3.h: the declarations; ablowitz_ladik3.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of ablowitz_ladik3.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 409e4fd8cb690721c6adb6d5890b33dccddcdaefdd1d5f081ee0fdc6c840f408
+ * body-sha256: 519b6e0dc3a1097dff4f6df2a551547fe8ac0c112d09d44e1202784eb6a3bf7a
  */
 #ifndef ABLOWITZ_LADIK3_H
 #define ABLOWITZ_LADIK3_H
@@ -10,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define ablowitz_ladik3_DIM 6
+#define ablowitz_ladik3_DIM 6 /* coordinates: x1, y1, x2, y2, x3, y3 */
 #define ablowitz_ladik3_ORDER 4
 #define ablowitz_ladik3_CASIMIRS 0
 #define ablowitz_ladik3_PHIGEN_VERSION "0.1.0"
@@ -18,13 +17,16 @@ extern "C" {
 enum { ablowitz_ladik3_STAGES = 5 };       /* of a step */
 enum { ablowitz_ladik3_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
-/* State vectors: x1, y1, x2, y2, x3, y3. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } ablowitz_ladik3_params;
 extern const ablowitz_ladik3_params ablowitz_ladik3_default_params;
 
-/* How a step ends; ablowitz_ladik3_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const double x[6]);
+void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[6], double out[]);
+void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[6], double out[6]);
+
 typedef enum { ablowitz_ladik3_OK = 0, ablowitz_ladik3_NO_CONVERGENCE, ablowitz_ladik3_SINGULAR,
     ablowitz_ladik3_NOT_FINITE, ablowitz_ladik3_BAD_ARGUMENT } ablowitz_ladik3_status;
 const char *ablowitz_ladik3_status_string(ablowitz_ladik3_status status);
@@ -37,8 +39,7 @@ typedef struct {
     double difference[ablowitz_ladik3_DIFFERENCES][ablowitz_ladik3_DIM];
 } ablowitz_ladik3_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   ablowitz_ladik3_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[ablowitz_ladik3_DIM];     /* the state; read it freely, change it only through functions */
     double carry[ablowitz_ladik3_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -53,10 +54,11 @@ typedef struct {
     double t_before_h;
     ablowitz_ladik3_history history[ablowitz_ladik3_STAGES]; /* for starting guesses */
 } ablowitz_ladik3_solver;
+size_t ablowitz_ladik3_solver_size(void); /* for bindings to other languages, as what follows */
+size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. ablowitz_ladik3_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. ablowitz_ladik3_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const ablowitz_ladik3_params *params,
     const double x0[ablowitz_ladik3_DIM]);
 
@@ -75,17 +77,6 @@ ablowitz_ladik3_status ablowitz_ladik3_kick(ablowitz_ladik3_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 ablowitz_ladik3_status ablowitz_ladik3_ensemble(const ablowitz_ladik3_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double ablowitz_ladik3_hamiltonian(const ablowitz_ladik3_params *params, const double x[ablowitz_ladik3_DIM]);
-void ablowitz_ladik3_casimirs(const ablowitz_ladik3_params *params, const double x[ablowitz_ladik3_DIM],
-    double out[]);
-void ablowitz_ladik3_vector_field(const ablowitz_ladik3_params *params, const double x[ablowitz_ladik3_DIM],
-    double out[ablowitz_ladik3_DIM]);
-
-/* For bindings: the size of ablowitz_ladik3_solver, and its count of good steps. */
-size_t ablowitz_ladik3_solver_size(void);
-size_t ablowitz_ladik3_solver_steps_done(const ablowitz_ladik3_solver *s);
 
 #ifdef __cplusplus
 }

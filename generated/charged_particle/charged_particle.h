@@ -1,8 +1,7 @@
 /*
- * charged_particle.h: the declarations; charged_particle.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of charged_particle.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 45256399f05cd8bce4aa62031b7c6d1cb425d949f325c7d7b0881bf90d028080
+ * body-sha256: 5e59cc723f3597b6ad990e7c76f20ce8d7d53f0b3c1c0ec02c719870bb020547
  */
 #ifndef CHARGED_PARTICLE_H
 #define CHARGED_PARTICLE_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define charged_particle_DIM 6
+#define charged_particle_DIM 6 /* coordinates: x, y, z, u, v, w */
 #define charged_particle_ORDER 4
 #define charged_particle_CASIMIRS 0
 #define charged_particle_PHIGEN_VERSION "0.1.0"
 #define charged_particle_SPEC_SHA256 "6bda6268e8c6b32b81eb7049d472c6dd6ed8376176c222eb700c90680204f278"
 enum { charged_particle_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
-/* State vectors: x, y, z, u, v, w. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } charged_particle_params;
 extern const charged_particle_params charged_particle_default_params;
 
-/* How a step ends; charged_particle_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double charged_particle_hamiltonian(const charged_particle_params *params, const double x[6]);
+void charged_particle_casimirs(const charged_particle_params *params, const double x[6], double out[]);
+void charged_particle_vector_field(const charged_particle_params *params, const double x[6], double out[6]);
+
 typedef enum { charged_particle_OK = 0, charged_particle_NO_CONVERGENCE, charged_particle_SINGULAR,
     charged_particle_NOT_FINITE, charged_particle_BAD_ARGUMENT } charged_particle_status;
 const char *charged_particle_status_string(charged_particle_status status);
@@ -36,8 +38,7 @@ typedef struct {
     double difference[charged_particle_DIFFERENCES][charged_particle_DIM];
 } charged_particle_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   charged_particle_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[charged_particle_DIM];     /* the state; read it freely, change it only through functions */
     double carry[charged_particle_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -51,10 +52,11 @@ typedef struct {
     double t_before_h;
     charged_particle_history history; /* for starting guesses */
 } charged_particle_solver;
+size_t charged_particle_solver_size(void); /* for bindings to other languages, as what follows */
+size_t charged_particle_solver_steps_done(const charged_particle_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. charged_particle_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. charged_particle_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 charged_particle_status charged_particle_init(charged_particle_solver *s,
     const charged_particle_params *params, const double x0[charged_particle_DIM]);
 
@@ -73,18 +75,6 @@ charged_particle_status charged_particle_kick(charged_particle_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 charged_particle_status charged_particle_ensemble(const charged_particle_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double charged_particle_hamiltonian(const charged_particle_params *params,
-    const double x[charged_particle_DIM]);
-void charged_particle_casimirs(const charged_particle_params *params, const double x[charged_particle_DIM],
-    double out[]);
-void charged_particle_vector_field(const charged_particle_params *params,
-    const double x[charged_particle_DIM], double out[charged_particle_DIM]);
-
-/* For bindings: the size of charged_particle_solver, and its count of good steps. */
-size_t charged_particle_solver_size(void);
-size_t charged_particle_solver_steps_done(const charged_particle_solver *s);
 
 #ifdef __cplusplus
 }

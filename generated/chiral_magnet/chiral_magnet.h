@@ -1,8 +1,7 @@
 /*
- * chiral_magnet.h: the declarations; chiral_magnet.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of chiral_magnet.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 82e99c7ea5ccad0f5364780ea3b6bb3f1a0fec58e0cbbf066e857d4432d246ca
+ * body-sha256: f1480982336e22db9dadad5489aba3d5782d32ce232562e62079179f41244798
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -34,7 +33,6 @@ enum { chiral_magnet_COEFFICIENTS = 30 }; /* numbers that depend on params and h
 enum { chiral_magnet_GATHERED = 3 };      /* sums over other sites that are held for each site */
 enum { chiral_magnet_BOND_ARRAYS = 2 };   /* parameters at bonds */
 
-/* How a step ends; chiral_magnet_status_string says it in words. */
 typedef enum { chiral_magnet_OK = 0, chiral_magnet_NO_CONVERGENCE, chiral_magnet_SINGULAR,
     chiral_magnet_NOT_FINITE, chiral_magnet_BAD_ARGUMENT } chiral_magnet_status;
 

@@ -1,8 +1,7 @@
 /*
- * cyclotron.h: the declarations; cyclotron.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of cyclotron.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ad4c6ba6850f893bee50a6ae31f88fb2d3b4f846100747d52376907f6aba1432
+ * body-sha256: 08b81ed718bbf7de75bcc4ddcce4a7ca26b9b44c71257fb79c259bdf5d797a8b
  */
 #ifndef CYCLOTRON_H
 #define CYCLOTRON_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define cyclotron_DIM 3
+#define cyclotron_DIM 3 /* coordinates: u, v, b */
 #define cyclotron_ORDER 4
-#define cyclotron_CASIMIRS 1
+#define cyclotron_CASIMIRS 1 /* B */
 #define cyclotron_PHIGEN_VERSION "0.1.0"
 #define cyclotron_SPEC_SHA256 "28619749874f2e10947903325f521330765638e5d2fdca830ed74dadbaba7614"
 enum { cyclotron_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
-/* State vectors: u, v, b. Casimirs: B. */
 typedef struct {
     char unused; /* this system has no parameters */
 } cyclotron_params;
 extern const cyclotron_params cyclotron_default_params;
 
-/* How a step ends; cyclotron_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double cyclotron_hamiltonian(const cyclotron_params *params, const double x[3]);
+void cyclotron_casimirs(const cyclotron_params *params, const double x[3], double out[]);
+void cyclotron_vector_field(const cyclotron_params *params, const double x[3], double out[3]);
+
 typedef enum { cyclotron_OK = 0, cyclotron_NO_CONVERGENCE, cyclotron_SINGULAR, cyclotron_NOT_FINITE,
     cyclotron_BAD_ARGUMENT } cyclotron_status;
 const char *cyclotron_status_string(cyclotron_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[cyclotron_DIFFERENCES][cyclotron_DIM];
 } cyclotron_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with cyclotron_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[cyclotron_DIM];     /* the state; read it freely, change it only through functions */
     double carry[cyclotron_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     cyclotron_history history; /* for starting guesses */
 } cyclotron_solver;
+size_t cyclotron_solver_size(void); /* for bindings to other languages, as what follows */
+size_t cyclotron_solver_steps_done(const cyclotron_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. cyclotron_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. cyclotron_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *params,
     const double x0[cyclotron_DIM]);
 
@@ -70,16 +73,6 @@ cyclotron_status cyclotron_kick(cyclotron_solver *s, const double change[cyclotr
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 cyclotron_status cyclotron_ensemble(const cyclotron_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double cyclotron_hamiltonian(const cyclotron_params *params, const double x[cyclotron_DIM]);
-void cyclotron_casimirs(const cyclotron_params *params, const double x[cyclotron_DIM], double out[]);
-void cyclotron_vector_field(const cyclotron_params *params, const double x[cyclotron_DIM],
-    double out[cyclotron_DIM]);
-
-/* For bindings: the size of cyclotron_solver, and its count of good steps. */
-size_t cyclotron_solver_size(void);
-size_t cyclotron_solver_steps_done(const cyclotron_solver *s);
 
 #ifdef __cplusplus
 }

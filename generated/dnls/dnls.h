@@ -1,8 +1,7 @@
 /*
- * dnls.h: the declarations; dnls.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of dnls.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9d04aca9fb4412002e1415749ae8c5acb4e9b54b4043f101e63dc2c8454fbd64
+ * body-sha256: 5dba5351ca44bc45f970b4ad46b37d5f3e04dd5058a9ae0e77ed3cd179132e1d
  */
 #ifndef DNLS_H
 #define DNLS_H
@@ -27,7 +26,6 @@ extern const dnls_params dnls_default_params;
 enum { dnls_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { dnls_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 
-/* How a step ends; dnls_status_string says it in words. */
 typedef enum { dnls_OK = 0, dnls_NO_CONVERGENCE, dnls_SINGULAR, dnls_NOT_FINITE,
     dnls_BAD_ARGUMENT } dnls_status;
 

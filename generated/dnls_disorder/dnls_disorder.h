@@ -1,8 +1,7 @@
 /*
- * dnls_disorder.h: the declarations; dnls_disorder.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of dnls_disorder.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9e58464b4ec098f8cc1733a943c7a5a90981a237ec5a735023da9a1ddb5a35b1
+ * body-sha256: e28f9f6846c5a8bb9a5605ed6d889aa26fdeb4cd37d7d5d37bc5eb995e836152
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
@@ -28,7 +27,6 @@ extern const dnls_disorder_params dnls_disorder_default_params;
 enum { dnls_disorder_ARRAYS = 3 };        /* arrays over the sites: fields, then parameters */
 enum { dnls_disorder_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 
-/* How a step ends; dnls_disorder_status_string says it in words. */
 typedef enum { dnls_disorder_OK = 0, dnls_disorder_NO_CONVERGENCE, dnls_disorder_SINGULAR,
     dnls_disorder_NOT_FINITE, dnls_disorder_BAD_ARGUMENT } dnls_disorder_status;
 

@@ -1,8 +1,7 @@
 /*
- * double_well.h: the declarations; double_well.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of double_well.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e91be10f473e0de7216b9053eb64d03a1c4e3caacab951e79433b350d8886852
+ * body-sha256: 3f285f314f17675c36b8613467fd0d969c867fb018fd0bafe43120ae5f81ac3c
  */
 #ifndef DOUBLE_WELL_H
 #define DOUBLE_WELL_H
@@ -11,7 +10,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define double_well_DIM 2
+#define double_well_DIM 2 /* coordinates: q, p */
 #define double_well_ORDER 2
 #define double_well_CASIMIRS 0
 #define double_well_PHIGEN_VERSION "0.1.0"
@@ -21,7 +20,6 @@ enum { double_well_SOURCES = 1 };       /* of noise: bath */
 enum { double_well_DRAWS = 1 };         /* increments of the noise in a step */
 enum { double_well_PARTS = 1 };         /* increments of one source in a step, each of a part of it */
 
-/* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double barrier; /* default 1.0 */
     double gamma;   /* friction */
@@ -29,12 +27,19 @@ typedef struct {
 } double_well_params;
 extern const double_well_params double_well_default_params;
 
-/* How a step ends; double_well_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double double_well_hamiltonian(const double_well_params *params, const double x[2]);
+void double_well_casimirs(const double_well_params *params, const double x[2], double out[]);
+void double_well_vector_field(const double_well_params *params, const double x[2], double out[2]);
+
+/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
+void double_well_noise_fields(const double_well_params *params, const double x[2], double out[2]);
+
 typedef enum { double_well_OK = 0, double_well_NO_CONVERGENCE, double_well_SINGULAR, double_well_NOT_FINITE,
     double_well_BAD_ARGUMENT } double_well_status;
 const char *double_well_status_string(double_well_status status);
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with double_well_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[double_well_DIM];     /* the state; read it freely, change it only through functions */
     double carry[double_well_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -51,10 +56,11 @@ typedef struct {
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 } double_well_solver;
+size_t double_well_solver_size(void); /* for bindings to other languages, as what follows */
+size_t double_well_solver_steps_done(const double_well_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. double_well_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. double_well_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 double_well_status double_well_init(double_well_solver *s, const double_well_params *params,
     const double x0[double_well_DIM]);
 
@@ -88,20 +94,6 @@ double_well_status double_well_ensemble(const double_well_params *params, double
    threads. */
 double_well_status double_well_ensemble_of(const double_well_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double double_well_hamiltonian(const double_well_params *params, const double x[double_well_DIM]);
-void double_well_casimirs(const double_well_params *params, const double x[double_well_DIM], double out[]);
-void double_well_vector_field(const double_well_params *params, const double x[double_well_DIM],
-    double out[double_well_DIM]);
-
-/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
-void double_well_noise_fields(const double_well_params *params, const double x[double_well_DIM],
-    double out[double_well_SOURCES * double_well_DIM]);
-
-/* For bindings: the size of double_well_solver, and its count of good steps. */
-size_t double_well_solver_size(void);
-size_t double_well_solver_steps_done(const double_well_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * duffing.h: the declarations; duffing.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of duffing.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6085385a1efb266139f08651126666fe0b61ba9829b7398038d725208c563f4f
+ * body-sha256: 14c2a0db83b6d3a660c635a9adeeb48f8fd694a5f0a3e9a73f1dba798de817b4
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define duffing_DIM 2
+#define duffing_DIM 2 /* coordinates: q, p */
 #define duffing_ORDER 6
 #define duffing_CASIMIRS 0
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "72ba392fccc406dfdc3b1d47b1172899f03878892236d624cb8d53a7a18b6c1c"
 enum { duffing_COEFFICIENTS = 33 }; /* numbers that depend on params and h, and on the time */
 
-/* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double A;     /* amplitude of the drive */
     double omega; /* its frequency */
 } duffing_params;
 extern const duffing_params duffing_default_params;
 
-/* How a step ends; duffing_status_string says it in words. */
+/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
+double duffing_hamiltonian(const duffing_params *params, double t, const double x[2]);
+void duffing_casimirs(const duffing_params *params, const double x[2], double out[]);
+void duffing_vector_field(const duffing_params *params, double t, const double x[2], double out[2]);
+
 typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing_NOT_FINITE,
     duffing_BAD_ARGUMENT } duffing_status;
 const char *duffing_status_string(duffing_status status);
@@ -37,7 +39,7 @@ typedef struct {
     double difference[duffing_DIFFERENCES][duffing_DIM];
 } duffing_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with duffing_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[duffing_DIM];     /* the state; read it freely, change it only through functions */
     double carry[duffing_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -52,10 +54,11 @@ typedef struct {
     double t_before_h;
     duffing_history history; /* for starting guesses */
 } duffing_solver;
+size_t duffing_solver_size(void); /* for bindings to other languages, as what follows */
+size_t duffing_solver_steps_done(const duffing_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. duffing_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. duffing_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 duffing_status duffing_init(duffing_solver *s, const duffing_params *params, const double x0[duffing_DIM]);
 
 /* The same at the time t0, which duffing_init takes to be 0. */
@@ -79,16 +82,6 @@ duffing_status duffing_ensemble(const duffing_params *params, double *x, size_t 
 /* The same from the time t0 of all members on, which duffing_ensemble takes to be 0. */
 duffing_status duffing_ensemble_at(const duffing_params *params, double *x, size_t members, double t0,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
-double duffing_hamiltonian(const duffing_params *params, double t, const double x[duffing_DIM]);
-void duffing_casimirs(const duffing_params *params, const double x[duffing_DIM], double out[]);
-void duffing_vector_field(const duffing_params *params, double t, const double x[duffing_DIM],
-    double out[duffing_DIM]);
-
-/* For bindings: the size of duffing_solver, and its count of good steps. */
-size_t duffing_solver_size(void);
-size_t duffing_solver_steps_done(const duffing_solver *s);
 
 #ifdef __cplusplus
 }

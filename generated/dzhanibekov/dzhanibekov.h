@@ -1,8 +1,7 @@
 /*
- * dzhanibekov.h: the declarations; dzhanibekov.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of dzhanibekov.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cf862e6684d9571be2cf7000c34bba11cd05b99c55abfc97ee17832ed7c5f98b
+ * body-sha256: aa7794b2f11a8e6251c3d79b4018d2aefc58faa09e02ed0988dd3712006113a7
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define dzhanibekov_DIM 3
+#define dzhanibekov_DIM 3 /* coordinates: x1, x2, x3 */
 #define dzhanibekov_ORDER 6
-#define dzhanibekov_CASIMIRS 1
+#define dzhanibekov_CASIMIRS 1 /* C */
 #define dzhanibekov_PHIGEN_VERSION "0.1.0"
 #define dzhanibekov_SPEC_SHA256 "69c6aa7f443565487e48a933405a1745ed7142d940611d93ee67a5351a59ea66"
 enum { dzhanibekov_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
@@ -21,7 +20,6 @@ enum { dzhanibekov_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion 
 enum { dzhanibekov_ELEMENT = 4 };       /* numbers of an element of the group */
 enum { dzhanibekov_RATE = 3 };          /* numbers of what the Casimirs turn */
 
-/* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
     double I1; /* least moment of inertia */
     double I2; /* intermediate moment of inertia */
@@ -29,7 +27,11 @@ typedef struct {
 } dzhanibekov_params;
 extern const dzhanibekov_params dzhanibekov_default_params;
 
-/* How a step ends; dzhanibekov_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double dzhanibekov_hamiltonian(const dzhanibekov_params *params, const double x[3]);
+void dzhanibekov_casimirs(const dzhanibekov_params *params, const double x[3], double out[]);
+void dzhanibekov_vector_field(const dzhanibekov_params *params, const double x[3], double out[3]);
+
 typedef enum { dzhanibekov_OK = 0, dzhanibekov_NO_CONVERGENCE, dzhanibekov_SINGULAR, dzhanibekov_NOT_FINITE,
     dzhanibekov_BAD_ARGUMENT } dzhanibekov_status;
 const char *dzhanibekov_status_string(dzhanibekov_status status);
@@ -42,7 +44,7 @@ typedef struct {
     double difference[dzhanibekov_DIFFERENCES][dzhanibekov_DIM];
 } dzhanibekov_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with dzhanibekov_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[dzhanibekov_DIM];     /* the state; read it freely, change it only through functions */
     double carry[dzhanibekov_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -65,10 +67,12 @@ typedef struct {
     double t_before_h;
     dzhanibekov_history history; /* for starting guesses */
 } dzhanibekov_solver;
+size_t dzhanibekov_solver_size(void); /* for bindings to other languages, as what follows */
+size_t dzhanibekov_solver_steps_done(const dzhanibekov_solver *s);
+void dzhanibekov_attitude(const dzhanibekov_solver *s, double out[dzhanibekov_ELEMENT]);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. dzhanibekov_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. dzhanibekov_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 dzhanibekov_status dzhanibekov_init(dzhanibekov_solver *s, const dzhanibekov_params *params,
     const double x0[dzhanibekov_DIM]);
 
@@ -104,17 +108,6 @@ dzhanibekov_status dzhanibekov_ensemble(const dzhanibekov_params *params, double
 dzhanibekov_status dzhanibekov_ensemble_attitudes(const dzhanibekov_params *params, double *x,
     double *attitude, size_t members, const double *gauge, const double *h, size_t steps, size_t stride,
     double *frames, double *attitudes, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double dzhanibekov_hamiltonian(const dzhanibekov_params *params, const double x[dzhanibekov_DIM]);
-void dzhanibekov_casimirs(const dzhanibekov_params *params, const double x[dzhanibekov_DIM], double out[]);
-void dzhanibekov_vector_field(const dzhanibekov_params *params, const double x[dzhanibekov_DIM],
-    double out[dzhanibekov_DIM]);
-
-/* For bindings: the size of dzhanibekov_solver, and its count of good steps. */
-size_t dzhanibekov_solver_size(void);
-size_t dzhanibekov_solver_steps_done(const dzhanibekov_solver *s);
-void dzhanibekov_attitude(const dzhanibekov_solver *s, double out[dzhanibekov_ELEMENT]);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * engel_geodesics.h: the declarations; engel_geodesics.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of engel_geodesics.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b3254bb7c7135383e1b78fa7fcda8dca5300621f7dd08ab799e681a31e45c093
+ * body-sha256: 141143b3d903d3ef92118f58f4a906d3b38969a59d671485b25cca8cc611969c
  */
 #ifndef ENGEL_GEODESICS_H
 #define ENGEL_GEODESICS_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define engel_geodesics_DIM 4
+#define engel_geodesics_DIM 4 /* coordinates: h1, h2, h3, h4 */
 #define engel_geodesics_ORDER 4
-#define engel_geodesics_CASIMIRS 2
+#define engel_geodesics_CASIMIRS 2 /* h4, C */
 #define engel_geodesics_PHIGEN_VERSION "0.1.0"
 #define engel_geodesics_SPEC_SHA256 "fb609c6d402d3a7fbfac0e7cda1d7e07e2dba9262c5dfd8f16d22d0ab34eeabc"
 enum { engel_geodesics_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
-/* State vectors: h1, h2, h3, h4. Casimirs: h4, C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } engel_geodesics_params;
 extern const engel_geodesics_params engel_geodesics_default_params;
 
-/* How a step ends; engel_geodesics_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const double x[4]);
+void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[4], double out[]);
+void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[4], double out[4]);
+
 typedef enum { engel_geodesics_OK = 0, engel_geodesics_NO_CONVERGENCE, engel_geodesics_SINGULAR,
     engel_geodesics_NOT_FINITE, engel_geodesics_BAD_ARGUMENT } engel_geodesics_status;
 const char *engel_geodesics_status_string(engel_geodesics_status status);
@@ -36,8 +38,7 @@ typedef struct {
     double difference[engel_geodesics_DIFFERENCES][engel_geodesics_DIM];
 } engel_geodesics_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   engel_geodesics_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[engel_geodesics_DIM];     /* the state; read it freely, change it only through functions */
     double carry[engel_geodesics_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -51,10 +52,11 @@ typedef struct {
     double t_before_h;
     engel_geodesics_history history; /* for starting guesses */
 } engel_geodesics_solver;
+size_t engel_geodesics_solver_size(void); /* for bindings to other languages, as what follows */
+size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. engel_geodesics_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. engel_geodesics_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const engel_geodesics_params *params,
     const double x0[engel_geodesics_DIM]);
 
@@ -73,17 +75,6 @@ engel_geodesics_status engel_geodesics_kick(engel_geodesics_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 engel_geodesics_status engel_geodesics_ensemble(const engel_geodesics_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double engel_geodesics_hamiltonian(const engel_geodesics_params *params, const double x[engel_geodesics_DIM]);
-void engel_geodesics_casimirs(const engel_geodesics_params *params, const double x[engel_geodesics_DIM],
-    double out[]);
-void engel_geodesics_vector_field(const engel_geodesics_params *params, const double x[engel_geodesics_DIM],
-    double out[engel_geodesics_DIM]);
-
-/* For bindings: the size of engel_geodesics_solver, and its count of good steps. */
-size_t engel_geodesics_solver_size(void);
-size_t engel_geodesics_solver_steps_done(const engel_geodesics_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * food_web.h: the declarations; food_web.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9d0917a11a05aee7ddc09085421e2ea28fc0d62f158bc6d4d853ecf7596ff9d0
+ * body-sha256: 90e5facf95b233903c2202c257202e9dc511bee60cc09d3fe921e4bebd747b71
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -30,7 +29,6 @@ enum { food_web_COEFFICIENTS = 26 }; /* numbers that depend on params and h only
 enum { food_web_GATHERED = 1 };      /* sums over other sites that are held for each site */
 enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 
-/* How a step ends; food_web_status_string says it in words. */
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
     food_web_BAD_ARGUMENT } food_web_status;
 

@@ -1,8 +1,7 @@
 /*
- * fput.h: the declarations; fput.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of fput.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 288e99e51d3e928ccdbca98666e6a19f6de7ea55d27a0132d8b00dc1032f4041
+ * body-sha256: 6f0b4ce44efaeb6ad8ceb27558b189ebf0db2efa344dedf03d4fcea0d7d33b9f
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -28,7 +27,6 @@ extern const fput_params fput_default_params;
 enum { fput_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { fput_COEFFICIENTS = 56 }; /* numbers that depend on params and h only */
 
-/* How a step ends; fput_status_string says it in words. */
 typedef enum { fput_OK = 0, fput_NO_CONVERGENCE, fput_SINGULAR, fput_NOT_FINITE,
     fput_BAD_ARGUMENT } fput_status;
 

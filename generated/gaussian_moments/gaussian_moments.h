@@ -1,8 +1,7 @@
 /*
- * gaussian_moments.h: the declarations; gaussian_moments.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of gaussian_moments.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a9f5ea731f5b9934ed25d5204a9b87e4fecbad256045ce46948bd9a2913a74c8
+ * body-sha256: 7485c5ecbbf34d5a757df7d9720a075fc267441e50d68034cb1f08ba2e6f32ea
  */
 #ifndef GAUSSIAN_MOMENTS_H
 #define GAUSSIAN_MOMENTS_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define gaussian_moments_DIM 3
+#define gaussian_moments_DIM 3 /* coordinates: a, b, c */
 #define gaussian_moments_ORDER 6
-#define gaussian_moments_CASIMIRS 1
+#define gaussian_moments_CASIMIRS 1 /* area */
 #define gaussian_moments_PHIGEN_VERSION "0.1.0"
 #define gaussian_moments_SPEC_SHA256 "967874dae83dd8a6800d977c3a20ab90481f1a1e1820f485f001b0650f3fc9e7"
 enum { gaussian_moments_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
-/* State vectors: a, b, c. Casimirs: area. */
 typedef struct {
     double k; /* stiffness of the harmonic part */
     double g; /* strength of the quartic part */
 } gaussian_moments_params;
 extern const gaussian_moments_params gaussian_moments_default_params;
 
-/* How a step ends; gaussian_moments_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double gaussian_moments_hamiltonian(const gaussian_moments_params *params, const double x[3]);
+void gaussian_moments_casimirs(const gaussian_moments_params *params, const double x[3], double out[]);
+void gaussian_moments_vector_field(const gaussian_moments_params *params, const double x[3], double out[3]);
+
 typedef enum { gaussian_moments_OK = 0, gaussian_moments_NO_CONVERGENCE, gaussian_moments_SINGULAR,
     gaussian_moments_NOT_FINITE, gaussian_moments_BAD_ARGUMENT } gaussian_moments_status;
 const char *gaussian_moments_status_string(gaussian_moments_status status);
@@ -37,8 +39,7 @@ typedef struct {
     double difference[gaussian_moments_DIFFERENCES][gaussian_moments_DIM];
 } gaussian_moments_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   gaussian_moments_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[gaussian_moments_DIM];     /* the state; read it freely, change it only through functions */
     double carry[gaussian_moments_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -52,10 +53,11 @@ typedef struct {
     double t_before_h;
     gaussian_moments_history history; /* for starting guesses */
 } gaussian_moments_solver;
+size_t gaussian_moments_solver_size(void); /* for bindings to other languages, as what follows */
+size_t gaussian_moments_solver_steps_done(const gaussian_moments_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. gaussian_moments_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. gaussian_moments_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
     const gaussian_moments_params *params, const double x0[gaussian_moments_DIM]);
 
@@ -74,18 +76,6 @@ gaussian_moments_status gaussian_moments_kick(gaussian_moments_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 gaussian_moments_status gaussian_moments_ensemble(const gaussian_moments_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double gaussian_moments_hamiltonian(const gaussian_moments_params *params,
-    const double x[gaussian_moments_DIM]);
-void gaussian_moments_casimirs(const gaussian_moments_params *params, const double x[gaussian_moments_DIM],
-    double out[]);
-void gaussian_moments_vector_field(const gaussian_moments_params *params,
-    const double x[gaussian_moments_DIM], double out[gaussian_moments_DIM]);
-
-/* For bindings: the size of gaussian_moments_solver, and its count of good steps. */
-size_t gaussian_moments_solver_size(void);
-size_t gaussian_moments_solver_steps_done(const gaussian_moments_solver *s);
 
 #ifdef __cplusplus
 }

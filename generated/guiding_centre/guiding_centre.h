@@ -1,8 +1,7 @@
 /*
- * guiding_centre.h: the declarations; guiding_centre.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of guiding_centre.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 27c3acf928b468b95d7b2a16c0883758fb2bdab5973b578e12d91b0691c72660
+ * body-sha256: cb11dd045e042ccdc3ccb725a6dcda70b582e293e85ac0f328d436bc6dcffb48
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -10,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define guiding_centre_DIM 4
+#define guiding_centre_DIM 4 /* coordinates: x, y, z, u */
 #define guiding_centre_ORDER 4
 #define guiding_centre_CASIMIRS 0
 #define guiding_centre_PHIGEN_VERSION "0.1.0"
@@ -18,7 +17,6 @@ extern "C" {
 enum { guiding_centre_STAGES = 5 };       /* of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 
-/* State vectors: x, y, z, u. Casimirs: none. */
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */
     double mu;    /* magnetic moment */
@@ -26,7 +24,11 @@ typedef struct {
 } guiding_centre_params;
 extern const guiding_centre_params guiding_centre_default_params;
 
-/* How a step ends; guiding_centre_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double guiding_centre_hamiltonian(const guiding_centre_params *params, const double x[4]);
+void guiding_centre_casimirs(const guiding_centre_params *params, const double x[4], double out[]);
+void guiding_centre_vector_field(const guiding_centre_params *params, const double x[4], double out[4]);
+
 typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR,
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
 const char *guiding_centre_status_string(guiding_centre_status status);
@@ -39,7 +41,7 @@ typedef struct {
     double difference[guiding_centre_DIFFERENCES][guiding_centre_DIM];
 } guiding_centre_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with guiding_centre_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[guiding_centre_DIM];     /* the state; read it freely, change it only through functions */
     double carry[guiding_centre_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -54,10 +56,11 @@ typedef struct {
     double t_before_h;
     guiding_centre_history history[guiding_centre_STAGES]; /* for starting guesses */
 } guiding_centre_solver;
+size_t guiding_centre_solver_size(void); /* for bindings to other languages, as what follows */
+size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. guiding_centre_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. guiding_centre_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guiding_centre_params *params,
     const double x0[guiding_centre_DIM]);
 
@@ -74,17 +77,6 @@ guiding_centre_status guiding_centre_kick(guiding_centre_solver *s, const double
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 guiding_centre_status guiding_centre_ensemble(const guiding_centre_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double guiding_centre_hamiltonian(const guiding_centre_params *params, const double x[guiding_centre_DIM]);
-void guiding_centre_casimirs(const guiding_centre_params *params, const double x[guiding_centre_DIM],
-    double out[]);
-void guiding_centre_vector_field(const guiding_centre_params *params, const double x[guiding_centre_DIM],
-    double out[guiding_centre_DIM]);
-
-/* For bindings: the size of guiding_centre_solver, and its count of good steps. */
-size_t guiding_centre_solver_size(void);
-size_t guiding_centre_solver_steps_done(const guiding_centre_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * harmonic_oscillator.h: the declarations; harmonic_oscillator.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of harmonic_oscillator.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 876d7acebf15a060f3b990ece809432bb84561d9434058cf75cd438eccaadade
+ * body-sha256: ccf32c42f34cd7a2093cf7211de24714eabcc9badba75aa5c4c63b0a9bf48981
  */
 #ifndef HARMONIC_OSCILLATOR_H
 #define HARMONIC_OSCILLATOR_H
@@ -10,21 +9,25 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define harmonic_oscillator_DIM 2
+#define harmonic_oscillator_DIM 2 /* coordinates: q, p */
 #define harmonic_oscillator_ORDER 4
 #define harmonic_oscillator_CASIMIRS 0
 #define harmonic_oscillator_PHIGEN_VERSION "0.1.0"
 #define harmonic_oscillator_SPEC_SHA256 "8fea2d54be1733fb7959bf089f29b69f069d88cc4d415a7096ee372bcd8b8f90"
 enum { harmonic_oscillator_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
 
-/* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double m; /* mass */
     double k; /* stiffness of the spring */
 } harmonic_oscillator_params;
 extern const harmonic_oscillator_params harmonic_oscillator_default_params;
 
-/* How a step ends; harmonic_oscillator_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params, const double x[2]);
+void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params, const double x[2], double out[]);
+void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params, const double x[2],
+    double out[2]);
+
 typedef enum { harmonic_oscillator_OK = 0, harmonic_oscillator_NO_CONVERGENCE, harmonic_oscillator_SINGULAR,
     harmonic_oscillator_NOT_FINITE, harmonic_oscillator_BAD_ARGUMENT } harmonic_oscillator_status;
 const char *harmonic_oscillator_status_string(harmonic_oscillator_status status);
@@ -37,8 +40,7 @@ typedef struct {
     double difference[harmonic_oscillator_DIFFERENCES][harmonic_oscillator_DIM];
 } harmonic_oscillator_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   harmonic_oscillator_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[harmonic_oscillator_DIM];     /* the state; read it freely, change it only through functions */
     double carry[harmonic_oscillator_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -52,10 +54,11 @@ typedef struct {
     double t_before_h;
     harmonic_oscillator_history history; /* for starting guesses */
 } harmonic_oscillator_solver;
+size_t harmonic_oscillator_solver_size(void); /* for bindings to other languages, as what follows */
+size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. harmonic_oscillator_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that
-   has to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. harmonic_oscillator_BAD_ARGUMENT, and *s as before, if
+   x0, a parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *s,
     const harmonic_oscillator_params *params, const double x0[harmonic_oscillator_DIM]);
 
@@ -75,18 +78,6 @@ harmonic_oscillator_status harmonic_oscillator_kick(harmonic_oscillator_solver *
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 harmonic_oscillator_status harmonic_oscillator_ensemble(const harmonic_oscillator_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double harmonic_oscillator_hamiltonian(const harmonic_oscillator_params *params,
-    const double x[harmonic_oscillator_DIM]);
-void harmonic_oscillator_casimirs(const harmonic_oscillator_params *params,
-    const double x[harmonic_oscillator_DIM], double out[]);
-void harmonic_oscillator_vector_field(const harmonic_oscillator_params *params,
-    const double x[harmonic_oscillator_DIM], double out[harmonic_oscillator_DIM]);
-
-/* For bindings: the size of harmonic_oscillator_solver, and its count of good steps. */
-size_t harmonic_oscillator_solver_size(void);
-size_t harmonic_oscillator_solver_steps_done(const harmonic_oscillator_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * heisenberg.h: the declarations; heisenberg.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8cffee2deeb7f3100894c105e8704b4bbfc2d14547ac3e9ee3442288a82cc583
+ * body-sha256: 7bb3e7584af9234364a79885a732303f65d8fee16d0a9998896495470d2f9c2d
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -28,7 +27,6 @@ extern const heisenberg_params heisenberg_default_params;
 enum { heisenberg_ARRAYS = 4 };        /* arrays over the sites: fields, then parameters */
 enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that depend on params and h only */
 
-/* How a step ends; heisenberg_status_string says it in words. */
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
     heisenberg_BAD_ARGUMENT } heisenberg_status;
 

@@ -1,8 +1,7 @@
 /*
- * heisenberg_plane.h: the declarations; heisenberg_plane.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of heisenberg_plane.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8396bbe6a1d00339c7a53af38d3e7de64b1afac6b6e4bfb0953defcc2421f25b
+ * body-sha256: 51ca20ae34aa43684f2091bca0a00082d0943bf0a7970b158df064bb95b7793b
  */
 #ifndef HEISENBERG_PLANE_H
 #define HEISENBERG_PLANE_H
@@ -28,7 +27,6 @@ extern const heisenberg_plane_params heisenberg_plane_default_params;
 enum { heisenberg_plane_ARRAYS = 3 };        /* arrays over the sites: fields, then parameters */
 enum { heisenberg_plane_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 
-/* How a step ends; heisenberg_plane_status_string says it in words. */
 typedef enum { heisenberg_plane_OK = 0, heisenberg_plane_NO_CONVERGENCE, heisenberg_plane_SINGULAR,
     heisenberg_plane_NOT_FINITE, heisenberg_plane_BAD_ARGUMENT } heisenberg_plane_status;
 

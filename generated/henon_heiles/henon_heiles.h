@@ -1,8 +1,7 @@
 /*
- * henon_heiles.h: the declarations; henon_heiles.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of henon_heiles.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7c0433f2345fc4bc3492c7d1f11ce858e80c34136c2954de710b6a18d29b48de
+ * body-sha256: 39636ce6ed953262621640f81ff3e8875b73bec1a028aba77b6ca2a38f6f91fe
  */
 #ifndef HENON_HEILES_H
 #define HENON_HEILES_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define henon_heiles_DIM 4
+#define henon_heiles_DIM 4 /* coordinates: x, y, px, py */
 #define henon_heiles_ORDER 6
 #define henon_heiles_CASIMIRS 0
 #define henon_heiles_PHIGEN_VERSION "0.1.0"
 #define henon_heiles_SPEC_SHA256 "344c927b8e04345779f4c5f13f803b87485fa1196d3f3acdf913e1c4000a502e"
 enum { henon_heiles_COEFFICIENTS = 24 }; /* numbers that depend on params and h only */
 
-/* State vectors: x, y, px, py. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } henon_heiles_params;
 extern const henon_heiles_params henon_heiles_default_params;
 
-/* How a step ends; henon_heiles_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double henon_heiles_hamiltonian(const henon_heiles_params *params, const double x[4]);
+void henon_heiles_casimirs(const henon_heiles_params *params, const double x[4], double out[]);
+void henon_heiles_vector_field(const henon_heiles_params *params, const double x[4], double out[4]);
+
 typedef enum { henon_heiles_OK = 0, henon_heiles_NO_CONVERGENCE, henon_heiles_SINGULAR,
     henon_heiles_NOT_FINITE, henon_heiles_BAD_ARGUMENT } henon_heiles_status;
 const char *henon_heiles_status_string(henon_heiles_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[henon_heiles_DIFFERENCES][henon_heiles_DIM];
 } henon_heiles_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with henon_heiles_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[henon_heiles_DIM];     /* the state; read it freely, change it only through functions */
     double carry[henon_heiles_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     henon_heiles_history history; /* for starting guesses */
 } henon_heiles_solver;
+size_t henon_heiles_solver_size(void); /* for bindings to other languages, as what follows */
+size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. henon_heiles_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. henon_heiles_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles_params *params,
     const double x0[henon_heiles_DIM]);
 
@@ -70,16 +73,6 @@ henon_heiles_status henon_heiles_kick(henon_heiles_solver *s, const double chang
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 henon_heiles_status henon_heiles_ensemble(const henon_heiles_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double henon_heiles_hamiltonian(const henon_heiles_params *params, const double x[henon_heiles_DIM]);
-void henon_heiles_casimirs(const henon_heiles_params *params, const double x[henon_heiles_DIM], double out[]);
-void henon_heiles_vector_field(const henon_heiles_params *params, const double x[henon_heiles_DIM],
-    double out[henon_heiles_DIM]);
-
-/* For bindings: the size of henon_heiles_solver, and its count of good steps. */
-size_t henon_heiles_solver_size(void);
-size_t henon_heiles_solver_steps_done(const henon_heiles_solver *s);
 
 #ifdef __cplusplus
 }

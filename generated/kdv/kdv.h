@@ -1,8 +1,7 @@
 /*
- * kdv.h: the declarations; kdv.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of kdv.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0019d3a7def87db7a555da9669b08863499c80e4cbc8677581f95247c4a3ae22
+ * body-sha256: e17ded288b83b26e490e74f02f494c860b793a4c019c771ae8a6b1902e5dd2fc
  */
 #ifndef KDV_H
 #define KDV_H
@@ -29,7 +28,6 @@ enum { kdv_ARRAYS = 1 };       /* arrays over the sites: fields, then parameters
 enum { kdv_COEFFICIENTS = 7 }; /* numbers that depend on params and h only */
 enum { kdv_DIFFERENCES = 4 };  /* that a guess is extrapolated from */
 
-/* How a step ends; kdv_status_string says it in words. */
 typedef enum { kdv_OK = 0, kdv_NO_CONVERGENCE, kdv_SINGULAR, kdv_NOT_FINITE, kdv_BAD_ARGUMENT } kdv_status;
 
 /* What guesses for the y of a stage are extrapolated from: differences of the last values of y - x. */

@@ -1,8 +1,7 @@
 /*
- * kepler.h: the declarations; kepler.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of kepler.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ba84a1bde924945da5f975888e3d99f10ca4baea31be81efc3576274cbc83281
+ * body-sha256: 0a4c5d2378a1ad1f19505d7fb4092cf73d6ebbcb79fefa5007b0c570ea3ffa02
  */
 #ifndef KEPLER_H
 #define KEPLER_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define kepler_DIM 4
+#define kepler_DIM 4 /* coordinates: x, y, px, py */
 #define kepler_ORDER 6
 #define kepler_CASIMIRS 0
 #define kepler_PHIGEN_VERSION "0.1.0"
 #define kepler_SPEC_SHA256 "7d889f3f1aeb8f2269b42200556d64daeb9a92956762d91c1f8a8d00d84f48f2"
 enum { kepler_COEFFICIENTS = 118 }; /* numbers that depend on params and h only */
 
-/* State vectors: x, y, px, py. Casimirs: none. */
 typedef struct {
     double mu; /* gravitational parameter of the centre */
 } kepler_params;
 extern const kepler_params kepler_default_params;
 
-/* How a step ends; kepler_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double kepler_hamiltonian(const kepler_params *params, const double x[4]);
+void kepler_casimirs(const kepler_params *params, const double x[4], double out[]);
+void kepler_vector_field(const kepler_params *params, const double x[4], double out[4]);
+
 typedef enum { kepler_OK = 0, kepler_NO_CONVERGENCE, kepler_SINGULAR, kepler_NOT_FINITE,
     kepler_BAD_ARGUMENT } kepler_status;
 const char *kepler_status_string(kepler_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[kepler_DIFFERENCES][kepler_DIM];
 } kepler_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with kepler_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[kepler_DIM];     /* the state; read it freely, change it only through functions */
     double carry[kepler_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     kepler_history history; /* for starting guesses */
 } kepler_solver;
+size_t kepler_solver_size(void); /* for bindings to other languages, as what follows */
+size_t kepler_solver_steps_done(const kepler_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. kepler_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. kepler_BAD_ARGUMENT, and *s as before, if x0, a parameter
+   or what follows from parameters alone is not finite, or one not positive that has to be. */
 kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const double x0[kepler_DIM]);
 
 /* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
@@ -69,15 +72,6 @@ kepler_status kepler_kick(kepler_solver *s, const double change[kepler_DIM]);
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 kepler_status kepler_ensemble(const kepler_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double kepler_hamiltonian(const kepler_params *params, const double x[kepler_DIM]);
-void kepler_casimirs(const kepler_params *params, const double x[kepler_DIM], double out[]);
-void kepler_vector_field(const kepler_params *params, const double x[kepler_DIM], double out[kepler_DIM]);
-
-/* For bindings: the size of kepler_solver, and its count of good steps. */
-size_t kepler_solver_size(void);
-size_t kepler_solver_steps_done(const kepler_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * kepler_eccentric.h: the declarations; kepler_eccentric.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of kepler_eccentric.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4538ba0ba047742f0f9eece7634f5f7d7cd0a1aaa33ad1e270b05a81f54d5838
+ * body-sha256: e5bb2fa0399b4d3a1d223a58a1125bdd2a76a6e13f063d70080ba71d148ed6a2
  */
 #ifndef KEPLER_ECCENTRIC_H
 #define KEPLER_ECCENTRIC_H
@@ -10,7 +9,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define kepler_eccentric_DIM 4
+#define kepler_eccentric_DIM 4 /* coordinates: q1, q2, p1, p2 */
 #define kepler_eccentric_ORDER 8
 #define kepler_eccentric_CASIMIRS 0
 #define kepler_eccentric_PHIGEN_VERSION "0.1.0"
@@ -18,19 +17,24 @@ extern "C" {
 enum { kepler_eccentric_COEFFICIENTS = 140 }; /* numbers that depend on params and h only */
 enum { kepler_eccentric_GAUGES = 1 };         /* that a trajectory holds fixed: e */
 
-/* State vectors: q1, q2, p1, p2. Casimirs: none. */
 typedef struct {
     double oblateness; /* quadrupole of the planet */
 } kepler_eccentric_params;
 extern const kepler_eccentric_params kepler_eccentric_default_params;
 
-/* How a step ends; kepler_eccentric_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double kepler_eccentric_hamiltonian(const kepler_eccentric_params *params, const double x[4]);
+void kepler_eccentric_casimirs(const kepler_eccentric_params *params, const double x[4], double out[]);
+void kepler_eccentric_vector_field(const kepler_eccentric_params *params, const double x[4], double out[4]);
+
+/* dt/dtau at x; params may be NULL. */
+double kepler_eccentric_monitor(const kepler_eccentric_params *params, const double x[4]);
+
 typedef enum { kepler_eccentric_OK = 0, kepler_eccentric_NO_CONVERGENCE, kepler_eccentric_SINGULAR,
     kepler_eccentric_NOT_FINITE, kepler_eccentric_BAD_ARGUMENT } kepler_eccentric_status;
 const char *kepler_eccentric_status_string(kepler_eccentric_status status);
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   kepler_eccentric_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[kepler_eccentric_DIM];     /* the state; read it freely, change it only through functions */
     double carry[kepler_eccentric_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -43,10 +47,12 @@ typedef struct {
     double gauge[kepler_eccentric_GAUGES]; /* e = -H(x0): K = monitor (H + e) is 0 along the trajectory */
     double coef[kepler_eccentric_COEFFICIENTS]; /* all that depends on params and h only */
 } kepler_eccentric_solver;
+size_t kepler_eccentric_solver_size(void); /* for bindings to other languages, as what follows */
+size_t kepler_eccentric_solver_steps_done(const kepler_eccentric_solver *s);
+double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. kepler_eccentric_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. kepler_eccentric_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 /* Also if kepler_eccentric_monitor is not positive at x0. */
 kepler_eccentric_status kepler_eccentric_init(kepler_eccentric_solver *s,
     const kepler_eccentric_params *params, const double x0[kepler_eccentric_DIM]);
@@ -73,22 +79,6 @@ kepler_eccentric_status kepler_eccentric_kick(kepler_eccentric_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 kepler_eccentric_status kepler_eccentric_ensemble(const kepler_eccentric_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double kepler_eccentric_hamiltonian(const kepler_eccentric_params *params,
-    const double x[kepler_eccentric_DIM]);
-void kepler_eccentric_casimirs(const kepler_eccentric_params *params, const double x[kepler_eccentric_DIM],
-    double out[]);
-void kepler_eccentric_vector_field(const kepler_eccentric_params *params,
-    const double x[kepler_eccentric_DIM], double out[kepler_eccentric_DIM]);
-
-/* dt/dtau at x; params may be NULL. */
-double kepler_eccentric_monitor(const kepler_eccentric_params *params, const double x[kepler_eccentric_DIM]);
-
-/* For bindings: the size of kepler_eccentric_solver, and its count of good steps. */
-size_t kepler_eccentric_solver_size(void);
-size_t kepler_eccentric_solver_steps_done(const kepler_eccentric_solver *s);
-double kepler_eccentric_solver_time(const kepler_eccentric_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * klein_gordon.h: the declarations; klein_gordon.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of klein_gordon.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: fe404b33b8901bf93dae8d66180ab127b2e319454a35b524a71dc92cb6c17345
+ * body-sha256: 205b0f0d8931df3b4eb3a8f14c32a140dad4d7652a2f60e8d8c42e5eba893877
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
@@ -27,7 +26,6 @@ extern const klein_gordon_params klein_gordon_default_params;
 enum { klein_gordon_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { klein_gordon_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
 
-/* How a step ends; klein_gordon_status_string says it in words. */
 typedef enum { klein_gordon_OK = 0, klein_gordon_NO_CONVERGENCE, klein_gordon_SINGULAR,
     klein_gordon_NOT_FINITE, klein_gordon_BAD_ARGUMENT } klein_gordon_status;
 

@@ -1,8 +1,7 @@
 /*
- * kowalevski_top.h: the declarations; kowalevski_top.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of kowalevski_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8f5fd42831ad1930c645d4b445607f9c1135d49283d24c07df5383c8e4353140
+ * body-sha256: 19cc964e98c6d9193abf82358f625b963a4865d816bcb676448d97a6f28321a6
  */
 #ifndef KOWALEVSKI_TOP_H
 #define KOWALEVSKI_TOP_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define kowalevski_top_DIM 6
+#define kowalevski_top_DIM 6 /* coordinates: P1, P2, P3, G1, G2, G3 */
 #define kowalevski_top_ORDER 8
-#define kowalevski_top_CASIMIRS 2
+#define kowalevski_top_CASIMIRS 2 /* A, B */
 #define kowalevski_top_PHIGEN_VERSION "0.1.0"
 #define kowalevski_top_SPEC_SHA256 "2799755b3e3da2be9c8c923424249137334cdb1506fcba1c87c071179c75beaa"
 enum { kowalevski_top_COEFFICIENTS = 172 }; /* numbers that depend on params and h only */
@@ -20,13 +19,16 @@ enum { kowalevski_top_REMEMBERED = 111 };   /* values that a recurrence is fitte
 enum { kowalevski_top_WINDOW = 40 };        /* of them that it may use */
 enum { kowalevski_top_AHEAD = 8 };          /* values that it foresees */
 
-/* State vectors: P1, P2, P3, G1, G2, G3. Casimirs: A, B. */
 typedef struct {
     char unused; /* this system has no parameters */
 } kowalevski_top_params;
 extern const kowalevski_top_params kowalevski_top_default_params;
 
-/* How a step ends; kowalevski_top_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const double x[6]);
+void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[6], double out[]);
+void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[6], double out[6]);
+
 typedef enum { kowalevski_top_OK = 0, kowalevski_top_NO_CONVERGENCE, kowalevski_top_SINGULAR,
     kowalevski_top_NOT_FINITE, kowalevski_top_BAD_ARGUMENT } kowalevski_top_status;
 const char *kowalevski_top_status_string(kowalevski_top_status status);
@@ -60,7 +62,7 @@ typedef struct {
     size_t recurrences_from_step;     /* when that is */
 } kowalevski_top_learnt;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with kowalevski_top_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[kowalevski_top_DIM];     /* the state; read it freely, change it only through functions */
     double carry[kowalevski_top_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -75,10 +77,11 @@ typedef struct {
     kowalevski_top_history history; /* for starting guesses */
     kowalevski_top_learnt blocks;
 } kowalevski_top_solver;
+size_t kowalevski_top_solver_size(void); /* for bindings to other languages, as what follows */
+size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. kowalevski_top_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. kowalevski_top_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowalevski_top_params *params,
     const double x0[kowalevski_top_DIM]);
 
@@ -103,17 +106,6 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
    not overlap. */
 kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double kowalevski_top_hamiltonian(const kowalevski_top_params *params, const double x[kowalevski_top_DIM]);
-void kowalevski_top_casimirs(const kowalevski_top_params *params, const double x[kowalevski_top_DIM],
-    double out[]);
-void kowalevski_top_vector_field(const kowalevski_top_params *params, const double x[kowalevski_top_DIM],
-    double out[kowalevski_top_DIM]);
-
-/* For bindings: the size of kowalevski_top_solver, and its count of good steps. */
-size_t kowalevski_top_solver_size(void);
-size_t kowalevski_top_solver_steps_done(const kowalevski_top_solver *s);
 
 #ifdef __cplusplus
 }

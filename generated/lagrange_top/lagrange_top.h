@@ -1,8 +1,7 @@
 /*
- * lagrange_top.h: the declarations; lagrange_top.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of lagrange_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eab01b53398f6144790f5d09dc9faa39d8eab39c7f37c679f87799cf2482cb95
+ * body-sha256: 861291653de24ccbc03a56aa01eb98dddad7955eb5fbc223f38ae78701a8679a
  */
 #ifndef LAGRANGE_TOP_H
 #define LAGRANGE_TOP_H
@@ -10,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define lagrange_top_DIM 6
+#define lagrange_top_DIM 6 /* coordinates: P1, P2, P3, G1, G2, G3 */
 #define lagrange_top_ORDER 4
-#define lagrange_top_CASIMIRS 2
+#define lagrange_top_CASIMIRS 2 /* A, B */
 #define lagrange_top_PHIGEN_VERSION "0.1.0"
 #define lagrange_top_SPEC_SHA256 "dc5faff4a3a290ee3b9329fcccd8fb8e506caefcd665168370fc76ae8622ea1f"
 enum { lagrange_top_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
 
-/* State vectors: P1, P2, P3, G1, G2, G3. Casimirs: A, B. */
 typedef struct {
     double I1;  /* moment of inertia about the first and second axes */
     double I3;  /* moment of inertia about the axis of symmetry */
@@ -25,7 +23,11 @@ typedef struct {
 } lagrange_top_params;
 extern const lagrange_top_params lagrange_top_default_params;
 
-/* How a step ends; lagrange_top_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double lagrange_top_hamiltonian(const lagrange_top_params *params, const double x[6]);
+void lagrange_top_casimirs(const lagrange_top_params *params, const double x[6], double out[]);
+void lagrange_top_vector_field(const lagrange_top_params *params, const double x[6], double out[6]);
+
 typedef enum { lagrange_top_OK = 0, lagrange_top_NO_CONVERGENCE, lagrange_top_SINGULAR,
     lagrange_top_NOT_FINITE, lagrange_top_BAD_ARGUMENT } lagrange_top_status;
 const char *lagrange_top_status_string(lagrange_top_status status);
@@ -38,7 +40,7 @@ typedef struct {
     double difference[lagrange_top_DIFFERENCES][lagrange_top_DIM];
 } lagrange_top_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lagrange_top_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[lagrange_top_DIM];     /* the state; read it freely, change it only through functions */
     double carry[lagrange_top_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -52,10 +54,11 @@ typedef struct {
     double t_before_h;
     lagrange_top_history history; /* for starting guesses */
 } lagrange_top_solver;
+size_t lagrange_top_solver_size(void); /* for bindings to other languages, as what follows */
+size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. lagrange_top_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. lagrange_top_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top_params *params,
     const double x0[lagrange_top_DIM]);
 
@@ -72,16 +75,6 @@ lagrange_top_status lagrange_top_kick(lagrange_top_solver *s, const double chang
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 lagrange_top_status lagrange_top_ensemble(const lagrange_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double lagrange_top_hamiltonian(const lagrange_top_params *params, const double x[lagrange_top_DIM]);
-void lagrange_top_casimirs(const lagrange_top_params *params, const double x[lagrange_top_DIM], double out[]);
-void lagrange_top_vector_field(const lagrange_top_params *params, const double x[lagrange_top_DIM],
-    double out[lagrange_top_DIM]);
-
-/* For bindings: the size of lagrange_top_solver, and its count of good steps. */
-size_t lagrange_top_solver_size(void);
-size_t lagrange_top_solver_steps_done(const lagrange_top_solver *s);
 
 #ifdef __cplusplus
 }

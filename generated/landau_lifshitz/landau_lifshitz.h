@@ -1,8 +1,7 @@
 /*
- * landau_lifshitz.h: the declarations; landau_lifshitz.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of landau_lifshitz.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9ee13a9964b0e04662212b605fea397c5712e459ad089cd08a1b15f91a039573
+ * body-sha256: 7b4d5e9db358fb236694a641b22ca26b881c45b163fde8da543bf4ff5d2d7bc2
  */
 #ifndef LANDAU_LIFSHITZ_H
 #define LANDAU_LIFSHITZ_H
@@ -10,15 +9,14 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define landau_lifshitz_DIM 3
+#define landau_lifshitz_DIM 3 /* coordinates: x, y, z */
 #define landau_lifshitz_ORDER 4
-#define landau_lifshitz_CASIMIRS 1
+#define landau_lifshitz_CASIMIRS 1 /* length */
 #define landau_lifshitz_PHIGEN_VERSION "0.1.0"
 #define landau_lifshitz_SPEC_SHA256 "0ace50d0804c6bcf96c22e3ce0adf1306322d767826930130168365d5a0c1cdd"
 enum { landau_lifshitz_STAGES = 5 };       /* of a step */
 enum { landau_lifshitz_COEFFICIENTS = 6 }; /* numbers that depend on params and h only */
 
-/* State vectors: x, y, z. Casimirs: length. */
 typedef struct {
     double K;            /* anisotropy */
     double B;            /* field along -z */
@@ -26,7 +24,11 @@ typedef struct {
 } landau_lifshitz_params;
 extern const landau_lifshitz_params landau_lifshitz_default_params;
 
-/* How a step ends; landau_lifshitz_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double landau_lifshitz_hamiltonian(const landau_lifshitz_params *params, const double x[3]);
+void landau_lifshitz_casimirs(const landau_lifshitz_params *params, const double x[3], double out[]);
+void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const double x[3], double out[3]);
+
 typedef enum { landau_lifshitz_OK = 0, landau_lifshitz_NO_CONVERGENCE, landau_lifshitz_SINGULAR,
     landau_lifshitz_NOT_FINITE, landau_lifshitz_BAD_ARGUMENT } landau_lifshitz_status;
 const char *landau_lifshitz_status_string(landau_lifshitz_status status);
@@ -39,8 +41,7 @@ typedef struct {
     double difference[landau_lifshitz_DIFFERENCES][landau_lifshitz_DIM];
 } landau_lifshitz_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   landau_lifshitz_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[landau_lifshitz_DIM];     /* the state; read it freely, change it only through functions */
     double carry[landau_lifshitz_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -55,10 +56,11 @@ typedef struct {
     double t_before_h;
     landau_lifshitz_history history[landau_lifshitz_STAGES]; /* for starting guesses */
 } landau_lifshitz_solver;
+size_t landau_lifshitz_solver_size(void); /* for bindings to other languages, as what follows */
+size_t landau_lifshitz_solver_steps_done(const landau_lifshitz_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. landau_lifshitz_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. landau_lifshitz_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const landau_lifshitz_params *params,
     const double x0[landau_lifshitz_DIM]);
 
@@ -77,17 +79,6 @@ landau_lifshitz_status landau_lifshitz_kick(landau_lifshitz_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 landau_lifshitz_status landau_lifshitz_ensemble(const landau_lifshitz_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double landau_lifshitz_hamiltonian(const landau_lifshitz_params *params, const double x[landau_lifshitz_DIM]);
-void landau_lifshitz_casimirs(const landau_lifshitz_params *params, const double x[landau_lifshitz_DIM],
-    double out[]);
-void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const double x[landau_lifshitz_DIM],
-    double out[landau_lifshitz_DIM]);
-
-/* For bindings: the size of landau_lifshitz_solver, and its count of good steps. */
-size_t landau_lifshitz_solver_size(void);
-size_t landau_lifshitz_solver_steps_done(const landau_lifshitz_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * lotka_volterra.h: the declarations; lotka_volterra.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of lotka_volterra.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9994bdbec9ce2d28d95bfa531d87eace25d2a274359377fe9e8da9f5ad86473c
+ * body-sha256: 2c86be20f926f79df9bb6c6299193531f9b572906d65169ea57d548bbdbafd34
  */
 #ifndef LOTKA_VOLTERRA_H
 #define LOTKA_VOLTERRA_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define lotka_volterra_DIM 3
+#define lotka_volterra_DIM 3 /* coordinates: x1, x2, x3 */
 #define lotka_volterra_ORDER 2
-#define lotka_volterra_CASIMIRS 1
+#define lotka_volterra_CASIMIRS 1 /* C */
 #define lotka_volterra_PHIGEN_VERSION "0.1.0"
 #define lotka_volterra_SPEC_SHA256 "a253a78f7e0887e5a834a02b0b1f47451af2de51574fd76b016f875f92baa539"
 enum { lotka_volterra_COEFFICIENTS = 1 }; /* numbers that depend on params and h only */
@@ -20,13 +19,16 @@ enum { lotka_volterra_REMEMBERED = 111 }; /* values that a recurrence is fitted 
 enum { lotka_volterra_WINDOW = 40 };      /* of them that it may use */
 enum { lotka_volterra_AHEAD = 8 };        /* values that it foresees */
 
-/* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } lotka_volterra_params;
 extern const lotka_volterra_params lotka_volterra_default_params;
 
-/* How a step ends; lotka_volterra_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const double x[3]);
+void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[3], double out[]);
+void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[3], double out[3]);
+
 typedef enum { lotka_volterra_OK = 0, lotka_volterra_NO_CONVERGENCE, lotka_volterra_SINGULAR,
     lotka_volterra_NOT_FINITE, lotka_volterra_BAD_ARGUMENT } lotka_volterra_status;
 const char *lotka_volterra_status_string(lotka_volterra_status status);
@@ -60,7 +62,7 @@ typedef struct {
     size_t recurrences_from_step;     /* when that is */
 } lotka_volterra_learnt;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with lotka_volterra_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[lotka_volterra_DIM];     /* the state; read it freely, change it only through functions */
     double carry[lotka_volterra_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -75,10 +77,11 @@ typedef struct {
     lotka_volterra_history history; /* for starting guesses */
     lotka_volterra_learnt blocks;
 } lotka_volterra_solver;
+size_t lotka_volterra_solver_size(void); /* for bindings to other languages, as what follows */
+size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. lotka_volterra_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. lotka_volterra_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_volterra_params *params,
     const double x0[lotka_volterra_DIM]);
 
@@ -103,17 +106,6 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
    not overlap. */
 lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double lotka_volterra_hamiltonian(const lotka_volterra_params *params, const double x[lotka_volterra_DIM]);
-void lotka_volterra_casimirs(const lotka_volterra_params *params, const double x[lotka_volterra_DIM],
-    double out[]);
-void lotka_volterra_vector_field(const lotka_volterra_params *params, const double x[lotka_volterra_DIM],
-    double out[lotka_volterra_DIM]);
-
-/* For bindings: the size of lotka_volterra_solver, and its count of good steps. */
-size_t lotka_volterra_solver_size(void);
-size_t lotka_volterra_solver_steps_done(const lotka_volterra_solver *s);
 
 #ifdef __cplusplus
 }

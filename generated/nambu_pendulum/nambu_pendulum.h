@@ -1,8 +1,7 @@
 /*
- * nambu_pendulum.h: the declarations; nambu_pendulum.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of nambu_pendulum.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 59a5e80f50437fa39d1288e4d6c36353ff33b1b90647ec5ad38d44c0fca904e7
+ * body-sha256: 20bf672db1a33f9efd3998d1e08bdad8c4c66b0eee066363ad981613009edb93
  */
 #ifndef NAMBU_PENDULUM_H
 #define NAMBU_PENDULUM_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define nambu_pendulum_DIM 3
+#define nambu_pendulum_DIM 3 /* coordinates: theta, p, V */
 #define nambu_pendulum_ORDER 4
-#define nambu_pendulum_CASIMIRS 1
+#define nambu_pendulum_CASIMIRS 1 /* C */
 #define nambu_pendulum_PHIGEN_VERSION "0.1.0"
 #define nambu_pendulum_SPEC_SHA256 "4a482cc6c1e66da787de49d9112e6ca1c38e0b9e783293e47090388bbe60f416"
 enum { nambu_pendulum_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
@@ -20,13 +19,16 @@ enum { nambu_pendulum_REMEMBERED = 111 }; /* values that a recurrence is fitted 
 enum { nambu_pendulum_WINDOW = 40 };      /* of them that it may use */
 enum { nambu_pendulum_AHEAD = 8 };        /* values that it foresees */
 
-/* State vectors: theta, p, V. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } nambu_pendulum_params;
 extern const nambu_pendulum_params nambu_pendulum_default_params;
 
-/* How a step ends; nambu_pendulum_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const double x[3]);
+void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[3], double out[]);
+void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[3], double out[3]);
+
 typedef enum { nambu_pendulum_OK = 0, nambu_pendulum_NO_CONVERGENCE, nambu_pendulum_SINGULAR,
     nambu_pendulum_NOT_FINITE, nambu_pendulum_BAD_ARGUMENT } nambu_pendulum_status;
 const char *nambu_pendulum_status_string(nambu_pendulum_status status);
@@ -60,7 +62,7 @@ typedef struct {
     size_t recurrences_from_step;     /* when that is */
 } nambu_pendulum_learnt;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with nambu_pendulum_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[nambu_pendulum_DIM];     /* the state; read it freely, change it only through functions */
     double carry[nambu_pendulum_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -75,10 +77,11 @@ typedef struct {
     nambu_pendulum_history history; /* for starting guesses */
     nambu_pendulum_learnt blocks;
 } nambu_pendulum_solver;
+size_t nambu_pendulum_solver_size(void); /* for bindings to other languages, as what follows */
+size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. nambu_pendulum_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. nambu_pendulum_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_pendulum_params *params,
     const double x0[nambu_pendulum_DIM]);
 
@@ -103,17 +106,6 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
    not overlap. */
 nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double nambu_pendulum_hamiltonian(const nambu_pendulum_params *params, const double x[nambu_pendulum_DIM]);
-void nambu_pendulum_casimirs(const nambu_pendulum_params *params, const double x[nambu_pendulum_DIM],
-    double out[]);
-void nambu_pendulum_vector_field(const nambu_pendulum_params *params, const double x[nambu_pendulum_DIM],
-    double out[nambu_pendulum_DIM]);
-
-/* For bindings: the size of nambu_pendulum_solver, and its count of good steps. */
-size_t nambu_pendulum_solver_size(void);
-size_t nambu_pendulum_solver_steps_done(const nambu_pendulum_solver *s);
 
 #ifdef __cplusplus
 }

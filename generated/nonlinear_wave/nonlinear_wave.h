@@ -1,8 +1,7 @@
 /*
- * nonlinear_wave.h: the declarations; nonlinear_wave.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of nonlinear_wave.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 11baecb8f1671179427f9e29c8821a86c88938ea000d5f5110ed4eccbc76c5a4
+ * body-sha256: 8099d2d7082062ac80fd6890277cdea8e950829ac1ea1d8bc7fbcfea69fe8340
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
@@ -28,7 +27,6 @@ extern const nonlinear_wave_params nonlinear_wave_default_params;
 enum { nonlinear_wave_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { nonlinear_wave_COEFFICIENTS = 56 }; /* numbers that depend on params and h only */
 
-/* How a step ends; nonlinear_wave_status_string says it in words. */
 typedef enum { nonlinear_wave_OK = 0, nonlinear_wave_NO_CONVERGENCE, nonlinear_wave_SINGULAR,
     nonlinear_wave_NOT_FINITE, nonlinear_wave_BAD_ARGUMENT } nonlinear_wave_status;
 

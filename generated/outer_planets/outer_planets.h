@@ -1,8 +1,7 @@
 /*
- * outer_planets.h: the declarations; outer_planets.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of outer_planets.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c38a1edfba709078e43cfe75aad6dcb29ca0f3c8e94fdfcb3275111ef3feb73d
+ * body-sha256: 61e965d7c88569bb64fdf55e197dc8f093517b40838293ed892bf4bce8541039
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -29,7 +28,6 @@ enum { outer_planets_ARRAYS = 7 };        /* arrays over the sites: fields, then
 enum { outer_planets_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
 enum { outer_planets_GATHERED = 3 };      /* sums over other sites that are held for each site */
 
-/* How a step ends; outer_planets_status_string says it in words. */
 typedef enum { outer_planets_OK = 0, outer_planets_NO_CONVERGENCE, outer_planets_SINGULAR,
     outer_planets_NOT_FINITE, outer_planets_BAD_ARGUMENT } outer_planets_status;
 

@@ -1,8 +1,7 @@
 /*
- * pendulum.h: the declarations; pendulum.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of pendulum.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1cfafe5aa90af7e7cf81ca790d302b41a6aa708e5b6899c23efec73fa7bd912c
+ * body-sha256: db517fb8adbb408cf0911adea290b6a84893cdbc0cfe6fe85306f280735d164d
  */
 #ifndef PENDULUM_H
 #define PENDULUM_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define pendulum_DIM 2
+#define pendulum_DIM 2 /* coordinates: q, p */
 #define pendulum_ORDER 6
 #define pendulum_CASIMIRS 0
 #define pendulum_PHIGEN_VERSION "0.1.0"
 #define pendulum_SPEC_SHA256 "ed81622cda36680120729d820e279a981f65dfdd206a130f06fa0ab7a405c963"
 enum { pendulum_COEFFICIENTS = 19 }; /* numbers that depend on params and h only */
 
-/* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double g; /* gravity over the length of the rod */
 } pendulum_params;
 extern const pendulum_params pendulum_default_params;
 
-/* How a step ends; pendulum_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double pendulum_hamiltonian(const pendulum_params *params, const double x[2]);
+void pendulum_casimirs(const pendulum_params *params, const double x[2], double out[]);
+void pendulum_vector_field(const pendulum_params *params, const double x[2], double out[2]);
+
 typedef enum { pendulum_OK = 0, pendulum_NO_CONVERGENCE, pendulum_SINGULAR, pendulum_NOT_FINITE,
     pendulum_BAD_ARGUMENT } pendulum_status;
 const char *pendulum_status_string(pendulum_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[pendulum_DIFFERENCES][pendulum_DIM];
 } pendulum_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[pendulum_DIM];     /* the state; read it freely, change it only through functions */
     double carry[pendulum_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     pendulum_history history; /* for starting guesses */
 } pendulum_solver;
+size_t pendulum_solver_size(void); /* for bindings to other languages, as what follows */
+size_t pendulum_solver_steps_done(const pendulum_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. pendulum_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. pendulum_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
     const double x0[pendulum_DIM]);
 
@@ -70,16 +73,6 @@ pendulum_status pendulum_kick(pendulum_solver *s, const double change[pendulum_D
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 pendulum_status pendulum_ensemble(const pendulum_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double pendulum_hamiltonian(const pendulum_params *params, const double x[pendulum_DIM]);
-void pendulum_casimirs(const pendulum_params *params, const double x[pendulum_DIM], double out[]);
-void pendulum_vector_field(const pendulum_params *params, const double x[pendulum_DIM],
-    double out[pendulum_DIM]);
-
-/* For bindings: the size of pendulum_solver, and its count of good steps. */
-size_t pendulum_solver_size(void);
-size_t pendulum_solver_steps_done(const pendulum_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * pendulum_euler.h: the declarations; pendulum_euler.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of pendulum_euler.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aca0594d34b35273764ef222eed57cf15ad6963e10f1be2d8f8edf98929e30b8
+ * body-sha256: 94521e11351130014158a9e2127b102657817b3ec0fe9a7142996c276bf16bbf
  */
 #ifndef PENDULUM_EULER_H
 #define PENDULUM_EULER_H
@@ -10,25 +9,28 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define pendulum_euler_DIM 2
+#define pendulum_euler_DIM 2 /* coordinates: q, p */
 #define pendulum_euler_ORDER 1
 #define pendulum_euler_CASIMIRS 0
 #define pendulum_euler_PHIGEN_VERSION "0.1.0"
 #define pendulum_euler_SPEC_SHA256 "10030022f93bccf90322e3b69b8a94dcdf9ef8ba03d95b772ef2b3dc4481dc59"
 enum { pendulum_euler_COEFFICIENTS = 2 }; /* numbers that depend on params and h only */
 
-/* State vectors: q, p. Casimirs: none. */
 typedef struct {
     double g; /* gravity over the length of the rod */
 } pendulum_euler_params;
 extern const pendulum_euler_params pendulum_euler_default_params;
 
-/* How a step ends; pendulum_euler_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const double x[2]);
+void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[2], double out[]);
+void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[2], double out[2]);
+
 typedef enum { pendulum_euler_OK = 0, pendulum_euler_NO_CONVERGENCE, pendulum_euler_SINGULAR,
     pendulum_euler_NOT_FINITE, pendulum_euler_BAD_ARGUMENT } pendulum_euler_status;
 const char *pendulum_euler_status_string(pendulum_euler_status status);
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with pendulum_euler_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[pendulum_euler_DIM];     /* the state; read it freely, change it only through functions */
     double carry[pendulum_euler_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -41,10 +43,11 @@ typedef struct {
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 } pendulum_euler_solver;
+size_t pendulum_euler_solver_size(void); /* for bindings to other languages, as what follows */
+size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. pendulum_euler_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. pendulum_euler_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendulum_euler_params *params,
     const double x0[pendulum_euler_DIM]);
 
@@ -61,17 +64,6 @@ pendulum_euler_status pendulum_euler_kick(pendulum_euler_solver *s, const double
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 pendulum_euler_status pendulum_euler_ensemble(const pendulum_euler_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double pendulum_euler_hamiltonian(const pendulum_euler_params *params, const double x[pendulum_euler_DIM]);
-void pendulum_euler_casimirs(const pendulum_euler_params *params, const double x[pendulum_euler_DIM],
-    double out[]);
-void pendulum_euler_vector_field(const pendulum_euler_params *params, const double x[pendulum_euler_DIM],
-    double out[pendulum_euler_DIM]);
-
-/* For bindings: the size of pendulum_euler_solver, and its count of good steps. */
-size_t pendulum_euler_solver_size(void);
-size_t pendulum_euler_solver_steps_done(const pendulum_euler_solver *s);
 
 #ifdef __cplusplus
 }

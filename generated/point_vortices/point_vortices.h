@@ -1,8 +1,7 @@
 /*
- * point_vortices.h: the declarations; point_vortices.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3821dbd7e44c6379b0e67737890df0f5f1ee3280faa216edce91acd8c0537748
+ * body-sha256: 67168655f2a6e26e0fb8572bb07f601d8cb8454a54133529e0565ccdbc67261f
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -31,7 +30,6 @@ enum { point_vortices_DIRECTIONS = 24 };  /* of a Krylov space */
 enum { point_vortices_DIFFERENCES = 2 };  /* that a guess is extrapolated from */
 enum { point_vortices_GATHERED = 4 };     /* sums over other sites that are held for each site */
 
-/* How a step ends; point_vortices_status_string says it in words. */
 typedef enum { point_vortices_OK = 0, point_vortices_NO_CONVERGENCE, point_vortices_SINGULAR,
     point_vortices_NOT_FINITE, point_vortices_BAD_ARGUMENT } point_vortices_status;
 

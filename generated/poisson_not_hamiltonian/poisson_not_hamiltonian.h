@@ -1,8 +1,7 @@
 /*
- * poisson_not_hamiltonian.h: the declarations; poisson_not_hamiltonian.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of poisson_not_hamiltonian.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2dc70251cb9a0d361dbf0bc773a93da509886ffabc35979ca0b0706749d0b2b3
+ * body-sha256: ba2c5dfd6ce45a5c17ba12185edde5fdaecdad4e0ee34d9113631d0f6c9ae5ee
  */
 #ifndef POISSON_NOT_HAMILTONIAN_H
 #define POISSON_NOT_HAMILTONIAN_H
@@ -10,20 +9,25 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define poisson_not_hamiltonian_DIM 3
+#define poisson_not_hamiltonian_DIM 3 /* coordinates: x, y, z */
 #define poisson_not_hamiltonian_ORDER 4
-#define poisson_not_hamiltonian_CASIMIRS 1
+#define poisson_not_hamiltonian_CASIMIRS 1 /* C */
 #define poisson_not_hamiltonian_PHIGEN_VERSION "0.1.0"
 #define poisson_not_hamiltonian_SPEC_SHA256 "91f506e06f622dbaf4083fe4274a994509dabe6e59da3a17c4a06cd9bcaa9603"
 enum { poisson_not_hamiltonian_COEFFICIENTS = 2 }; /* numbers that depend on params and h only */
 
-/* State vectors: x, y, z. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } poisson_not_hamiltonian_params;
 extern const poisson_not_hamiltonian_params poisson_not_hamiltonian_default_params;
 
-/* How a step ends; poisson_not_hamiltonian_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params, const double x[3]);
+void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params, const double x[3],
+    double out[]);
+void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params, const double x[3],
+    double out[3]);
+
 typedef enum { poisson_not_hamiltonian_OK = 0, poisson_not_hamiltonian_NO_CONVERGENCE,
     poisson_not_hamiltonian_SINGULAR, poisson_not_hamiltonian_NOT_FINITE,
     poisson_not_hamiltonian_BAD_ARGUMENT } poisson_not_hamiltonian_status;
@@ -38,8 +42,7 @@ typedef struct {
     double difference[poisson_not_hamiltonian_DIFFERENCES][poisson_not_hamiltonian_DIM];
 } poisson_not_hamiltonian_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   poisson_not_hamiltonian_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     /* the state; read it freely, change it only through functions */
     double x[poisson_not_hamiltonian_DIM];
@@ -54,10 +57,12 @@ typedef struct {
     double t_before_h;
     poisson_not_hamiltonian_history history; /* for starting guesses */
 } poisson_not_hamiltonian_solver;
+size_t poisson_not_hamiltonian_solver_size(void); /* for bindings to other languages, as what follows */
+size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. poisson_not_hamiltonian_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one
-   that has to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. poisson_not_hamiltonian_BAD_ARGUMENT, and *s as before,
+   if x0, a parameter or what follows from parameters alone is not finite, or one not positive that has to
+   be. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamiltonian_solver *s,
     const poisson_not_hamiltonian_params *params, const double x0[poisson_not_hamiltonian_DIM]);
 
@@ -77,18 +82,6 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_kick(poisson_not_hamilton
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 poisson_not_hamiltonian_status poisson_not_hamiltonian_ensemble(const poisson_not_hamiltonian_params *params,
     double *x, size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double poisson_not_hamiltonian_hamiltonian(const poisson_not_hamiltonian_params *params,
-    const double x[poisson_not_hamiltonian_DIM]);
-void poisson_not_hamiltonian_casimirs(const poisson_not_hamiltonian_params *params,
-    const double x[poisson_not_hamiltonian_DIM], double out[]);
-void poisson_not_hamiltonian_vector_field(const poisson_not_hamiltonian_params *params,
-    const double x[poisson_not_hamiltonian_DIM], double out[poisson_not_hamiltonian_DIM]);
-
-/* For bindings: the size of poisson_not_hamiltonian_solver, and its count of good steps. */
-size_t poisson_not_hamiltonian_solver_size(void);
-size_t poisson_not_hamiltonian_solver_steps_done(const poisson_not_hamiltonian_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * predator_prey.h: the declarations; predator_prey.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of predator_prey.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8519fc42cd79a20e95e492d7332158c6d706ab1e525bf5f78bb4e5a48a4ed28a
+ * body-sha256: bcaf39b73169f39092328426d60697113b3790ffbdd98fcdfd5a8812ade2ea8d
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -10,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define predator_prey_DIM 2
+#define predator_prey_DIM 2 /* coordinates: prey, predator */
 #define predator_prey_ORDER 4
 #define predator_prey_CASIMIRS 0
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that depend on params and h only */
 
-/* State vectors: prey, predator. Casimirs: none. */
 typedef struct {
     double growth; /* growth rate of the prey without predators */
     double attack; /* prey lost per predator and unit time */
@@ -26,7 +24,11 @@ typedef struct {
 } predator_prey_params;
 extern const predator_prey_params predator_prey_default_params;
 
-/* How a step ends; predator_prey_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double predator_prey_hamiltonian(const predator_prey_params *params, const double x[2]);
+void predator_prey_casimirs(const predator_prey_params *params, const double x[2], double out[]);
+void predator_prey_vector_field(const predator_prey_params *params, const double x[2], double out[2]);
+
 typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR,
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
 const char *predator_prey_status_string(predator_prey_status status);
@@ -39,7 +41,7 @@ typedef struct {
     double difference[predator_prey_DIFFERENCES][predator_prey_DIM];
 } predator_prey_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with predator_prey_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[predator_prey_DIM];     /* the state; read it freely, change it only through functions */
     double carry[predator_prey_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -53,10 +55,11 @@ typedef struct {
     double t_before_h;
     predator_prey_history history; /* for starting guesses */
 } predator_prey_solver;
+size_t predator_prey_solver_size(void); /* for bindings to other languages, as what follows */
+size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. predator_prey_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. predator_prey_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_prey_params *params,
     const double x0[predator_prey_DIM]);
 
@@ -73,17 +76,6 @@ predator_prey_status predator_prey_kick(predator_prey_solver *s, const double ch
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 predator_prey_status predator_prey_ensemble(const predator_prey_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double predator_prey_hamiltonian(const predator_prey_params *params, const double x[predator_prey_DIM]);
-void predator_prey_casimirs(const predator_prey_params *params, const double x[predator_prey_DIM],
-    double out[]);
-void predator_prey_vector_field(const predator_prey_params *params, const double x[predator_prey_DIM],
-    double out[predator_prey_DIM]);
-
-/* For bindings: the size of predator_prey_solver, and its count of good steps. */
-size_t predator_prey_solver_size(void);
-size_t predator_prey_solver_steps_done(const predator_prey_solver *s);
 
 #ifdef __cplusplus
 }

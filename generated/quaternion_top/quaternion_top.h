@@ -1,8 +1,7 @@
 /*
- * quaternion_top.h: the declarations; quaternion_top.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of quaternion_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: db4dc9e74868099f541c5226dfa8698ca6b483c0589b3a385c57a8c2eb643309
+ * body-sha256: 2fac9685a712083daa9975aea2bd8034ae0feac586cee53ae02f2b6ec37c4c53
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -10,15 +9,14 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define quaternion_top_DIM 7
+#define quaternion_top_DIM 7 /* coordinates: m1, m2, m3, w, x, y, z */
 #define quaternion_top_ORDER 4
-#define quaternion_top_CASIMIRS 1
+#define quaternion_top_CASIMIRS 1 /* length */
 #define quaternion_top_PHIGEN_VERSION "0.1.0"
 #define quaternion_top_SPEC_SHA256 "818ae683b38dea8c70860ad173c7962b5eb71229e0d7aeaea854acb32ebba04c"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that depend on params and h only */
 enum { quaternion_top_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: length */
 
-/* State vectors: m1, m2, m3, w, x, y, z. Casimirs: length. */
 typedef struct {
     double I1;     /* least moment of inertia */
     double I2;     /* intermediate moment of inertia */
@@ -28,7 +26,11 @@ typedef struct {
 } quaternion_top_params;
 extern const quaternion_top_params quaternion_top_default_params;
 
-/* How a step ends; quaternion_top_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double quaternion_top_hamiltonian(const quaternion_top_params *params, const double x[7]);
+void quaternion_top_casimirs(const quaternion_top_params *params, const double x[7], double out[]);
+void quaternion_top_vector_field(const quaternion_top_params *params, const double x[7], double out[7]);
+
 typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR,
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
 const char *quaternion_top_status_string(quaternion_top_status status);
@@ -41,7 +43,7 @@ typedef struct {
     double difference[quaternion_top_DIFFERENCES][quaternion_top_DIM];
 } quaternion_top_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with quaternion_top_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[quaternion_top_DIM];     /* the state; read it freely, change it only through functions */
     double carry[quaternion_top_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -56,10 +58,11 @@ typedef struct {
     double t_before_h;
     quaternion_top_history history; /* for starting guesses */
 } quaternion_top_solver;
+size_t quaternion_top_solver_size(void); /* for bindings to other languages, as what follows */
+size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. quaternion_top_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. quaternion_top_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 quaternion_top_status quaternion_top_init(quaternion_top_solver *s, const quaternion_top_params *params,
     const double x0[quaternion_top_DIM]);
 
@@ -80,17 +83,6 @@ quaternion_top_status quaternion_top_kick(quaternion_top_solver *s, const double
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 quaternion_top_status quaternion_top_ensemble(const quaternion_top_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double quaternion_top_hamiltonian(const quaternion_top_params *params, const double x[quaternion_top_DIM]);
-void quaternion_top_casimirs(const quaternion_top_params *params, const double x[quaternion_top_DIM],
-    double out[]);
-void quaternion_top_vector_field(const quaternion_top_params *params, const double x[quaternion_top_DIM],
-    double out[quaternion_top_DIM]);
-
-/* For bindings: the size of quaternion_top_solver, and its count of good steps. */
-size_t quaternion_top_solver_size(void);
-size_t quaternion_top_solver_steps_done(const quaternion_top_solver *s);
 
 #ifdef __cplusplus
 }

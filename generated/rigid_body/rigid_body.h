@@ -1,8 +1,7 @@
 /*
- * rigid_body.h: the declarations; rigid_body.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of rigid_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f2fe950ec2980979b6110beeb83193490d0b96240adc3e6fc2881c0053bb86b7
+ * body-sha256: 11f8f4e75e3f6dcf5dc5edd6afb2a1f7de938bb96e4050666ef4a53b39ce8e3a
  */
 #ifndef RIGID_BODY_H
 #define RIGID_BODY_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define rigid_body_DIM 3
+#define rigid_body_DIM 3 /* coordinates: x1, x2, x3 */
 #define rigid_body_ORDER 6
-#define rigid_body_CASIMIRS 1
+#define rigid_body_CASIMIRS 1 /* C */
 #define rigid_body_PHIGEN_VERSION "0.1.0"
 #define rigid_body_SPEC_SHA256 "8810186c1e0019884e5b3b03e44e3be202fcaec17d97ceab9967252a6cdb2d99"
 enum { rigid_body_COEFFICIENTS = 35 }; /* numbers that depend on params and h only */
@@ -21,7 +20,6 @@ enum { rigid_body_REMEMBERED = 111 };  /* values that a recurrence is fitted to 
 enum { rigid_body_WINDOW = 40 };       /* of them that it may use */
 enum { rigid_body_AHEAD = 8 };         /* values that it foresees */
 
-/* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
     double I1; /* first principal moment of inertia */
     double I2; /* second principal moment of inertia */
@@ -29,7 +27,11 @@ typedef struct {
 } rigid_body_params;
 extern const rigid_body_params rigid_body_default_params;
 
-/* How a step ends; rigid_body_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double rigid_body_hamiltonian(const rigid_body_params *params, const double x[3]);
+void rigid_body_casimirs(const rigid_body_params *params, const double x[3], double out[]);
+void rigid_body_vector_field(const rigid_body_params *params, const double x[3], double out[3]);
+
 typedef enum { rigid_body_OK = 0, rigid_body_NO_CONVERGENCE, rigid_body_SINGULAR, rigid_body_NOT_FINITE,
     rigid_body_BAD_ARGUMENT } rigid_body_status;
 const char *rigid_body_status_string(rigid_body_status status);
@@ -63,7 +65,7 @@ typedef struct {
     size_t recurrences_from_step;     /* when that is */
 } rigid_body_learnt;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with rigid_body_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[rigid_body_DIM];     /* the state; read it freely, change it only through functions */
     double carry[rigid_body_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -79,10 +81,11 @@ typedef struct {
     rigid_body_history history; /* for starting guesses */
     rigid_body_learnt blocks;
 } rigid_body_solver;
+size_t rigid_body_solver_size(void); /* for bindings to other languages, as what follows */
+size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. rigid_body_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. rigid_body_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 rigid_body_status rigid_body_init(rigid_body_solver *s, const rigid_body_params *params,
     const double x0[rigid_body_DIM]);
 
@@ -112,16 +115,6 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
    overlap. */
 rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
     const double *gauge, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double rigid_body_hamiltonian(const rigid_body_params *params, const double x[rigid_body_DIM]);
-void rigid_body_casimirs(const rigid_body_params *params, const double x[rigid_body_DIM], double out[]);
-void rigid_body_vector_field(const rigid_body_params *params, const double x[rigid_body_DIM],
-    double out[rigid_body_DIM]);
-
-/* For bindings: the size of rigid_body_solver, and its count of good steps. */
-size_t rigid_body_solver_size(void);
-size_t rigid_body_solver_steps_done(const rigid_body_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * rigid_body_dual.h: the declarations; rigid_body_dual.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of rigid_body_dual.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 648d86584094463a7033b7a1a14ce5507815c348ff8b1f8ef1fb87435bff2e21
+ * body-sha256: b36d5a2adfe262201d7039634bb0af5f5407e4e19925c29981381076b4d5843f
  */
 #ifndef RIGID_BODY_DUAL_H
 #define RIGID_BODY_DUAL_H
@@ -10,15 +9,14 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define rigid_body_dual_DIM 3
+#define rigid_body_dual_DIM 3 /* coordinates: x1, x2, x3 */
 #define rigid_body_dual_ORDER 4
-#define rigid_body_dual_CASIMIRS 1
+#define rigid_body_dual_CASIMIRS 1 /* C */
 #define rigid_body_dual_PHIGEN_VERSION "0.1.0"
 #define rigid_body_dual_SPEC_SHA256 "e8342777c4b6b547dcc62fa6d2e3aaf07e52570aa2174b60c461d6c56ed43f1b"
 enum { rigid_body_dual_COEFFICIENTS = 12 }; /* numbers that depend on params and h only */
 enum { rigid_body_dual_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: C */
 
-/* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
     double I1; /* first principal moment of inertia */
     double I2; /* second principal moment of inertia */
@@ -26,7 +24,11 @@ typedef struct {
 } rigid_body_dual_params;
 extern const rigid_body_dual_params rigid_body_dual_default_params;
 
-/* How a step ends; rigid_body_dual_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const double x[3]);
+void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[3], double out[]);
+void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[3], double out[3]);
+
 typedef enum { rigid_body_dual_OK = 0, rigid_body_dual_NO_CONVERGENCE, rigid_body_dual_SINGULAR,
     rigid_body_dual_NOT_FINITE, rigid_body_dual_BAD_ARGUMENT } rigid_body_dual_status;
 const char *rigid_body_dual_status_string(rigid_body_dual_status status);
@@ -39,8 +41,7 @@ typedef struct {
     double difference[rigid_body_dual_DIFFERENCES][rigid_body_dual_DIM];
 } rigid_body_dual_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   rigid_body_dual_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[rigid_body_dual_DIM];     /* the state; read it freely, change it only through functions */
     double carry[rigid_body_dual_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -55,10 +56,11 @@ typedef struct {
     double t_before_h;
     rigid_body_dual_history history; /* for starting guesses */
 } rigid_body_dual_solver;
+size_t rigid_body_dual_solver_size(void); /* for bindings to other languages, as what follows */
+size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. rigid_body_dual_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. rigid_body_dual_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 rigid_body_dual_status rigid_body_dual_init(rigid_body_dual_solver *s, const rigid_body_dual_params *params,
     const double x0[rigid_body_dual_DIM]);
 
@@ -82,17 +84,6 @@ rigid_body_dual_status rigid_body_dual_kick(rigid_body_dual_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 rigid_body_dual_status rigid_body_dual_ensemble(const rigid_body_dual_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double rigid_body_dual_hamiltonian(const rigid_body_dual_params *params, const double x[rigid_body_dual_DIM]);
-void rigid_body_dual_casimirs(const rigid_body_dual_params *params, const double x[rigid_body_dual_DIM],
-    double out[]);
-void rigid_body_dual_vector_field(const rigid_body_dual_params *params, const double x[rigid_body_dual_DIM],
-    double out[rigid_body_dual_DIM]);
-
-/* For bindings: the size of rigid_body_dual_solver, and its count of good steps. */
-size_t rigid_body_dual_solver_size(void);
-size_t rigid_body_dual_solver_steps_done(const rigid_body_dual_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * rigid_body_paper.h: the declarations; rigid_body_paper.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of rigid_body_paper.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1620db202d51d63c82a25048b88438142f0db461861e8b9b44877df2b2d9cab9
+ * body-sha256: df0bc0473a5c30439c3be800d90878e7b53f6814613dfbb836fd44e23368c623
  */
 #ifndef RIGID_BODY_PAPER_H
 #define RIGID_BODY_PAPER_H
@@ -10,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define rigid_body_paper_DIM 3
+#define rigid_body_paper_DIM 3 /* coordinates: x1, x2, x3 */
 #define rigid_body_paper_ORDER 2
-#define rigid_body_paper_CASIMIRS 1
+#define rigid_body_paper_CASIMIRS 1 /* C */
 #define rigid_body_paper_PHIGEN_VERSION "0.1.0"
 #define rigid_body_paper_SPEC_SHA256 "fdf2d9a528753bef04cdf4e448b386ab40d533eb21d1b8fc60aed87613d78d3e"
 enum { rigid_body_paper_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
-/* State vectors: x1, x2, x3. Casimirs: C. */
 typedef struct {
     double J1; /* default 1.0 */
     double J2; /* default 3.141592653589793 */
@@ -25,7 +23,11 @@ typedef struct {
 } rigid_body_paper_params;
 extern const rigid_body_paper_params rigid_body_paper_default_params;
 
-/* How a step ends; rigid_body_paper_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double rigid_body_paper_hamiltonian(const rigid_body_paper_params *params, const double x[3]);
+void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const double x[3], double out[]);
+void rigid_body_paper_vector_field(const rigid_body_paper_params *params, const double x[3], double out[3]);
+
 typedef enum { rigid_body_paper_OK = 0, rigid_body_paper_NO_CONVERGENCE, rigid_body_paper_SINGULAR,
     rigid_body_paper_NOT_FINITE, rigid_body_paper_BAD_ARGUMENT } rigid_body_paper_status;
 const char *rigid_body_paper_status_string(rigid_body_paper_status status);
@@ -38,8 +40,7 @@ typedef struct {
     double difference[rigid_body_paper_DIFFERENCES][rigid_body_paper_DIM];
 } rigid_body_paper_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   rigid_body_paper_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[rigid_body_paper_DIM];     /* the state; read it freely, change it only through functions */
     double carry[rigid_body_paper_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -53,10 +54,11 @@ typedef struct {
     double t_before_h;
     rigid_body_paper_history history; /* for starting guesses */
 } rigid_body_paper_solver;
+size_t rigid_body_paper_solver_size(void); /* for bindings to other languages, as what follows */
+size_t rigid_body_paper_solver_steps_done(const rigid_body_paper_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. rigid_body_paper_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. rigid_body_paper_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
     const rigid_body_paper_params *params, const double x0[rigid_body_paper_DIM]);
 
@@ -75,18 +77,6 @@ rigid_body_paper_status rigid_body_paper_kick(rigid_body_paper_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 rigid_body_paper_status rigid_body_paper_ensemble(const rigid_body_paper_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double rigid_body_paper_hamiltonian(const rigid_body_paper_params *params,
-    const double x[rigid_body_paper_DIM]);
-void rigid_body_paper_casimirs(const rigid_body_paper_params *params, const double x[rigid_body_paper_DIM],
-    double out[]);
-void rigid_body_paper_vector_field(const rigid_body_paper_params *params,
-    const double x[rigid_body_paper_DIM], double out[rigid_body_paper_DIM]);
-
-/* For bindings: the size of rigid_body_paper_solver, and its count of good steps. */
-size_t rigid_body_paper_solver_size(void);
-size_t rigid_body_paper_solver_steps_done(const rigid_body_paper_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * satellite.h: the declarations; satellite.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of satellite.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d299968337240a620d672c2fd8885ffded63d434484362cd051fd33afdcbf4df
+ * body-sha256: e7f43248dab26b6e22511b555fb6a09cb60dd239e7836ea4f240073538fc84de
  */
 #ifndef SATELLITE_H
 #define SATELLITE_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define satellite_DIM 9
+#define satellite_DIM 9 /* coordinates: m1, m2, m3, N1, N2, N3, G1, G2, G3 */
 #define satellite_ORDER 4
-#define satellite_CASIMIRS 3
+#define satellite_CASIMIRS 3 /* N, G, A */
 #define satellite_PHIGEN_VERSION "0.1.0"
 #define satellite_SPEC_SHA256 "dc272fb52ae5f34a922056236d9e6fdb08ff8338f24456d0b55a9a52485fca76"
 enum { satellite_STAGES = 5 };        /* of a step */
@@ -20,7 +19,6 @@ enum { satellite_COEFFICIENTS = 7 };  /* numbers that depend on params and h onl
 enum { satellite_ATTITUDE_SIZE = 4 }; /* numbers of an attitude, a quaternion */
 enum { satellite_ELEMENT = 4 };       /* numbers of an element of the group */
 
-/* State vectors: m1, m2, m3, N1, N2, N3, G1, G2, G3. Casimirs: N, G, A. */
 typedef struct {
     double I1; /* least moment of inertia */
     double I2; /* intermediate moment of inertia */
@@ -29,7 +27,11 @@ typedef struct {
 } satellite_params;
 extern const satellite_params satellite_default_params;
 
-/* How a step ends; satellite_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double satellite_hamiltonian(const satellite_params *params, const double x[9]);
+void satellite_casimirs(const satellite_params *params, const double x[9], double out[]);
+void satellite_vector_field(const satellite_params *params, const double x[9], double out[9]);
+
 typedef enum { satellite_OK = 0, satellite_NO_CONVERGENCE, satellite_SINGULAR, satellite_NOT_FINITE,
     satellite_BAD_ARGUMENT } satellite_status;
 const char *satellite_status_string(satellite_status status);
@@ -42,7 +44,7 @@ typedef struct {
     double difference[satellite_DIFFERENCES][satellite_DIM];
 } satellite_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with satellite_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[satellite_DIM];     /* the state; read it freely, change it only through functions */
     double carry[satellite_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -61,10 +63,12 @@ typedef struct {
     double t_before_h;
     satellite_history history[satellite_STAGES]; /* for starting guesses */
 } satellite_solver;
+size_t satellite_solver_size(void); /* for bindings to other languages, as what follows */
+size_t satellite_solver_steps_done(const satellite_solver *s);
+void satellite_attitude(const satellite_solver *s, double out[satellite_ELEMENT]);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. satellite_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. satellite_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 satellite_status satellite_init(satellite_solver *s, const satellite_params *params,
     const double x0[satellite_DIM]);
 
@@ -95,17 +99,6 @@ satellite_status satellite_ensemble(const satellite_params *params, double *x, s
 satellite_status satellite_ensemble_attitudes(const satellite_params *params, double *x, double *attitude,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
     unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double satellite_hamiltonian(const satellite_params *params, const double x[satellite_DIM]);
-void satellite_casimirs(const satellite_params *params, const double x[satellite_DIM], double out[]);
-void satellite_vector_field(const satellite_params *params, const double x[satellite_DIM],
-    double out[satellite_DIM]);
-
-/* For bindings: the size of satellite_solver, and its count of good steps. */
-size_t satellite_solver_size(void);
-size_t satellite_solver_steps_done(const satellite_solver *s);
-void satellite_attitude(const satellite_solver *s, double out[satellite_ELEMENT]);
 
 #ifdef __cplusplus
 }

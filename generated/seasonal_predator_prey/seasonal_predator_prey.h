@@ -1,8 +1,7 @@
 /*
- * seasonal_predator_prey.h: the declarations; seasonal_predator_prey.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of seasonal_predator_prey.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2bbbb27e6fbb70b9ddbf03782fb364675e7fc1ccd81344cd72d8a39ad7816f19
+ * body-sha256: eea489d5b2afc67a7c5e7e5e2220645f2da791c2598a8b1c52c90f235572e0cc
  */
 #ifndef SEASONAL_PREDATOR_PREY_H
 #define SEASONAL_PREDATOR_PREY_H
@@ -10,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define seasonal_predator_prey_DIM 2
+#define seasonal_predator_prey_DIM 2 /* coordinates: x, y */
 #define seasonal_predator_prey_ORDER 4
 #define seasonal_predator_prey_CASIMIRS 0
 #define seasonal_predator_prey_PHIGEN_VERSION "0.1.0"
 #define seasonal_predator_prey_SPEC_SHA256 "6024fb8258a78f369b01d8e52272919642b4af3cf2bb32db98053ab4b6a20c9a"
 enum { seasonal_predator_prey_COEFFICIENTS = 20 }; /* numbers that depend on params and h, and on the time */
 
-/* State vectors: x, y. Casimirs: none. */
 typedef struct {
     double alpha;   /* growth of the prey */
     double beta;    /* default 1.0 */
@@ -28,7 +26,14 @@ typedef struct {
 } seasonal_predator_prey_params;
 extern const seasonal_predator_prey_params seasonal_predator_prey_default_params;
 
-/* How a step ends; seasonal_predator_prey_status_string says it in words. */
+/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
+double seasonal_predator_prey_hamiltonian(const seasonal_predator_prey_params *params, double t,
+    const double x[2]);
+void seasonal_predator_prey_casimirs(const seasonal_predator_prey_params *params, const double x[2],
+    double out[]);
+void seasonal_predator_prey_vector_field(const seasonal_predator_prey_params *params, double t,
+    const double x[2], double out[2]);
+
 typedef enum { seasonal_predator_prey_OK = 0, seasonal_predator_prey_NO_CONVERGENCE,
     seasonal_predator_prey_SINGULAR, seasonal_predator_prey_NOT_FINITE,
     seasonal_predator_prey_BAD_ARGUMENT } seasonal_predator_prey_status;
@@ -43,8 +48,7 @@ typedef struct {
     double difference[seasonal_predator_prey_DIFFERENCES][seasonal_predator_prey_DIM];
 } seasonal_predator_prey_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   seasonal_predator_prey_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     /* the state; read it freely, change it only through functions */
     double x[seasonal_predator_prey_DIM];
@@ -60,10 +64,11 @@ typedef struct {
     double t_before_h;
     seasonal_predator_prey_history history; /* for starting guesses */
 } seasonal_predator_prey_solver;
+size_t seasonal_predator_prey_solver_size(void); /* for bindings to other languages, as what follows */
+size_t seasonal_predator_prey_solver_steps_done(const seasonal_predator_prey_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. seasonal_predator_prey_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one
-   that has to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. seasonal_predator_prey_BAD_ARGUMENT, and *s as before, if
+   x0, a parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 seasonal_predator_prey_status seasonal_predator_prey_init(seasonal_predator_prey_solver *s,
     const seasonal_predator_prey_params *params, const double x0[seasonal_predator_prey_DIM]);
 
@@ -91,18 +96,6 @@ seasonal_predator_prey_status seasonal_predator_prey_ensemble(const seasonal_pre
 /* The same from the time t0 of all members on, which seasonal_predator_prey_ensemble takes to be 0. */
 seasonal_predator_prey_status seasonal_predator_prey_ensemble_at(const seasonal_predator_prey_params *params,
     double *x, size_t members, double t0, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
-double seasonal_predator_prey_hamiltonian(const seasonal_predator_prey_params *params, double t,
-    const double x[seasonal_predator_prey_DIM]);
-void seasonal_predator_prey_casimirs(const seasonal_predator_prey_params *params,
-    const double x[seasonal_predator_prey_DIM], double out[]);
-void seasonal_predator_prey_vector_field(const seasonal_predator_prey_params *params, double t,
-    const double x[seasonal_predator_prey_DIM], double out[seasonal_predator_prey_DIM]);
-
-/* For bindings: the size of seasonal_predator_prey_solver, and its count of good steps. */
-size_t seasonal_predator_prey_solver_size(void);
-size_t seasonal_predator_prey_solver_steps_done(const seasonal_predator_prey_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * sine_gordon.h: the declarations; sine_gordon.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of sine_gordon.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4cb25d045966d403bfa9de1e28604ee2df0c8213afb1bbd7fad93030da7bec1e
+ * body-sha256: 933325c0143901fcaaba077e0f841f1b10c87b3a9af8b2d5ee5bf38d6cc34343
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
@@ -27,7 +26,6 @@ extern const sine_gordon_params sine_gordon_default_params;
 enum { sine_gordon_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { sine_gordon_COEFFICIENTS = 42 }; /* numbers that depend on params and h only */
 
-/* How a step ends; sine_gordon_status_string says it in words. */
 typedef enum { sine_gordon_OK = 0, sine_gordon_NO_CONVERGENCE, sine_gordon_SINGULAR, sine_gordon_NOT_FINITE,
     sine_gordon_BAD_ARGUMENT } sine_gordon_status;
 

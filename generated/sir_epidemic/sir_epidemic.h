@@ -1,8 +1,7 @@
 /*
- * sir_epidemic.h: the declarations; sir_epidemic.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of sir_epidemic.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 237c4ccfc6a0a87382303694ef617dd53060835ca8f923f9b6db643cebdff7e2
+ * body-sha256: c241fddc438657c964f8e1f9d137ff89337afda207291ef0ebe02f8a9c475bfc
  */
 #ifndef SIR_EPIDEMIC_H
 #define SIR_EPIDEMIC_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define sir_epidemic_DIM 3
+#define sir_epidemic_DIM 3 /* coordinates: S, I, R */
 #define sir_epidemic_ORDER 4
-#define sir_epidemic_CASIMIRS 1
+#define sir_epidemic_CASIMIRS 1 /* N */
 #define sir_epidemic_PHIGEN_VERSION "0.1.0"
 #define sir_epidemic_SPEC_SHA256 "3cf6d26b9024102964d272d47dd11225be0d3e675077cabf3aa91f4af27a10e2"
 enum { sir_epidemic_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
 
-/* State vectors: S, I, R. Casimirs: N. */
 typedef struct {
     double beta;  /* contacts per unit of time that infect */
     double gamma; /* rate of recovery */
 } sir_epidemic_params;
 extern const sir_epidemic_params sir_epidemic_default_params;
 
-/* How a step ends; sir_epidemic_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double x[3]);
+void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[3], double out[]);
+void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[3], double out[3]);
+
 typedef enum { sir_epidemic_OK = 0, sir_epidemic_NO_CONVERGENCE, sir_epidemic_SINGULAR,
     sir_epidemic_NOT_FINITE, sir_epidemic_BAD_ARGUMENT } sir_epidemic_status;
 const char *sir_epidemic_status_string(sir_epidemic_status status);
@@ -37,7 +39,7 @@ typedef struct {
     double difference[sir_epidemic_DIFFERENCES][sir_epidemic_DIM];
 } sir_epidemic_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_epidemic_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[sir_epidemic_DIM];     /* the state; read it freely, change it only through functions */
     double carry[sir_epidemic_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -51,10 +53,11 @@ typedef struct {
     double t_before_h;
     sir_epidemic_history history; /* for starting guesses */
 } sir_epidemic_solver;
+size_t sir_epidemic_solver_size(void); /* for bindings to other languages, as what follows */
+size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. sir_epidemic_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. sir_epidemic_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic_params *params,
     const double x0[sir_epidemic_DIM]);
 
@@ -71,16 +74,6 @@ sir_epidemic_status sir_epidemic_kick(sir_epidemic_solver *s, const double chang
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 sir_epidemic_status sir_epidemic_ensemble(const sir_epidemic_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double sir_epidemic_hamiltonian(const sir_epidemic_params *params, const double x[sir_epidemic_DIM]);
-void sir_epidemic_casimirs(const sir_epidemic_params *params, const double x[sir_epidemic_DIM], double out[]);
-void sir_epidemic_vector_field(const sir_epidemic_params *params, const double x[sir_epidemic_DIM],
-    double out[sir_epidemic_DIM]);
-
-/* For bindings: the size of sir_epidemic_solver, and its count of good steps. */
-size_t sir_epidemic_solver_size(void);
-size_t sir_epidemic_solver_steps_done(const sir_epidemic_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * sir_final_size.h: the declarations; sir_final_size.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of sir_final_size.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ceadbc229d84f709b2346432cb8934587ee52989838fb7ef43d1bd1f0b38f94f
+ * body-sha256: 3285bc5c9d470907b66c0698f9038fa86b2c0291b708ea60760e697f72a5b627
  */
 #ifndef SIR_FINAL_SIZE_H
 #define SIR_FINAL_SIZE_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define sir_final_size_DIM 3
+#define sir_final_size_DIM 3 /* coordinates: S, I, R */
 #define sir_final_size_ORDER 4
-#define sir_final_size_CASIMIRS 1
+#define sir_final_size_CASIMIRS 1 /* K */
 #define sir_final_size_PHIGEN_VERSION "0.1.0"
 #define sir_final_size_SPEC_SHA256 "7484c778f31ede239b94c4b0e42e17d8479ae32e0b1efc0469e7872614cbf00b"
 enum { sir_final_size_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
-/* State vectors: S, I, R. Casimirs: K. */
 typedef struct {
     double beta;  /* contacts per unit of time that infect */
     double gamma; /* rate of recovery */
 } sir_final_size_params;
 extern const sir_final_size_params sir_final_size_default_params;
 
-/* How a step ends; sir_final_size_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double sir_final_size_hamiltonian(const sir_final_size_params *params, const double x[3]);
+void sir_final_size_casimirs(const sir_final_size_params *params, const double x[3], double out[]);
+void sir_final_size_vector_field(const sir_final_size_params *params, const double x[3], double out[3]);
+
 typedef enum { sir_final_size_OK = 0, sir_final_size_NO_CONVERGENCE, sir_final_size_SINGULAR,
     sir_final_size_NOT_FINITE, sir_final_size_BAD_ARGUMENT } sir_final_size_status;
 const char *sir_final_size_status_string(sir_final_size_status status);
@@ -37,7 +39,7 @@ typedef struct {
     double difference[sir_final_size_DIFFERENCES][sir_final_size_DIM];
 } sir_final_size_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with sir_final_size_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[sir_final_size_DIM];     /* the state; read it freely, change it only through functions */
     double carry[sir_final_size_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -51,10 +53,11 @@ typedef struct {
     double t_before_h;
     sir_final_size_history history; /* for starting guesses */
 } sir_final_size_solver;
+size_t sir_final_size_solver_size(void); /* for bindings to other languages, as what follows */
+size_t sir_final_size_solver_steps_done(const sir_final_size_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. sir_final_size_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. sir_final_size_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_final_size_params *params,
     const double x0[sir_final_size_DIM]);
 
@@ -71,17 +74,6 @@ sir_final_size_status sir_final_size_kick(sir_final_size_solver *s, const double
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 sir_final_size_status sir_final_size_ensemble(const sir_final_size_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double sir_final_size_hamiltonian(const sir_final_size_params *params, const double x[sir_final_size_DIM]);
-void sir_final_size_casimirs(const sir_final_size_params *params, const double x[sir_final_size_DIM],
-    double out[]);
-void sir_final_size_vector_field(const sir_final_size_params *params, const double x[sir_final_size_DIM],
-    double out[sir_final_size_DIM]);
-
-/* For bindings: the size of sir_final_size_solver, and its count of good steps. */
-size_t sir_final_size_solver_size(void);
-size_t sir_final_size_solver_steps_done(const sir_final_size_solver *s);
 
 #ifdef __cplusplus
 }

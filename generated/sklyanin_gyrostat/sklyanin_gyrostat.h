@@ -1,8 +1,7 @@
 /*
- * sklyanin_gyrostat.h: the declarations; sklyanin_gyrostat.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of sklyanin_gyrostat.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 78a943774fcfe561d6a5f9ac801f382333cc9c4d0a13844135d673e21fa9d1bb
+ * body-sha256: 238776b0d16ea938f765b0b957a18557a1aabe15c4c724a4ae844007b516f5b8
  */
 #ifndef SKLYANIN_GYROSTAT_H
 #define SKLYANIN_GYROSTAT_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define sklyanin_gyrostat_DIM 4
+#define sklyanin_gyrostat_DIM 4 /* coordinates: S0, S1, S2, S3 */
 #define sklyanin_gyrostat_ORDER 4
-#define sklyanin_gyrostat_CASIMIRS 2
+#define sklyanin_gyrostat_CASIMIRS 2 /* K0, K1 */
 #define sklyanin_gyrostat_PHIGEN_VERSION "0.1.0"
 #define sklyanin_gyrostat_SPEC_SHA256 "e651a28cdc56907d5b5af694cc55378ac05a29592265e45944f163a14d4ec86f"
 enum { sklyanin_gyrostat_COEFFICIENTS = 31 }; /* numbers that depend on params and h only */
 enum { sklyanin_gyrostat_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: K0 */
 
-/* State vectors: S0, S1, S2, S3. Casimirs: K0, K1. */
 typedef struct {
     char unused; /* this system has no parameters */
 } sklyanin_gyrostat_params;
 extern const sklyanin_gyrostat_params sklyanin_gyrostat_default_params;
 
-/* How a step ends; sklyanin_gyrostat_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params, const double x[4]);
+void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[4], double out[]);
+void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params, const double x[4], double out[4]);
+
 typedef enum { sklyanin_gyrostat_OK = 0, sklyanin_gyrostat_NO_CONVERGENCE, sklyanin_gyrostat_SINGULAR,
     sklyanin_gyrostat_NOT_FINITE, sklyanin_gyrostat_BAD_ARGUMENT } sklyanin_gyrostat_status;
 const char *sklyanin_gyrostat_status_string(sklyanin_gyrostat_status status);
@@ -37,8 +39,7 @@ typedef struct {
     double difference[sklyanin_gyrostat_DIFFERENCES][sklyanin_gyrostat_DIM];
 } sklyanin_gyrostat_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   sklyanin_gyrostat_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[sklyanin_gyrostat_DIM];     /* the state; read it freely, change it only through functions */
     double carry[sklyanin_gyrostat_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -53,10 +54,11 @@ typedef struct {
     double t_before_h;
     sklyanin_gyrostat_history history; /* for starting guesses */
 } sklyanin_gyrostat_solver;
+size_t sklyanin_gyrostat_solver_size(void); /* for bindings to other languages, as what follows */
+size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. sklyanin_gyrostat_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. sklyanin_gyrostat_BAD_ARGUMENT, and *s as before, if x0,
+   a parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 sklyanin_gyrostat_status sklyanin_gyrostat_init(sklyanin_gyrostat_solver *s,
     const sklyanin_gyrostat_params *params, const double x0[sklyanin_gyrostat_DIM]);
 
@@ -80,18 +82,6 @@ sklyanin_gyrostat_status sklyanin_gyrostat_kick(sklyanin_gyrostat_solver *s,
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 sklyanin_gyrostat_status sklyanin_gyrostat_ensemble(const sklyanin_gyrostat_params *params, double *x,
     size_t members, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double sklyanin_gyrostat_hamiltonian(const sklyanin_gyrostat_params *params,
-    const double x[sklyanin_gyrostat_DIM]);
-void sklyanin_gyrostat_casimirs(const sklyanin_gyrostat_params *params, const double x[sklyanin_gyrostat_DIM],
-    double out[]);
-void sklyanin_gyrostat_vector_field(const sklyanin_gyrostat_params *params,
-    const double x[sklyanin_gyrostat_DIM], double out[sklyanin_gyrostat_DIM]);
-
-/* For bindings: the size of sklyanin_gyrostat_solver, and its count of good steps. */
-size_t sklyanin_gyrostat_solver_size(void);
-size_t sklyanin_gyrostat_solver_steps_done(const sklyanin_gyrostat_solver *s);
 
 #ifdef __cplusplus
 }

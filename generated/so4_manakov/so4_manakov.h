@@ -1,8 +1,7 @@
 /*
- * so4_manakov.h: the declarations; so4_manakov.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of so4_manakov.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8fe6a9772fbc2252b9b1c1724ed619f24465a01645703870aefbc33ca620cb67
+ * body-sha256: e267d73b8b65192d68ddc179b44b1f74a9839d6d21952f6d7762c2eb749081a4
  */
 #ifndef SO4_MANAKOV_H
 #define SO4_MANAKOV_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define so4_manakov_DIM 6
+#define so4_manakov_DIM 6 /* coordinates: x12, x13, x14, x23, x24, x34 */
 #define so4_manakov_ORDER 4
-#define so4_manakov_CASIMIRS 2
+#define so4_manakov_CASIMIRS 2 /* A, B */
 #define so4_manakov_PHIGEN_VERSION "0.1.0"
 #define so4_manakov_SPEC_SHA256 "c60c8cfe639c4453a54f9110f2a3b99c614520fc0699d00cf0c68db1b9948be4"
 enum { so4_manakov_COEFFICIENTS = 32 }; /* numbers that depend on params and h only */
 enum { so4_manakov_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: A */
 
-/* State vectors: x12, x13, x14, x23, x24, x34. Casimirs: A, B. */
 typedef struct {
     char unused; /* this system has no parameters */
 } so4_manakov_params;
 extern const so4_manakov_params so4_manakov_default_params;
 
-/* How a step ends; so4_manakov_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[6]);
+void so4_manakov_casimirs(const so4_manakov_params *params, const double x[6], double out[]);
+void so4_manakov_vector_field(const so4_manakov_params *params, const double x[6], double out[6]);
+
 typedef enum { so4_manakov_OK = 0, so4_manakov_NO_CONVERGENCE, so4_manakov_SINGULAR, so4_manakov_NOT_FINITE,
     so4_manakov_BAD_ARGUMENT } so4_manakov_status;
 const char *so4_manakov_status_string(so4_manakov_status status);
@@ -37,7 +39,7 @@ typedef struct {
     double difference[so4_manakov_DIFFERENCES][so4_manakov_DIM];
 } so4_manakov_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with so4_manakov_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[so4_manakov_DIM];     /* the state; read it freely, change it only through functions */
     double carry[so4_manakov_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -52,10 +54,11 @@ typedef struct {
     double t_before_h;
     so4_manakov_history history; /* for starting guesses */
 } so4_manakov_solver;
+size_t so4_manakov_solver_size(void); /* for bindings to other languages, as what follows */
+size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. so4_manakov_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. so4_manakov_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 so4_manakov_status so4_manakov_init(so4_manakov_solver *s, const so4_manakov_params *params,
     const double x0[so4_manakov_DIM]);
 
@@ -76,16 +79,6 @@ so4_manakov_status so4_manakov_kick(so4_manakov_solver *s, const double change[s
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 so4_manakov_status so4_manakov_ensemble(const so4_manakov_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double so4_manakov_hamiltonian(const so4_manakov_params *params, const double x[so4_manakov_DIM]);
-void so4_manakov_casimirs(const so4_manakov_params *params, const double x[so4_manakov_DIM], double out[]);
-void so4_manakov_vector_field(const so4_manakov_params *params, const double x[so4_manakov_DIM],
-    double out[so4_manakov_DIM]);
-
-/* For bindings: the size of so4_manakov_solver, and its count of good steps. */
-size_t so4_manakov_solver_size(void);
-size_t so4_manakov_solver_steps_done(const so4_manakov_solver *s);
 
 #ifdef __cplusplus
 }

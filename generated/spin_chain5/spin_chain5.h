@@ -1,8 +1,7 @@
 /*
- * spin_chain5.h: the declarations; spin_chain5.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of spin_chain5.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0cbf37fe43260e891a5cbaa2c1ca9535b2b7a93e8922a83e1b6e01f4befec6a1
+ * body-sha256: 75083b58cb812fd8c23d056dd8d4acf049b38403df23caa45ff4347c0f80200b
  */
 #ifndef SPIN_CHAIN5_H
 #define SPIN_CHAIN5_H
@@ -10,21 +9,24 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define spin_chain5_DIM 15
+#define spin_chain5_DIM 15 /* coordinates: x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4, x5, y5, z5 */
 #define spin_chain5_ORDER 4
-#define spin_chain5_CASIMIRS 5
+#define spin_chain5_CASIMIRS 5 /* C1, C2, C3, C4, C5 */
 #define spin_chain5_PHIGEN_VERSION "0.1.0"
 #define spin_chain5_SPEC_SHA256 "822f770e232b566fca45eb393c188aab67b907df200761f36001661c9c3fe5e9"
 enum { spin_chain5_COEFFICIENTS = 33 }; /* numbers that depend on params and h only */
 enum { spin_chain5_GAUGES = 5 };        /* Casimirs whose multiples are taken from H: C1, C2, C3, C4, C5 */
 
-/* State vectors: x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4, x5, y5, z5. Casimirs: C1, C2, C3, C4, C5. */
 typedef struct {
     double J; /* exchange constant, ferromagnetic if positive */
 } spin_chain5_params;
 extern const spin_chain5_params spin_chain5_default_params;
 
-/* How a step ends; spin_chain5_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[15]);
+void spin_chain5_casimirs(const spin_chain5_params *params, const double x[15], double out[]);
+void spin_chain5_vector_field(const spin_chain5_params *params, const double x[15], double out[15]);
+
 typedef enum { spin_chain5_OK = 0, spin_chain5_NO_CONVERGENCE, spin_chain5_SINGULAR, spin_chain5_NOT_FINITE,
     spin_chain5_BAD_ARGUMENT } spin_chain5_status;
 const char *spin_chain5_status_string(spin_chain5_status status);
@@ -37,7 +39,7 @@ typedef struct {
     double difference[spin_chain5_DIFFERENCES][spin_chain5_DIM];
 } spin_chain5_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_chain5_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[spin_chain5_DIM];     /* the state; read it freely, change it only through functions */
     double carry[spin_chain5_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -52,10 +54,11 @@ typedef struct {
     double t_before_h;
     spin_chain5_history history; /* for starting guesses */
 } spin_chain5_solver;
+size_t spin_chain5_solver_size(void); /* for bindings to other languages, as what follows */
+size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. spin_chain5_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. spin_chain5_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 spin_chain5_status spin_chain5_init(spin_chain5_solver *s, const spin_chain5_params *params,
     const double x0[spin_chain5_DIM]);
 
@@ -76,16 +79,6 @@ spin_chain5_status spin_chain5_kick(spin_chain5_solver *s, const double change[s
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 spin_chain5_status spin_chain5_ensemble(const spin_chain5_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double spin_chain5_hamiltonian(const spin_chain5_params *params, const double x[spin_chain5_DIM]);
-void spin_chain5_casimirs(const spin_chain5_params *params, const double x[spin_chain5_DIM], double out[]);
-void spin_chain5_vector_field(const spin_chain5_params *params, const double x[spin_chain5_DIM],
-    double out[spin_chain5_DIM]);
-
-/* For bindings: the size of spin_chain5_solver, and its count of good steps. */
-size_t spin_chain5_solver_size(void);
-size_t spin_chain5_solver_steps_done(const spin_chain5_solver *s);
 
 #ifdef __cplusplus
 }

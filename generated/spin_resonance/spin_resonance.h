@@ -1,8 +1,7 @@
 /*
- * spin_resonance.h: the declarations; spin_resonance.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of spin_resonance.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9567f39c2adaebd6f0f6dee2d2048d7c6e7ddefe23066013b645f7ffff6bb361
+ * body-sha256: a778e5865ab3907f00be7ba5426a292ec9206ec21ce02d4d3a8177e0079b650c
  */
 #ifndef SPIN_RESONANCE_H
 #define SPIN_RESONANCE_H
@@ -10,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define spin_resonance_DIM 3
+#define spin_resonance_DIM 3 /* coordinates: m1, m2, m3 */
 #define spin_resonance_ORDER 4
-#define spin_resonance_CASIMIRS 1
+#define spin_resonance_CASIMIRS 1 /* size */
 #define spin_resonance_PHIGEN_VERSION "0.1.0"
 #define spin_resonance_SPEC_SHA256 "5ddcd1cafa805e373cf495543a70a36ab54b37b0b9b46774ed678f920e677a3b"
 enum { spin_resonance_COEFFICIENTS = 15 }; /* numbers that depend on params and h, and on the time */
 
-/* State vectors: m1, m2, m3. Casimirs: size. */
 typedef struct {
     double b0;    /* steady field */
     double b;     /* rotating field */
@@ -26,7 +24,12 @@ typedef struct {
 } spin_resonance_params;
 extern const spin_resonance_params spin_resonance_default_params;
 
-/* How a step ends; spin_resonance_status_string says it in words. */
+/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
+double spin_resonance_hamiltonian(const spin_resonance_params *params, double t, const double x[3]);
+void spin_resonance_casimirs(const spin_resonance_params *params, const double x[3], double out[]);
+void spin_resonance_vector_field(const spin_resonance_params *params, double t, const double x[3],
+    double out[3]);
+
 typedef enum { spin_resonance_OK = 0, spin_resonance_NO_CONVERGENCE, spin_resonance_SINGULAR,
     spin_resonance_NOT_FINITE, spin_resonance_BAD_ARGUMENT } spin_resonance_status;
 const char *spin_resonance_status_string(spin_resonance_status status);
@@ -39,7 +42,7 @@ typedef struct {
     double difference[spin_resonance_DIFFERENCES][spin_resonance_DIM];
 } spin_resonance_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with spin_resonance_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[spin_resonance_DIM];     /* the state; read it freely, change it only through functions */
     double carry[spin_resonance_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -54,10 +57,11 @@ typedef struct {
     double t_before_h;
     spin_resonance_history history; /* for starting guesses */
 } spin_resonance_solver;
+size_t spin_resonance_solver_size(void); /* for bindings to other languages, as what follows */
+size_t spin_resonance_solver_steps_done(const spin_resonance_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. spin_resonance_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. spin_resonance_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 spin_resonance_status spin_resonance_init(spin_resonance_solver *s, const spin_resonance_params *params,
     const double x0[spin_resonance_DIM]);
 
@@ -82,18 +86,6 @@ spin_resonance_status spin_resonance_ensemble(const spin_resonance_params *param
 /* The same from the time t0 of all members on, which spin_resonance_ensemble takes to be 0. */
 spin_resonance_status spin_resonance_ensemble_at(const spin_resonance_params *params, double *x,
     size_t members, double t0, double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
-double spin_resonance_hamiltonian(const spin_resonance_params *params, double t,
-    const double x[spin_resonance_DIM]);
-void spin_resonance_casimirs(const spin_resonance_params *params, const double x[spin_resonance_DIM],
-    double out[]);
-void spin_resonance_vector_field(const spin_resonance_params *params, double t,
-    const double x[spin_resonance_DIM], double out[spin_resonance_DIM]);
-
-/* For bindings: the size of spin_resonance_solver, and its count of good steps. */
-size_t spin_resonance_solver_size(void);
-size_t spin_resonance_solver_steps_done(const spin_resonance_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * thermal_chain.h: the declarations; thermal_chain.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of thermal_chain.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3bde86c1a003fc0f40c5210d35728968821b8194e6900f39e6173e0e2eb30bb2
+ * body-sha256: 32f59f2d9353350e3b290e9ad09c21a20b3576e1ea94551944e1caa1f11c7fd5
  */
 #ifndef THERMAL_CHAIN_H
 #define THERMAL_CHAIN_H
@@ -11,9 +10,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define thermal_chain_DIM 12
+#define thermal_chain_DIM 12 /* coordinates: x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4 */
 #define thermal_chain_ORDER 2
-#define thermal_chain_CASIMIRS 4
+#define thermal_chain_CASIMIRS 4 /* length1, length2, length3, length4 */
 #define thermal_chain_PHIGEN_VERSION "0.1.0"
 #define thermal_chain_SPEC_SHA256 "5d3df38060fdd4f00d014c45e35eeeca792676acb8c0de5c5229638247bbb939"
 enum { thermal_chain_COEFFICIENTS = 17 }; /* numbers that depend on params and h, and on the noise */
@@ -23,8 +22,6 @@ enum { thermal_chain_SOURCES = 12 };
 enum { thermal_chain_DRAWS = 12 }; /* increments of the noise in a step */
 enum { thermal_chain_PARTS = 1 };  /* increments of one source in a step, each of a part of it */
 
-/* State vectors: x1, y1, z1, x2, y2, z2, x3, y3, z3, x4, y4, z4. Casimirs: length1, length2, length3,
-   length4. */
 typedef struct {
     double J;            /* exchange */
     double T;            /* temperature */
@@ -32,12 +29,19 @@ typedef struct {
 } thermal_chain_params;
 extern const thermal_chain_params thermal_chain_default_params;
 
-/* How a step ends; thermal_chain_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double thermal_chain_hamiltonian(const thermal_chain_params *params, const double x[12]);
+void thermal_chain_casimirs(const thermal_chain_params *params, const double x[12], double out[]);
+void thermal_chain_vector_field(const thermal_chain_params *params, const double x[12], double out[12]);
+
+/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
+void thermal_chain_noise_fields(const thermal_chain_params *params, const double x[12], double out[144]);
+
 typedef enum { thermal_chain_OK = 0, thermal_chain_NO_CONVERGENCE, thermal_chain_SINGULAR,
     thermal_chain_NOT_FINITE, thermal_chain_BAD_ARGUMENT } thermal_chain_status;
 const char *thermal_chain_status_string(thermal_chain_status status);
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thermal_chain_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[thermal_chain_DIM];     /* the state; read it freely, change it only through functions */
     double carry[thermal_chain_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -54,10 +58,11 @@ typedef struct {
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 } thermal_chain_solver;
+size_t thermal_chain_solver_size(void); /* for bindings to other languages, as what follows */
+size_t thermal_chain_solver_steps_done(const thermal_chain_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. thermal_chain_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. thermal_chain_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_chain_params *params,
     const double x0[thermal_chain_DIM]);
 
@@ -91,21 +96,6 @@ thermal_chain_status thermal_chain_ensemble(const thermal_chain_params *params, 
    on threads. */
 thermal_chain_status thermal_chain_ensemble_of(const thermal_chain_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double thermal_chain_hamiltonian(const thermal_chain_params *params, const double x[thermal_chain_DIM]);
-void thermal_chain_casimirs(const thermal_chain_params *params, const double x[thermal_chain_DIM],
-    double out[]);
-void thermal_chain_vector_field(const thermal_chain_params *params, const double x[thermal_chain_DIM],
-    double out[thermal_chain_DIM]);
-
-/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
-void thermal_chain_noise_fields(const thermal_chain_params *params, const double x[thermal_chain_DIM],
-    double out[thermal_chain_SOURCES * thermal_chain_DIM]);
-
-/* For bindings: the size of thermal_chain_solver, and its count of good steps. */
-size_t thermal_chain_solver_size(void);
-size_t thermal_chain_solver_steps_done(const thermal_chain_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * thermal_heisenberg.h: the declarations; thermal_heisenberg.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of thermal_heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ef04f8547c0c4140dff37dacd644893f5112cb58f044ad3d15a38f2dee3a1832
+ * body-sha256: f99ecd71f7c5018e86d4a68e33666b91e90d0904850d85b32647e6dfd6c7b8c0
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -30,7 +29,6 @@ extern const thermal_heisenberg_params thermal_heisenberg_default_params;
 enum { thermal_heisenberg_ARRAYS = 7 }; /* arrays over the sites: fields, then parameters, then noise */
 enum { thermal_heisenberg_COEFFICIENTS = 60 }; /* numbers that depend on params and h only */
 
-/* How a step ends; thermal_heisenberg_status_string says it in words. */
 typedef enum { thermal_heisenberg_OK = 0, thermal_heisenberg_NO_CONVERGENCE, thermal_heisenberg_SINGULAR,
     thermal_heisenberg_NOT_FINITE, thermal_heisenberg_BAD_ARGUMENT } thermal_heisenberg_status;
 

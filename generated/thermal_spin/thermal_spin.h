@@ -1,8 +1,7 @@
 /*
- * thermal_spin.h: the declarations; thermal_spin.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of thermal_spin.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1f2b1faf365e90d8c1c49f3f991e65e3e1e0c1f1a919c3f2897731a6de9ac43b
+ * body-sha256: 055337ec431e61777714558e899f3b55b44c78a2062365d342ea930afc85ce2a
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -11,9 +10,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define thermal_spin_DIM 3
+#define thermal_spin_DIM 3 /* coordinates: x, y, z */
 #define thermal_spin_ORDER 2
-#define thermal_spin_CASIMIRS 1
+#define thermal_spin_CASIMIRS 1 /* length */
 #define thermal_spin_PHIGEN_VERSION "0.1.0"
 #define thermal_spin_SPEC_SHA256 "94027d99f63156278559cc210d53326037ddbd17e39528977f9fdc3b323e1de6"
 enum { thermal_spin_COEFFICIENTS = 13 }; /* numbers that depend on params and h, and on the noise */
@@ -21,7 +20,6 @@ enum { thermal_spin_SOURCES = 3 };       /* of noise: bath_x, bath_y, bath_z */
 enum { thermal_spin_DRAWS = 3 };         /* increments of the noise in a step */
 enum { thermal_spin_PARTS = 1 };         /* increments of one source in a step, each of a part of it */
 
-/* State vectors: x, y, z. Casimirs: length. */
 typedef struct {
     double B;            /* field along z */
     double T;            /* temperature */
@@ -29,12 +27,19 @@ typedef struct {
 } thermal_spin_params;
 extern const thermal_spin_params thermal_spin_default_params;
 
-/* How a step ends; thermal_spin_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double thermal_spin_hamiltonian(const thermal_spin_params *params, const double x[3]);
+void thermal_spin_casimirs(const thermal_spin_params *params, const double x[3], double out[]);
+void thermal_spin_vector_field(const thermal_spin_params *params, const double x[3], double out[3]);
+
+/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
+void thermal_spin_noise_fields(const thermal_spin_params *params, const double x[3], double out[9]);
+
 typedef enum { thermal_spin_OK = 0, thermal_spin_NO_CONVERGENCE, thermal_spin_SINGULAR,
     thermal_spin_NOT_FINITE, thermal_spin_BAD_ARGUMENT } thermal_spin_status;
 const char *thermal_spin_status_string(thermal_spin_status status);
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thermal_spin_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[thermal_spin_DIM];     /* the state; read it freely, change it only through functions */
     double carry[thermal_spin_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -51,10 +56,11 @@ typedef struct {
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
 } thermal_spin_solver;
+size_t thermal_spin_solver_size(void); /* for bindings to other languages, as what follows */
+size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. thermal_spin_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. thermal_spin_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin_params *params,
     const double x0[thermal_spin_DIM]);
 
@@ -88,20 +94,6 @@ thermal_spin_status thermal_spin_ensemble(const thermal_spin_params *params, dou
    on threads. */
 thermal_spin_status thermal_spin_ensemble_of(const thermal_spin_params *params, double *x, size_t members,
     double h, size_t steps, uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double thermal_spin_hamiltonian(const thermal_spin_params *params, const double x[thermal_spin_DIM]);
-void thermal_spin_casimirs(const thermal_spin_params *params, const double x[thermal_spin_DIM], double out[]);
-void thermal_spin_vector_field(const thermal_spin_params *params, const double x[thermal_spin_DIM],
-    double out[thermal_spin_DIM]);
-
-/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
-void thermal_spin_noise_fields(const thermal_spin_params *params, const double x[thermal_spin_DIM],
-    double out[thermal_spin_SOURCES * thermal_spin_DIM]);
-
-/* For bindings: the size of thermal_spin_solver, and its count of good steps. */
-size_t thermal_spin_solver_size(void);
-size_t thermal_spin_solver_steps_done(const thermal_spin_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * thruster_body.h: the declarations; thruster_body.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of thruster_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 117c651adb023b87518bf940ff5df39e1c2774e18b4aaa4beffac14a9d0a58dc
+ * body-sha256: cc95da035fbc8912187bccb3bd0c3aeb3fa79dfcf5d87925391a1dc7994d241a
  */
 #ifndef THRUSTER_BODY_H
 #define THRUSTER_BODY_H
@@ -10,15 +9,14 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define thruster_body_DIM 3
+#define thruster_body_DIM 3 /* coordinates: m1, m2, m3 */
 #define thruster_body_ORDER 4
-#define thruster_body_CASIMIRS 1
+#define thruster_body_CASIMIRS 1 /* C */
 #define thruster_body_PHIGEN_VERSION "0.1.0"
 #define thruster_body_SPEC_SHA256 "d7008fc5692e1b59f1c3b14bb2c026902f9cbe75a2384109edc23562163c7f67"
 enum { thruster_body_STAGES = 5 };       /* of a step */
 enum { thruster_body_COEFFICIENTS = 8 }; /* numbers that depend on params and h only */
 
-/* State vectors: m1, m2, m3. Casimirs: C. */
 typedef struct {
     double I1;     /* default 2.0 */
     double I2;     /* default 3.0 */
@@ -28,7 +26,11 @@ typedef struct {
 } thruster_body_params;
 extern const thruster_body_params thruster_body_default_params;
 
-/* How a step ends; thruster_body_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double thruster_body_hamiltonian(const thruster_body_params *params, const double x[3]);
+void thruster_body_casimirs(const thruster_body_params *params, const double x[3], double out[]);
+void thruster_body_vector_field(const thruster_body_params *params, const double x[3], double out[3]);
+
 typedef enum { thruster_body_OK = 0, thruster_body_NO_CONVERGENCE, thruster_body_SINGULAR,
     thruster_body_NOT_FINITE, thruster_body_BAD_ARGUMENT } thruster_body_status;
 const char *thruster_body_status_string(thruster_body_status status);
@@ -41,7 +43,7 @@ typedef struct {
     double difference[thruster_body_DIFFERENCES][thruster_body_DIM];
 } thruster_body_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with thruster_body_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[thruster_body_DIM];     /* the state; read it freely, change it only through functions */
     double carry[thruster_body_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -55,10 +57,11 @@ typedef struct {
     double t_before_h;
     thruster_body_history history[thruster_body_STAGES]; /* for starting guesses */
 } thruster_body_solver;
+size_t thruster_body_solver_size(void); /* for bindings to other languages, as what follows */
+size_t thruster_body_solver_steps_done(const thruster_body_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. thruster_body_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to
-   be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. thruster_body_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_body_params *params,
     const double x0[thruster_body_DIM]);
 
@@ -75,17 +78,6 @@ thruster_body_status thruster_body_kick(thruster_body_solver *s, const double ch
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 thruster_body_status thruster_body_ensemble(const thruster_body_params *params, double *x, size_t members,
     double h, size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double thruster_body_hamiltonian(const thruster_body_params *params, const double x[thruster_body_DIM]);
-void thruster_body_casimirs(const thruster_body_params *params, const double x[thruster_body_DIM],
-    double out[]);
-void thruster_body_vector_field(const thruster_body_params *params, const double x[thruster_body_DIM],
-    double out[thruster_body_DIM]);
-
-/* For bindings: the size of thruster_body_solver, and its count of good steps. */
-size_t thruster_body_solver_size(void);
-size_t thruster_body_solver_steps_done(const thruster_body_solver *s);
 
 #ifdef __cplusplus
 }

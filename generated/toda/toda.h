@@ -1,8 +1,7 @@
 /*
- * toda.h: the declarations; toda.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b3da08611bf1be093051d4efce0edf5193d775db58a2db099d368d4f4ae47275
+ * body-sha256: d0d1462c18a85c7dbdd73b8d2cab095f6300ea4be00c292f3578cd68f8eaa3fd
  */
 #ifndef TODA_H
 #define TODA_H
@@ -27,7 +26,6 @@ extern const toda_params toda_default_params;
 enum { toda_ARRAYS = 2 };        /* arrays over the sites: fields, then parameters */
 enum { toda_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
 
-/* How a step ends; toda_status_string says it in words. */
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 

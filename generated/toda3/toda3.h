@@ -1,8 +1,7 @@
 /*
- * toda3.h: the declarations; toda3.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of toda3.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5be9dc53f1b647132ce4b1f0589820ba6a109c8f3cc885b01eddf50512db6515
+ * body-sha256: 7885e4f0e2ce93ee945ff1fdc1e2ce05a45c5c4102e00ff67b7e2d3d044d0638
  */
 #ifndef TODA3_H
 #define TODA3_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define toda3_DIM 5
+#define toda3_DIM 5 /* coordinates: a1, a2, b1, b2, b3 */
 #define toda3_ORDER 4
-#define toda3_CASIMIRS 1
+#define toda3_CASIMIRS 1 /* C */
 #define toda3_PHIGEN_VERSION "0.1.0"
 #define toda3_SPEC_SHA256 "813743f0c214e25a500552f5cc291b9b59649d4122a822c50e413b8a48c6bba9"
 enum { toda3_COEFFICIENTS = 10 }; /* numbers that depend on params and h only */
 
-/* State vectors: a1, a2, b1, b2, b3. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } toda3_params;
 extern const toda3_params toda3_default_params;
 
-/* How a step ends; toda3_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double toda3_hamiltonian(const toda3_params *params, const double x[5]);
+void toda3_casimirs(const toda3_params *params, const double x[5], double out[]);
+void toda3_vector_field(const toda3_params *params, const double x[5], double out[5]);
+
 typedef enum { toda3_OK = 0, toda3_NO_CONVERGENCE, toda3_SINGULAR, toda3_NOT_FINITE,
     toda3_BAD_ARGUMENT } toda3_status;
 const char *toda3_status_string(toda3_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[toda3_DIFFERENCES][toda3_DIM];
 } toda3_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with toda3_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[toda3_DIM];     /* the state; read it freely, change it only through functions */
     double carry[toda3_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     toda3_history history; /* for starting guesses */
 } toda3_solver;
+size_t toda3_solver_size(void); /* for bindings to other languages, as what follows */
+size_t toda3_solver_steps_done(const toda3_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. toda3_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. toda3_BAD_ARGUMENT, and *s as before, if x0, a parameter
+   or what follows from parameters alone is not finite, or one not positive that has to be. */
 toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const double x0[toda3_DIM]);
 
 /* One step of size h, of either sign, or many. On failure x is the last good state, after s->steps steps. */
@@ -69,15 +72,6 @@ toda3_status toda3_kick(toda3_solver *s, const double change[toda3_DIM]);
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 toda3_status toda3_ensemble(const toda3_params *params, double *x, size_t members, double h, size_t steps,
     unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double toda3_hamiltonian(const toda3_params *params, const double x[toda3_DIM]);
-void toda3_casimirs(const toda3_params *params, const double x[toda3_DIM], double out[]);
-void toda3_vector_field(const toda3_params *params, const double x[toda3_DIM], double out[toda3_DIM]);
-
-/* For bindings: the size of toda3_solver, and its count of good steps. */
-size_t toda3_solver_size(void);
-size_t toda3_solver_steps_done(const toda3_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * toda3_quadratic.h: the declarations; toda3_quadratic.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of toda3_quadratic.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ad08c3c6f98325d4a5fb05cb5297daa37f0014ff2509791b2282b0ec0e775873
+ * body-sha256: e8fc1b404b523b5f7625139d80a92a6d043ff1c3bb1acc221165979f804c82f0
  */
 #ifndef TODA3_QUADRATIC_H
 #define TODA3_QUADRATIC_H
@@ -10,9 +9,9 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define toda3_quadratic_DIM 5
+#define toda3_quadratic_DIM 5 /* coordinates: a1, a2, b1, b2, b3 */
 #define toda3_quadratic_ORDER 4
-#define toda3_quadratic_CASIMIRS 1
+#define toda3_quadratic_CASIMIRS 1 /* det */
 #define toda3_quadratic_PHIGEN_VERSION "0.1.0"
 #define toda3_quadratic_SPEC_SHA256 "7af77757733d7da7009fd5c930b7974289267141d3afbc870017a911873e4cad"
 enum { toda3_quadratic_COEFFICIENTS = 1 }; /* numbers that depend on params and h only */
@@ -20,13 +19,16 @@ enum { toda3_quadratic_REMEMBERED = 112 }; /* values that a recurrence is fitted
 enum { toda3_quadratic_WINDOW = 40 };      /* of them that it may use */
 enum { toda3_quadratic_AHEAD = 1 };        /* values that it foresees */
 
-/* State vectors: a1, a2, b1, b2, b3. Casimirs: det. */
 typedef struct {
     char unused; /* this system has no parameters */
 } toda3_quadratic_params;
 extern const toda3_quadratic_params toda3_quadratic_default_params;
 
-/* How a step ends; toda3_quadratic_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const double x[5]);
+void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[5], double out[]);
+void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[5], double out[5]);
+
 typedef enum { toda3_quadratic_OK = 0, toda3_quadratic_NO_CONVERGENCE, toda3_quadratic_SINGULAR,
     toda3_quadratic_NOT_FINITE, toda3_quadratic_BAD_ARGUMENT } toda3_quadratic_status;
 const char *toda3_quadratic_status_string(toda3_quadratic_status status);
@@ -48,8 +50,7 @@ typedef struct {
     double weight[toda3_quadratic_WINDOW][toda3_quadratic_DIM][toda3_quadratic_AHEAD];
 } toda3_quadratic_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with
-   toda3_quadratic_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[toda3_quadratic_DIM];     /* the state; read it freely, change it only through functions */
     double carry[toda3_quadratic_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -63,10 +64,11 @@ typedef struct {
     double t_before_h;
     toda3_quadratic_history history; /* for starting guesses */
 } toda3_quadratic_solver;
+size_t toda3_quadratic_solver_size(void); /* for bindings to other languages, as what follows */
+size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. toda3_quadratic_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has
-   to be positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. toda3_quadratic_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const toda3_quadratic_params *params,
     const double x0[toda3_quadratic_DIM]);
 
@@ -92,17 +94,6 @@ toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *pa
    not overlap. */
 toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double toda3_quadratic_hamiltonian(const toda3_quadratic_params *params, const double x[toda3_quadratic_DIM]);
-void toda3_quadratic_casimirs(const toda3_quadratic_params *params, const double x[toda3_quadratic_DIM],
-    double out[]);
-void toda3_quadratic_vector_field(const toda3_quadratic_params *params, const double x[toda3_quadratic_DIM],
-    double out[toda3_quadratic_DIM]);
-
-/* For bindings: the size of toda3_quadratic_solver, and its count of good steps. */
-size_t toda3_quadratic_solver_size(void);
-size_t toda3_quadratic_solver_steps_done(const toda3_quadratic_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * volterra.h: the declarations; volterra.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of volterra.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ba34a37b4b812fbdf4fe6a1bf69059cd14f8b49c73c42ce7928ec66965f886b5
+ * body-sha256: eeefa614e0d60c7c280ea93f7b50f644fec597b8e6d12eba1be78299a841f9ab
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
@@ -27,7 +26,6 @@ extern const volterra_params volterra_default_params;
 enum { volterra_ARRAYS = 1 };        /* arrays over the sites: fields, then parameters */
 enum { volterra_COEFFICIENTS = 14 }; /* numbers that depend on params and h only */
 
-/* How a step ends; volterra_status_string says it in words. */
 typedef enum { volterra_OK = 0, volterra_NO_CONVERGENCE, volterra_SINGULAR, volterra_NOT_FINITE,
     volterra_BAD_ARGUMENT } volterra_status;
 

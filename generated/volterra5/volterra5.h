@@ -1,8 +1,7 @@
 /*
- * volterra5.h: the declarations; volterra5.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of volterra5.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c8bb34c10f6032a74e239567cbd789c32a9aaa2e45a87a8dd0988e291caf070e
+ * body-sha256: 8996d026fd9af3ab5a0cacafc881c8286ff87a6bffaf9a5012729e07fbc7ccae
  */
 #ifndef VOLTERRA5_H
 #define VOLTERRA5_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define volterra5_DIM 5
+#define volterra5_DIM 5 /* coordinates: v1, v2, v3, v4, v5 */
 #define volterra5_ORDER 4
-#define volterra5_CASIMIRS 1
+#define volterra5_CASIMIRS 1 /* C */
 #define volterra5_PHIGEN_VERSION "0.1.0"
 #define volterra5_SPEC_SHA256 "dd128093b5704f6c0aeea964a546614f9b636714a89d9b639a6d0eec7b0d3270"
 enum { volterra5_COEFFICIENTS = 4 }; /* numbers that depend on params and h only */
 
-/* State vectors: v1, v2, v3, v4, v5. Casimirs: C. */
 typedef struct {
     char unused; /* this system has no parameters */
 } volterra5_params;
 extern const volterra5_params volterra5_default_params;
 
-/* How a step ends; volterra5_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double volterra5_hamiltonian(const volterra5_params *params, const double x[5]);
+void volterra5_casimirs(const volterra5_params *params, const double x[5], double out[]);
+void volterra5_vector_field(const volterra5_params *params, const double x[5], double out[5]);
+
 typedef enum { volterra5_OK = 0, volterra5_NO_CONVERGENCE, volterra5_SINGULAR, volterra5_NOT_FINITE,
     volterra5_BAD_ARGUMENT } volterra5_status;
 const char *volterra5_status_string(volterra5_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[volterra5_DIFFERENCES][volterra5_DIM];
 } volterra5_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with volterra5_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[volterra5_DIM];     /* the state; read it freely, change it only through functions */
     double carry[volterra5_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     volterra5_history history; /* for starting guesses */
 } volterra5_solver;
+size_t volterra5_solver_size(void); /* for bindings to other languages, as what follows */
+size_t volterra5_solver_steps_done(const volterra5_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. volterra5_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. volterra5_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *params,
     const double x0[volterra5_DIM]);
 
@@ -70,16 +73,6 @@ volterra5_status volterra5_kick(volterra5_solver *s, const double change[volterr
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 volterra5_status volterra5_ensemble(const volterra5_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double volterra5_hamiltonian(const volterra5_params *params, const double x[volterra5_DIM]);
-void volterra5_casimirs(const volterra5_params *params, const double x[volterra5_DIM], double out[]);
-void volterra5_vector_field(const volterra5_params *params, const double x[volterra5_DIM],
-    double out[volterra5_DIM]);
-
-/* For bindings: the size of volterra5_solver, and its count of good steps. */
-size_t volterra5_solver_size(void);
-size_t volterra5_solver_steps_done(const volterra5_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * vortices3.h: the declarations; vortices3.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of vortices3.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 248422e5c3ffb49758891fdbf09cbc89889ed1fa16459057805bb0bdf75f6453
+ * body-sha256: 6a34140e4a452bdf343f2fe6c24d2e586229b032a2e3e40a329622d4617ccfe1
  */
 #ifndef VORTICES3_H
 #define VORTICES3_H
@@ -10,20 +9,23 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define vortices3_DIM 6
+#define vortices3_DIM 6 /* coordinates: x1, y1, x2, y2, x3, y3 */
 #define vortices3_ORDER 4
 #define vortices3_CASIMIRS 0
 #define vortices3_PHIGEN_VERSION "0.1.0"
 #define vortices3_SPEC_SHA256 "037a04eba07f271265722e4dcbf9a974884f1b57a9cde7f8c30f2ddfde0882bc"
 enum { vortices3_COEFFICIENTS = 3 }; /* numbers that depend on params and h only */
 
-/* State vectors: x1, y1, x2, y2, x3, y3. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } vortices3_params;
 extern const vortices3_params vortices3_default_params;
 
-/* How a step ends; vortices3_status_string says it in words. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+double vortices3_hamiltonian(const vortices3_params *params, const double x[6]);
+void vortices3_casimirs(const vortices3_params *params, const double x[6], double out[]);
+void vortices3_vector_field(const vortices3_params *params, const double x[6], double out[6]);
+
 typedef enum { vortices3_OK = 0, vortices3_NO_CONVERGENCE, vortices3_SINGULAR, vortices3_NOT_FINITE,
     vortices3_BAD_ARGUMENT } vortices3_status;
 const char *vortices3_status_string(vortices3_status status);
@@ -36,7 +38,7 @@ typedef struct {
     double difference[vortices3_DIFFERENCES][vortices3_DIM];
 } vortices3_history;
 
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with vortices3_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[vortices3_DIM];     /* the state; read it freely, change it only through functions */
     double carry[vortices3_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -50,10 +52,11 @@ typedef struct {
     double t_before_h;
     vortices3_history history; /* for starting guesses */
 } vortices3_solver;
+size_t vortices3_solver_size(void); /* for bindings to other languages, as what follows */
+size_t vortices3_solver_steps_done(const vortices3_solver *s);
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or
-   overlap. vortices3_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be
-   positive is not, or what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. vortices3_BAD_ARGUMENT, and *s as before, if x0, a
+   parameter or what follows from parameters alone is not finite, or one not positive that has to be. */
 vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *params,
     const double x0[vortices3_DIM]);
 
@@ -70,16 +73,6 @@ vortices3_status vortices3_kick(vortices3_solver *s, const double change[vortice
    state. status (or NULL) receives the status of each; the first that is not OK is returned. */
 vortices3_status vortices3_ensemble(const vortices3_params *params, double *x, size_t members, double h,
     size_t steps, unsigned char *status);
-
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double vortices3_hamiltonian(const vortices3_params *params, const double x[vortices3_DIM]);
-void vortices3_casimirs(const vortices3_params *params, const double x[vortices3_DIM], double out[]);
-void vortices3_vector_field(const vortices3_params *params, const double x[vortices3_DIM],
-    double out[vortices3_DIM]);
-
-/* For bindings: the size of vortices3_solver, and its count of good steps. */
-size_t vortices3_solver_size(void);
-size_t vortices3_solver_steps_done(const vortices3_solver *s);
 
 #ifdef __cplusplus
 }

@@ -1,8 +1,7 @@
 /*
- * xxz_disorder.h: the declarations; xxz_disorder.c says how they were made.
- * DO NOT EDIT: edits are noticed by the checksum below.
+ * The declarations of xxz_disorder.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d09f202b49fae75fb3a75c44add1dda9b68f0b2a8c935754ab8dce52bf57d6cc
+ * body-sha256: 77dd1e353a0d71bb9c6ca72565268773ded68a9291d1c4bf313df6a864c1ab1e
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
@@ -29,7 +28,6 @@ extern const xxz_disorder_params xxz_disorder_default_params;
 enum { xxz_disorder_ARRAYS = 4 };        /* arrays over the sites: fields, then parameters */
 enum { xxz_disorder_COEFFICIENTS = 78 }; /* numbers that depend on params and h only */
 
-/* How a step ends; xxz_disorder_status_string says it in words. */
 typedef enum { xxz_disorder_OK = 0, xxz_disorder_NO_CONVERGENCE, xxz_disorder_SINGULAR,
     xxz_disorder_NOT_FINITE, xxz_disorder_BAD_ARGUMENT } xxz_disorder_status;
 

@@ -32,6 +32,12 @@ class About:
     facts: tuple[str, ...] = ()
     operations: Mapping[str, int] = field(default_factory=dict)
 
+    @property
+    def counts(self) -> str:
+        """The operations in words."""
+        named = ((n, what.removesuffix("s") if n == 1 else what) for what, n in self.operations.items())
+        return ", ".join(f"{n} {what}" for n, what in named if n)
+
 
 @dataclass(frozen=True)
 class Observables:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
@@ -19,7 +19,7 @@ from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
-from phigen.targets.c.kernels import function, members, printer
+from phigen.targets.c.kernels import declaration, function, members, printer
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.lanes import remembered
 from phigen.targets.c.layout import fitted
@@ -95,8 +95,7 @@ def _declared_lines(program: Program) -> list[str]:
     """The header comment of the declarations; that of the code says the rest."""
     name = program.name
     return [
-        f"{name}.h: the declarations; {name}.c says how they were made.",
-        "DO NOT EDIT: edits are noticed by the checksum below.",
+        f"The declarations of {name}.c. DO NOT EDIT: the checksum below notices.",
         f"SPDX-License-Identifier: {program.about.license}",
     ]
 
@@ -160,11 +159,38 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         "version": program.version,
         "sha256": program.about.spec_sha256,
         "coordinates": ", ".join(program.coordinates),
-        "casimirs": ", ".join(program.casimirs) or "none",
+        "casimirs": f" /* {', '.join(program.casimirs)} */" if program.casimirs else "",
         "members": [(f"double {member[p.name]};", _about(p, member[p.name])) for p in program.parameters]
         or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
+        "observables": [
+            (said, [declaration(program, k, name=name, returning=one) for k, name, one in kernels])
+            for said, kernels in _observables(program)
+        ],
     }
+
+
+#: Kernels that are functions of the API: each with its name there, and whether it returns its only value.
+Exported = list[tuple[Kernel, str, bool]]
+
+
+def _observables(program: Program) -> Iterator[tuple[str, Exported]]:
+    """What users may ask of a system at a state, and what the header says of it."""
+    seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
+    at, of = (" at the time t", "t, x") if program.time else ("", "x")
+    yield (
+        f"The Hamiltonian{at}; the Casimirs; the right-hand side pi(x) grad H({of}). params may be NULL.",
+        [(seen.energy, "hamiltonian", True), (seen.casimirs, "casimirs", False), (seen.vector_field, "", False)],
+    )
+    if noise and noise.fields:
+        said = "sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL."
+        yield said, [(noise.fields, "", False)]
+    if monitor:
+        yield "dt/dtau at x; params may be NULL.", [(monitor.rate, "", True)]
+    if modified:
+        order = f"up to O(h^{program.name}_MODIFIED_POWER)"
+        said = f"The Hamiltonian whose flow a step of size h is, {order}: constant along a trajectory to that order."
+        yield said, [(modified.kernel, "modified_hamiltonian", True)]
 
 
 def _renewing(program: Program) -> str:
@@ -243,7 +269,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
 
 
 def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
-    step, seen = program.step, program.observables
+    step = program.step
     body = functions.called(program)
     own: list[Kernel | None] = []
     if not isinstance(step, Splitting | Sweeps):
@@ -263,15 +289,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         if step.adjoint.refresh:
             body.append(function(program, step.adjoint.refresh, name="at_time_adjoint"))
     body += [function(program, kernel) for kernel in own if kernel]
-    body.append(function(program, seen.energy, name="hamiltonian", exported=True, returning=True))
-    body += [function(program, kernel, exported=True) for kernel in (seen.casimirs, seen.vector_field)]
-    if program.noise and program.noise.fields:
-        body.append(function(program, program.noise.fields, exported=True))
-    if program.monitor:
-        body.append(function(program, program.monitor.rate, exported=True, returning=True))
-    if program.modified:
-        name = "modified_hamiltonian"
-        body.append(function(program, program.modified.kernel, name=name, exported=True, returning=True))
+    for _, kernels in _observables(program):
+        body += [function(program, k, name=name, exported=True, returning=one) for k, name, one in kernels]
     text = "\n".join(body)
     member = members(program)
     asked = [

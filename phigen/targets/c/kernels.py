@@ -125,6 +125,12 @@ def function(
     return "\n".join([*texts, *head, "}"]) + "\n"
 
 
+def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: bool = False) -> str:
+    """The declaration of a function of the API, as `function` defines it."""
+    form = Form(f"{program.name}_{name or kernel.name}", exported=True, returning=returning)
+    return f"{_signature(program, kernel, form)};"
+
+
 def lane_calls(program: Program) -> Mapping[str, str]:
     """The functions that the loops over lanes call: their own versions where there are such."""
     own = {f: f"{program.name}_{f}_lane" for f in LANE_FUNCTIONS}

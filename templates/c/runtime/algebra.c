@@ -7,8 +7,10 @@
 
 #if PHI_IMPLICIT
 /* ---- Compensated sums, linear equations ---- */
-#else
+#elif PHI_SPLITTING
 /* ---- The explicit step ---- */
+#else
+/* ---- The solver ---- */
 #endif
 static int phi_finite(const double *values, int count)
 {
@@ -19,7 +21,7 @@ static int phi_finite(const double *values, int count)
 #if PHI_ADVANCE
 /* x + change + small in compensated arithmetic: were the carry, and what is as small, rounded with the change,
    corrections of one sign would add up to a drift. 0, and x as before, if the sum is not finite. */
-static int phi_advance(phi_solver *s, const double change[PHI_DIM], const double small[PHI_DIM])
+static int phi_advance(phi_solver *s, const double *change, const double *small)
 {
     double x[PHI_DIM], carry[PHI_DIM];
     for (int i = 0; i < PHI_DIM; ++i) {

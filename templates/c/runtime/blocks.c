@@ -433,7 +433,10 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         phi_pass(s, elapsed[lane]);
     }
 #endif
-    phi_count(s, PHI_LANES);
+    s->steps += PHI_LANES;
+#if !PHI_MONITOR
+    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
+#endif
 #if PHI_ATTITUDE
     phi_turn_block(s, table, PHI_ADDRESS(model));
 #endif
@@ -505,11 +508,7 @@ static void phi_learn_from(phi_solver *s, int passes)
 static phi_status phi_single(phi_solver *s)
 {
     const size_t before = s->evaluations;
-#if PHI_ATTITUDE
-    const phi_status status = phi_unread_step(s, s->h);
-#else
-    const phi_status status = phi_step(s, s->h);
-#endif
+    const phi_status status = phi_single_steps(s, s->h, 1);
 #if PHI_COMPOSED
     const double evaluations = (double)(s->evaluations - before) / (double)PHI_STAGES;
 #else
@@ -524,7 +523,7 @@ static phi_status phi_single(phi_solver *s)
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_table table;
-    phi_status status = phi_set_step(s, h);
+    phi_status status = phi_single_steps(s, h, 0); /* what depends on h */
     PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
 #if PHI_COMPOSED && !PHI_PATH
     table.marching = 0;

@@ -6,7 +6,7 @@
 #include "algebra.c"
 #include "model.h"
 
-#if PHI_EXPLICIT
+#if PHI_EXPLICIT && PHI_COMPOSED
 /* One explicit stage: x + increment(x). */
 static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 {
@@ -16,7 +16,7 @@ static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
     return phi_advance(s, increment, s->carry) ? PHI_OK : PHI_NOT_FINITE;
 }
 
-#else
+#elif PHI_SPLITTING
 #if PHI_ATTITUDE
 #include "attitude.c"
 #endif

@@ -53,7 +53,7 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
 #else
     const phi_status status = phi_init(s, params, x);
 #endif
-    return status == PHI_OK ? phi_set_step(s, all->h[m * all->own]) : status;
+    return status == PHI_OK ? phi_integrate(s, all->h[m * all->own], 0) : status; /* no step yet, but all for one */
 }
 
 /* The same at the state that the ensemble has for it, which is x then. */

@@ -27,7 +27,9 @@
 #include "noise.c"
 #endif
 
+#if !PHI_EXPLICIT
 /* ---- The solver ---- */
+#endif
 #if PHI_GAUGE && !PHI_MONITOR && !PHI_GAUGE_SEARCH
 #include "gauge.c"
 
@@ -98,36 +100,6 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
 }
 
 #endif
-/* What depends on the step size; nothing where that is as before. */
-static phi_status phi_set_step(phi_solver *s, double h)
-{
-    if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
-    if (memcmp(&h, &s->h, sizeof h) == 0) return PHI_OK;
-    PHI_EACH_STAGE
-#if PHI_GAUGE
-        phi_prepare(&s->params, s->gauge, PHI_FRACTION(h), PHI_OF(s->coef, stage));
-#else
-        phi_prepare(&s->params, PHI_FRACTION(h), PHI_OF(s->coef, stage));
-#endif
-#if PHI_GUESSED
-    memset(&s->history, 0, sizeof s->history);
-#endif
-#if PHI_RECURRENCES
-    PHI_EACH_STAGE PHI_OF(s->history, stage).slow_steps_allowed = PHI_REPAY;
-#endif
-#if PHI_BLOCKS
-    memset(&s->blocks, 0, sizeof s->blocks);
-    s->blocks.single_steps = 2 * PHI_AHEAD;
-    s->blocks.passes_without_recurrences = INT_MAX;
-#endif
-    s->h = h;
-#if !PHI_MONITOR
-    s->t_before_h = s->t;
-    s->steps_before_h = s->steps;
-#endif
-    return PHI_OK;
-}
-
 #if PHI_RENEWED
 #if PHI_NOISE
 /* What depends on the increments of the next step. */
@@ -160,17 +132,6 @@ static void phi_renew(phi_solver *s)
 #else
         phi_at_time(PHI_OF(s->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h, PHI_OF(s->coef, stage) + PHI_PREPARED);
 #endif
-#endif
-}
-
-#endif
-#if PHI_BLOCKS
-/* Some good steps have been made. */
-static void phi_count(phi_solver *s, size_t steps)
-{
-    s->steps += steps;
-#if !PHI_MONITOR
-    s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
 #endif
 }
 
@@ -224,38 +185,9 @@ static phi_status phi_stages(phi_solver *s)
 
 #endif
 #if PHI_BLOCKS
-#if PHI_ATTITUDE
-/* One step; s->attitude is left to phi_read_attitude. */
-static phi_status phi_unread_step(phi_solver *s, double h)
-#else
-phi_status phi_step(phi_solver *s, double h)
-#endif
-{
-    phi_status status = phi_set_step(s, h);
-    if (status != PHI_OK) return status;
-#if PHI_RENEWED
-    phi_renew(s);
-#endif
-#if PHI_COMPOSED
-    status = phi_stages(s);
-#else
-    PHI_EACH_STAGE status = phi_stage(s PHI_AND_STAGE);
-#endif
-    if (status == PHI_OK) phi_count(s, 1);
-    return status;
-}
-
-#if PHI_ATTITUDE
-phi_status phi_step(phi_solver *s, double h)
-{
-    const phi_status status = phi_unread_step(s, h);
-    if (status == PHI_OK) phi_read_attitude(s);
-    return status;
-}
-
-#endif
-#else
-#if PHI_NOISE
+/* Steps one by one; s->attitude is left to phi_read_attitude. */
+static phi_status phi_single_steps(phi_solver *s, double h, size_t steps)
+#elif PHI_NOISE
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw)
 #elif PHI_SPLITTING && PHI_ADJOINT
 /* phi_integrate, which leaves the states before all flows in kept, unless that is NULL. */
@@ -264,8 +196,32 @@ static phi_status phi_integrate_leaving(phi_solver *s, double h, size_t steps, d
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #endif
 {
-    phi_status status = phi_set_step(s, h);
-    for (; steps > 0 && status == PHI_OK; --steps) {
+    if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
+    if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
+        PHI_EACH_STAGE
+#if PHI_GAUGE
+            phi_prepare(&s->params, s->gauge, PHI_FRACTION(h), PHI_OF(s->coef, stage));
+#else
+            phi_prepare(&s->params, PHI_FRACTION(h), PHI_OF(s->coef, stage));
+#endif
+#if PHI_GUESSED
+        memset(&s->history, 0, sizeof s->history);
+#endif
+#if PHI_RECURRENCES
+        PHI_EACH_STAGE PHI_OF(s->history, stage).slow_steps_allowed = PHI_REPAY;
+#endif
+#if PHI_BLOCKS
+        memset(&s->blocks, 0, sizeof s->blocks);
+        s->blocks.single_steps = 2 * PHI_AHEAD;
+        s->blocks.passes_without_recurrences = INT_MAX;
+#endif
+        s->h = h;
+#if !PHI_MONITOR
+        s->t_before_h = s->t;
+        s->steps_before_h = s->steps;
+#endif
+    }
+    for (; steps > 0; --steps) {
 #if PHI_NOISE
         if (!phi_draw(s, dw)) return PHI_BAD_ARGUMENT;
         if (dw != NULL) dw += PHI_DRAWS;
@@ -273,15 +229,25 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_RENEWED
         phi_renew(s);
 #endif
+#if PHI_EXPLICIT && !PHI_COMPOSED
+        double increment[PHI_DIM];
+        phi_explicit(s->coef, s->x, increment);
+        ++s->evaluations;
+        if (!phi_advance(s, increment, s->carry)) return PHI_NOT_FINITE;
+#else
 #if PHI_SPLITTING && PHI_ADJOINT
-        status = phi_stages(s, kept);
+        const phi_status status = phi_stages(s, kept);
         if (kept != NULL) kept += PHI_FLOWS;
 #elif PHI_COMPOSED || PHI_SPLITTING
-        status = phi_stages(s);
+        const phi_status status = phi_stages(s);
 #else
-        PHI_EACH_STAGE status = phi_stage(s PHI_AND_STAGE);
+        const phi_status status = phi_stage(s);
 #endif
-        if (status != PHI_OK) break;
+#if PHI_ATTITUDE && !PHI_BLOCKS
+        if (status != PHI_OK) phi_read_attitude(s);
+#endif
+        if (status != PHI_OK) return status;
+#endif
         ++s->steps;
 #if PHI_MONITOR
     }
@@ -289,12 +255,24 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
     }
 #endif
-#if PHI_ATTITUDE
-    if (s != NULL) phi_read_attitude(s);
+#if PHI_ATTITUDE && !PHI_BLOCKS
+    phi_read_attitude(s);
 #endif
+    return PHI_OK;
+}
+
+#if PHI_BLOCKS && PHI_ATTITUDE
+phi_status phi_step(phi_solver *s, double h)
+{
+    const phi_status status = phi_single_steps(s, h, 1);
+    if (status == PHI_OK) phi_read_attitude(s);
     return status;
 }
 
+#elif PHI_BLOCKS
+phi_status phi_step(phi_solver *s, double h) { return phi_single_steps(s, h, 1); }
+
+#else
 #if PHI_NOISE
 phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_integrate_along(s, h, steps, NULL); }
 

@@ -46,7 +46,7 @@ typedef struct {
 } phi_learnt;
 
 #endif
-/* The solver is a plain value: copy it to branch, keep one per thread. Set it up with phi_init. */
+/* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
     double x[PHI_DIM];     /* the state; read it freely, change it only through functions */
     double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
@@ -109,10 +109,22 @@ typedef struct {
     phi_learnt blocks;
 #endif
 } phi_solver;
+size_t phi_solver_size(void); /* for bindings to other languages, as what follows */
+size_t phi_solver_steps_done(const phi_solver *s);
+#if PHI_MONITOR
+double phi_solver_time(const phi_solver *s);
+#endif
+#if PHI_ATTITUDE && PHI_POSITION
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]); /* and the position behind it */
+#elif PHI_ATTITUDE
+void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
+#endif
+#if PHI_ADJOINT
+size_t phi_trail_size(void);
+#endif
 
-/* Start at x0. params may be NULL for the defaults. Arguments of all functions may be parts of the solver, or overlap.
-   PHI_BAD_ARGUMENT, and *s as before, if x0 or a parameter is not finite, one that has to be positive is not, or
-   what is computed from parameters alone is not finite. */
+/* Start at x0. params may be NULL for the defaults. PHI_BAD_ARGUMENT, and *s as before, if x0, a parameter or what
+   follows from parameters alone is not finite, or one not positive that has to be. */
 #if PHI_MONITOR
 /* Also if phi_monitor is not positive at x0. */
 #endif
@@ -307,59 +319,5 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
 #endif
 
 #endif
-#endif
-#if PHI_TIMED
-/* The Hamiltonian at the time t; the Casimirs; the right-hand side pi(x) grad H(t, x). params may be NULL. */
-double phi_hamiltonian(const phi_params *params, double t, const double x[PHI_DIM]);
-void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[]);
-void phi_vector_field(const phi_params *params, double t, const double x[PHI_DIM], double out[PHI_DIM]);
-#else
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
-double phi_hamiltonian(const phi_params *params, const double x[PHI_DIM]);
-void phi_casimirs(const phi_params *params, const double x[PHI_DIM], double out[]);
-void phi_vector_field(const phi_params *params, const double x[PHI_DIM], double out[PHI_DIM]);
-#endif
-
-#if PHI_NOISE
-/* sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL. */
-#if PHI_TIMED
-void phi_noise_fields(const phi_params *params, double t, const double x[PHI_DIM], double out[PHI_SOURCES * PHI_DIM]);
-#else
-void phi_noise_fields(const phi_params *params, const double x[PHI_DIM], double out[PHI_SOURCES * PHI_DIM]);
-#endif
-
-#endif
-#if PHI_MONITOR
-/* dt/dtau at x; params may be NULL. */
-double phi_monitor(const phi_params *params, const double x[PHI_DIM]);
-
-#endif
-#if PHI_MODIFIED
-/* The Hamiltonian whose flow a step of size h is, up to O(h^PHI_MODIFIED_POWER): constant along a trajectory to that
-   order. */
-#if PHI_GAUGE
-double phi_modified_hamiltonian(const phi_params *params, const double gauge[PHI_GAUGES], double h,
-    const double x[PHI_DIM]);
-#elif PHI_TIMED
-double phi_modified_hamiltonian(const phi_params *params, double h, double t, const double x[PHI_DIM]);
-#else
-double phi_modified_hamiltonian(const phi_params *params, double h, const double x[PHI_DIM]);
-#endif
-
-#endif
-/* For bindings: the size of phi_solver, and its count of good steps. */
-size_t phi_solver_size(void);
-size_t phi_solver_steps_done(const phi_solver *s);
-#if PHI_ADJOINT
-size_t phi_trail_size(void);
-#endif
-#if PHI_ATTITUDE
-#if PHI_POSITION
-/* The attitude, then the position. */
-#endif
-void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
-#endif
-#if PHI_MONITOR
-double phi_solver_time(const phi_solver *s);
 #endif
 #endif

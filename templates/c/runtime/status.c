@@ -13,7 +13,7 @@ const char *phi_status_string(phi_status status)
 #if PHI_ASKED
     case PHI_STOPPED: return "stopped, as was asked";
 #endif
+    default: return "unknown status";
     }
-    return "unknown status";
 }
 #endif

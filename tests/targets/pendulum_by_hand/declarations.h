@@ -90,6 +90,10 @@ typedef struct {
 
 extern const phi_params phi_default_params;
 
+double phi_hamiltonian(const phi_params *params, const double x[2]);
+void phi_casimirs(const phi_params *params, const double x[2], double out[]);
+void phi_vector_field(const phi_params *params, const double x[2], double out[2]);
+
 #if PHI_COMPOSED
 enum { PHI_STAGES = 3 };
 #endif
