@@ -104,8 +104,9 @@ def first_loop(
             head.append(f"    memset(handed_{array} + row->from, 0, {whole});")
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    body += [*stores, *(f"share{k}[i - begin] += {value};" for k, (_, value) in enumerate(shares))]
-    text = _looped(name, layout, seeds.colour, [*head, *(f"    {line}" for line in names.pointers())], body, shares)
+    head += [f"    {line}" for line in names.pointers()]
+    looped = _in_vectors if program.profile == "fast" and not layout.leaves_out(seeds.colour) else _looped
+    text = looped(name, layout, seeds.colour, head, [*body, *stores], shares)
     return Loop(kernel.name + form, kernel.purpose, f"{told(program)}, double *sums", text)
 
 
@@ -118,6 +119,7 @@ def _looped(
     shares: Sequence[tuple[int, str]],
 ) -> str:
     """The loop over sites; where they have shares in sums, over so many of them at once that these are kept apart."""
+    body = [*body, *(f"share{k}[i - begin] += {value};" for k, (_, value) in enumerate(shares))]
     coloured = layout.leaves_out(colour)
     begin, end = ("begin", "") if shares else ("row->from", ", end = row->to")
     start = f"{name}_first(row, {colour}, {begin})" if coloured else begin
@@ -135,6 +137,32 @@ def _looped(
     lines.append(f"for (ptrdiff_t begin = row->from; begin < row->to; begin += {name}_ADDED) {{")
     lines += [*(f"    {line}" for line in inner), "}"]
     lines += [f"sums[{c}] += {name}_added(share{k}, apart);" for k, (c, _) in enumerate(shares)]
+    return "\n".join([*head, *(f"    {line}" for line in lines)]) + "\n"
+
+
+def _in_vectors(
+    name: str,
+    layout: Layout,
+    colour: int | None,
+    head: Sequence[str],
+    body: Sequence[str],
+    shares: Sequence[tuple[int, str]],
+) -> str:
+    """The same, where shares stay in registers: over vectors of 8 sites, then over those that are left."""
+    if not shares:
+        return _looped(name, layout, colour, head, body, shares)
+
+    def added(place: str) -> Iterator[str]:
+        yield from body
+        yield from (f"share{k}[{place}] += {value};" for k, (_, value) in enumerate(shares))
+
+    lines = [f"double {', '.join(f'share{k}[8] = {{ 0.0 }}' for k in range(len(shares)))};"]
+    lines.append("const ptrdiff_t to = row->to, whole = to - (to - row->from) % 8;")
+    lines += ["for (ptrdiff_t j = row->from; j < whole; j += 8) {", f"    {name}_EACH_SITE"]
+    lines += ["    for (ptrdiff_t l = 0; l < 8; ++l) {", "        const ptrdiff_t i = j + l;"]
+    lines += [*(f"        {line}" for line in added("l")), "    }", "}"]
+    lines += ["for (ptrdiff_t i = whole; i < to; ++i) {", *(f"    {line}" for line in added("0")), "}"]
+    lines += [f"sums[{c}] += {name}_added(share{k}, 8);" for k, (c, _) in enumerate(shares)]
     return "\n".join([*head, *(f"    {line}" for line in lines)]) + "\n"
 
 
