@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: fd3cdb294e6834b90543393c9f049331f93fe8e03f0516927209818ac404d400
+ * body-sha256: 66f8a7e2e2cd64175163c9b221add2cd65a382ca068cd34814e51d6aeef9eec3
  */
 #include "fput.h"
 #include <float.h>
@@ -401,11 +401,11 @@ static size_t fput_slices(const fput_solver *s, size_t *units)
     return fput_units(s);
 }
 
-/* How many flows are made at once. */
-static size_t fput_depth(const fput_solver *s)
+/* How many flows over so many arrays are made at once. */
+static size_t fput_depth(const fput_solver *s, size_t arrays)
 {
     size_t units;
-    const size_t slices = fput_slices(s, &units), bytes = (size_t)s->width * fput_ARRAYS * sizeof(double);
+    const size_t slices = fput_slices(s, &units), bytes = (size_t)s->width * arrays * sizeof(double);
     const size_t held = fput_CACHE / (bytes / slices) / fput_SPAN,
         room = slices / fput_THREADS / (2 * fput_SPAN);
     const size_t depth = held < room ? held : room;
@@ -440,7 +440,7 @@ static void fput_make_wave(const fput_solver *s, const fput_flow *flows, size_t 
 /* The flows of some steps, joined, without the last. */
 static void fput_make_waves(const fput_solver *s, size_t steps)
 {
-    const size_t each = fput_FLOWS - 1, depth = fput_depth(s);
+    const size_t each = fput_FLOWS - 1, depth = fput_depth(s, fput_ARRAYS);
     fput_flow flows[fput_DEEPEST];
     for (size_t done = 0; done < steps * each;) {
         size_t count = 0;

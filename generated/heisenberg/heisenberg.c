@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 7701039a176dc65cd9720e411ffcce4337fc8e1bc4686ade8218947488ca41cd
+ * body-sha256: 5164fd9b56b773aba1a48594d4630942c14f13ce23dceff2459cc0c4aa2623aa
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -722,12 +722,12 @@ static size_t heisenberg_slices(const heisenberg_solver *s, size_t *units)
     return s->sizes[0];
 }
 
-/* How many flows are made at once. */
-static size_t heisenberg_depth(const heisenberg_solver *s)
+/* How many flows over so many arrays are made at once. */
+static size_t heisenberg_depth(const heisenberg_solver *s, size_t arrays)
 {
     size_t units;
-    const size_t slices = heisenberg_slices(s, &units), bytes = s->rows * (size_t)s->width * heisenberg_ARRAYS
-        * sizeof(double);
+    const size_t slices = heisenberg_slices(s, &units),
+        bytes = s->rows * (size_t)s->width * arrays * sizeof(double);
     const size_t held = heisenberg_CACHE / (bytes / slices) / heisenberg_SPAN,
         room = slices / heisenberg_THREADS / (2 * heisenberg_SPAN);
     const size_t depth = held < room ? held : room;
@@ -764,7 +764,7 @@ static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_fl
 /* The flows of some steps, joined, without the last. */
 static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 {
-    const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s);
+    const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s, heisenberg_ARRAYS);
     heisenberg_flow flows[heisenberg_DEEPEST];
     for (size_t done = 0; done < steps * each;) {
         size_t count = 0;

@@ -90,22 +90,39 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
     const double *rows_bar, double coef_bar[PHI_SUMS])
 {
     phi_status status = PHI_OK;
+#if PHI_UNDONE
+    for (size_t k = until, next; k > done && status == PHI_OK; k = next) {
+        const size_t row = (k - 1) / stride, leg = (k - 1 - done) / g->leg, most = PHI_UNASKED / s->sites + 1;
+        if (k == steps || k % stride == 0) phi_row_back(s, g, g->first_step + k, rows_bar + row * PHI_DIM * s->sites);
+#if PHI_RENEWED
+        next = k - 1;
+#else
+        next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* one row, or leg, at once */
+        next = k - next > most ? k - most : next;
+#endif
+        PHI_PARALLEL
+        phi_steps_back(s, g, g->first_step + next, k - next);
+        if (next == done + leg * g->leg) status = phi_leave_leg(s, g, leg);
+#if PHI_RENEWED
+        phi_add_up_step(s, g, g->first_step + next, coef_bar);
+        (void)most;
+#else
+        (void)coef_bar;
+#endif
+        if (status == PHI_OK && phi_is_stopped(s, g, k - next)) status = PHI_STOPPED;
+    }
+#else
 #if PHI_SERIES
     phi_forget(s);
-#elif !PHI_UNDONE
+#else
     memcpy(g->x, s->x, sizeof g->x);
 #endif
     for (size_t k = until; k > done && status == PHI_OK; --k) {
         const size_t row = (k - 1) / stride, before = g->first_step + k - 1;
-#if !PHI_UNDONE
         double *kept = g->kept + (k - 1 - done) * g->of_step;
-#endif
         if (k == steps || k % stride == 0) phi_row_back(s, g, before + 1, rows_bar + row * PHI_DIM * s->sites);
 #if PHI_SERIES
         status = phi_step_back(s, g, before, kept);
-#elif PHI_UNDONE
-        phi_step_back(s, g, before, k > 1);
-        if ((k - 1 - done) % g->leg == 0) status = phi_leave_leg(s, g, (k - 1 - done) / g->leg);
 #else
         phi_step_back(s, g, before, k > 1, kept);
 #endif
@@ -116,6 +133,7 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
 #endif
         if (status == PHI_OK && phi_is_stopped(s, g, 1)) status = PHI_STOPPED;
     }
+#endif
     return status;
 }
 

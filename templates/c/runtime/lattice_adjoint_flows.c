@@ -28,7 +28,6 @@ static int phi_sweep_of(const phi_solver *s, int flow, int number)
 #endif
 }
 
-#endif
 /* The part of H that a sweep belongs to, from 0 on. */
 static int phi_part_of(const phi_solver *s, int sweep)
 {
@@ -42,6 +41,7 @@ static int phi_part_of(const phi_solver *s, int sweep)
 #endif
 }
 
+#endif
 /* The sweeps that steps consist of where they are joined: without the last flow, unless that is all. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
@@ -92,46 +92,93 @@ static void phi_keep_steps(const phi_solver *s, size_t steps)
 }
 
 #endif
-/* Pull cotangents back through one sweep, x being the fields before it, or after it where it is undone. */
+#if !PHI_UNDONE
+/* Pull cotangents back through one sweep, x being the fields before it. */
 static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int sweep, const double *coef, int row,
     double *const *x, double *const *bar)
 {
     size_t first, end = phi_share(phi_units(s), &first);
     phi_back_rows(s, sweep, coef, g->far, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #if PHI_HANDS
-#if PHI_UNDONE
-    phi_wait();
-#else
-    if (phi_hands[phi_part_of(s, sweep)]) phi_wait();
-#endif
     if (!phi_hands[phi_part_of(s, sweep)]) return;
+    phi_wait();
 #if PHI_GATHER
     phi_hand_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #else
     phi_hand_rows(s, sweep, x, bar, g->handed, first, end);
 #endif
     phi_wait();
-#elif PHI_UNDONE
-    phi_wait();
 #endif
 }
 
+#endif
 #if PHI_UNDONE
-/* Pull cotangents back through a flow in a step after so many; s->x becomes the fields before it. */
-static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number, double *const *bar)
+/* Pull cotangents back through a flow, and undo it, or hand what that has found, at pieces of rows. */
+static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end)
 {
-    const int row = number == PHI_FLOWS ? PHI_JOINED : phi_flow_rows[number];
-    phi_flow flow;
-    phi_find_flow(s, steps, number, &flow);
-    phi_sweep_back(s, g, flow.part, flow.coef, row, s->x, bar);
+    const phi_transpose *g = flow->g;
+#if PHI_HANDS
+    if (flow->go > 1) phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
+    else phi_back_rows(s, flow->part, flow->coef, g->far, s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+#else
+    phi_back_rows(s, flow->part, flow->coef, g->far, s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+#endif
 }
 
-/* Pull the cotangents of all sweeps of the step after so many back, and undo them. */
-static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int joined)
+/* Go back through some flows, the last first; all threads come here at once. */
+static void phi_go_all_back(const phi_solver *s, const phi_flow *flows, size_t count)
 {
-    PHI_PARALLEL
-    for (int flow = PHI_OWN_FLOWS - 1; flow >= 0; --flow)
-        phi_flow_back(s, g, steps, flow == 0 && joined ? PHI_FLOWS : flow, g->bar);
+#if PHI_WAVES
+    if (count > 1) {
+        phi_make_wave(s, flows, count);
+        return;
+    }
+#endif
+    size_t first, end = phi_share(phi_units(s), &first);
+    for (size_t k = 0; k < count; ++k) {
+        phi_go_back(s, flows + k, first, end);
+        phi_wait();
+    }
+}
+
+#if !PHI_WAVES
+enum { PHI_DEEPEST = 1 }; /* flows at once */
+#endif
+
+/* The way back through a flow of the step after so many, by its number, for those cotangents. */
+static void phi_find_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar, phi_flow *flow)
+{
+    phi_find_flow(s, step, number, flow);
+    flow->go = 1;
+    flow->row = number == PHI_FLOWS ? PHI_JOINED : phi_flow_rows[number];
+    flow->g = g;
+    flow->bar = bar;
+}
+
+/* Pull cotangents back through so many steps, joined, after so many, and undo them: s->x becomes the fields before. */
+static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t before, size_t steps)
+{
+#if PHI_WAVES
+    const size_t depth = phi_depth(s, PHI_ARRAYS + PHI_BARS + PHI_HANDED);
+#else
+    const size_t depth = 1;
+#endif
+    phi_flow flows[PHI_DEEPEST];
+    size_t count = 0;
+    for (size_t left = steps * PHI_OWN_FLOWS; left-- > 0;) {
+        const size_t step = before + left / PHI_OWN_FLOWS;
+        const int flow = (int)(left % PHI_OWN_FLOWS), number = flow == 0 && step > g->first_step ? PHI_FLOWS : flow;
+        for (int go = 1, last = 1; go <= last; ++go) {
+            phi_flow *next = flows + count++;
+            phi_find_back(s, g, step, number, g->bar, next);
+            next->go = go;
+            last = 1 + phi_hands[next->part - 1];
+            if (count < depth) continue;
+            phi_go_all_back(s, flows, count);
+            count = 0;
+        }
+    }
+    phi_go_all_back(s, flows, count);
 }
 
 /* The state that a leg of a segment begins with. */
@@ -238,9 +285,11 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 #if PHI_UNDONE
         if (PHI_FLOWS > 1) {
             phi_flow last;
-            phi_find_flow(s, steps - 1, PHI_FLOWS - 1, &last); /* which is made here, to be undone */
-            phi_sweep_part(s, last.part, last.coef, g->far);
-            phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar);
+            phi_find_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last);
+            phi_sweep_part(s, last.part, last.coef, g->far); /* to be undone */
+            phi_go_all_back(s, &last, 1);
+            last.go = 2;
+            phi_go_all_back(s, &last, phi_hands[last.part - 1]);
         }
 #else
         double *x[PHI_ARRAYS];

@@ -63,6 +63,12 @@ typedef struct {
 #if PHI_RENEWED
     double own[PHI_ROW];
 #endif
+#if PHI_UNDONE
+    int go;                    /* 0 onward; else back, 1 at the sites themselves, and 2 as they are handed something then, with: */
+    int row;
+    const struct phi_transpose *g;
+    double *const *bar;
+#endif
 } phi_flow;
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
@@ -70,6 +76,9 @@ static void phi_find_flow(const phi_solver *s, size_t steps, int number, phi_flo
 {
     const int joined = number == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[number];
     flow->part = phi_flow_parts[joined ? 0 : number];
+#if PHI_UNDONE
+    flow->go = 0;
+#endif
 #if PHI_RENEWED
     phi_renew(s, row, steps, flow->own);
     flow->coef = flow->own;
@@ -114,6 +123,10 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 #endif
     phi_sweep_part(s, phi_flow_parts[joined ? 0 : number], coef, s->far > 0);
 }
+
+#endif
+#if PHI_UNDONE
+static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end);
 
 #endif
 #if PHI_WAVES

@@ -10,7 +10,7 @@
 
 /* ---- What is kept to go back ---- */
 /* What is pulled back through steps, and the memory for it. */
-typedef struct {
+typedef struct phi_transpose {
     double *bar[PHI_BARS];       /* cotangents of the fields, then of parameters at sites, and at the bonds of each site */
     double *row_bar[PHI_BARS];   /* those of the fields of one row, and the same of parameters */
     double *handed[PHI_HANDED];  /* what sites hand to those that they have read */

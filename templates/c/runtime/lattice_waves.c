@@ -24,11 +24,11 @@ static size_t phi_slices(const phi_solver *s, size_t *units)
 #endif
 }
 
-/* How many flows are made at once. */
-static size_t phi_depth(const phi_solver *s)
+/* How many flows over so many arrays are made at once. */
+static size_t phi_depth(const phi_solver *s, size_t arrays)
 {
     size_t units;
-    const size_t slices = phi_slices(s, &units), bytes = s->rows * (size_t)s->width * PHI_ARRAYS * sizeof(double);
+    const size_t slices = phi_slices(s, &units), bytes = s->rows * (size_t)s->width * arrays * sizeof(double);
     const size_t held = PHI_CACHE / (bytes / slices) / PHI_SPAN, room = slices / PHI_THREADS / (2 * PHI_SPAN);
     const size_t depth = held < room ? held : room;
 #if PHI_TANGENT
@@ -42,7 +42,12 @@ static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t fr
 {
     size_t units;
     (void)phi_slices(s, &units);
+#if PHI_UNDONE
+    if (flow->go > 0) phi_go_back(s, flow, from * units, to * units);
+    else phi_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+#else
     phi_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+#endif
 }
 
 /* So many flows, one after the other. */
@@ -64,7 +69,7 @@ static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t cou
 /* The flows of some steps, joined, without the last. */
 static void phi_make_waves(const phi_solver *s, size_t steps)
 {
-    const size_t each = PHI_FLOWS - 1, depth = phi_depth(s);
+    const size_t each = PHI_FLOWS - 1, depth = phi_depth(s, PHI_ARRAYS);
     phi_flow flows[PHI_DEEPEST];
     for (size_t done = 0; done < steps * each;) {
         size_t count = 0;
