@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7141b800b97acc9d242614f48905605e685ab72262c1181bc7d65d16adf4aaa3
+ * body-sha256: 29ff75322c163f3ce83b542530efb2fbdac62e7e37aaf77d6715d9b5ffb290bf
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -157,7 +157,7 @@ static inline double ablowitz_ladik_sinroot(double s)
     return a + s4 * (b + s4 * c);
 }
 
-/* the flow of H_1 = sum of x*x[i+1]: y moved by a Riccati equation */
+/* The flow of H_1 = sum of x*x[i+1]: y moved by a Riccati equation. */
 static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladik_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
@@ -176,7 +176,7 @@ static inline void ablowitz_ladik_sweep1(const double *coef, const ablowitz_ladi
     }
 }
 
-/* the flow of H_2 = sum of -log(y**2 + (1 + x**2)): x, y turned */
+/* The flow of H_2 = sum of -log(y**2 + (1 + x**2)): x, y turned. */
 static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladik_row *row)
 {
     const double c2 = coef[2], c3 = coef[3];
@@ -191,7 +191,7 @@ static inline void ablowitz_ladik_sweep2(const double *coef, const ablowitz_ladi
     }
 }
 
-/* the flow of H_3 = sum of y*y[i+1]: x moved by a Riccati equation */
+/* The flow of H_3 = sum of y*y[i+1]: x moved by a Riccati equation. */
 static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladik_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
@@ -232,7 +232,7 @@ static void ablowitz_ladik_sweep_piece(const ablowitz_ladik_solver *s, int part,
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void ablowitz_ladik_energy_row(const ablowitz_ladik_row *row, double *restrict out)
 {
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1];
@@ -243,7 +243,7 @@ static void ablowitz_ladik_energy_row(const ablowitz_ladik_row *row, double *res
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -262,7 +262,7 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_row *row, doubl
 enum { ablowitz_ladik_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { ablowitz_ladik_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
@@ -352,6 +352,7 @@ static ablowitz_ladik_status ablowitz_ladik_set_step(ablowitz_ladik_solver *s, d
     return ablowitz_ladik_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s, double *const *x)
 {
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
@@ -359,6 +360,7 @@ static int ablowitz_ladik_all_hold(const ablowitz_ladik_solver *s, double *const
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void ablowitz_ladik_copy(double *const *to, double *const *from, const ablowitz_ladik_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -407,11 +409,15 @@ static int ablowitz_ladik_try(ablowitz_ladik_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
 {
     ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
     if (status != ablowitz_ladik_OK || steps == 0) return status;
-    ablowitz_ladik_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) ablowitz_ladik_copy(s->x, s->before, s);
+    else ablowitz_ladik_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = ablowitz_ladik_STRETCH; s->steps < end && status == ablowitz_ladik_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -499,6 +505,7 @@ void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)
 }
 
 void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out) { (void)s, (void)out; }
+
 void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out)
 {
     ablowitz_ladik_fill(s, ablowitz_ladik_vector_field_row, out);

@@ -1,7 +1,7 @@
 /*
  * The declarations of ablowitz_ladik.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 95583fbae2f01ed0121d4e20a34acaea16d494f87a3a5f2364c7041e576cbec0
+ * body-sha256: b2e8da5bc3dded7786535828e9d32c5dfaacbfa864bb2de5733290314d497a72
  */
 #ifndef ABLOWITZ_LADIK_H
 #define ABLOWITZ_LADIK_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define ablowitz_ladik_AXES 1
-#define ablowitz_ladik_DIM 2
+#define ablowitz_ladik_AXES 1 /* i */
+#define ablowitz_ladik_DIM 2  /* fields of a site: x, y */
 #define ablowitz_ladik_ORDER 4
 #define ablowitz_ladik_CASIMIRS 0
 #define ablowitz_ladik_PHIGEN_VERSION "0.1.0"
 #define ablowitz_ladik_SPEC_SHA256 "fdcac05ca3267c8d72f9b764571bd16dc6325331ec1c10b08ff5e44d3ea449c7"
 
-/* Axes, the slowest first: i. Fields of a site: x, y. Casimirs: none. */
 typedef struct {
     char unused; /* this system has no parameters */
 } ablowitz_ladik_params;
@@ -29,9 +28,9 @@ enum { ablowitz_ladik_COEFFICIENTS = 104 }; /* numbers that depend on params and
 typedef enum { ablowitz_ladik_OK = 0, ablowitz_ladik_NO_CONVERGENCE, ablowitz_ladik_SINGULAR,
     ablowitz_ladik_NOT_FINITE, ablowitz_ladik_BAD_ARGUMENT } ablowitz_ladik_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with ablowitz_ladik_init; a copy of the struct is the
-   same solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with ablowitz_ladik_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[ablowitz_ladik_AXES];
     size_t sites, rows;

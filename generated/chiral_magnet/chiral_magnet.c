@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 591b26ff69b936087dd1f173141afa73b65890b5994aadc69b5dbf207909de5b
+ * body-sha256: 2dad20816e7c13d4edd1bfc2da272bdbabad596b4e4cad62c5dd61982a9676c7
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -51,13 +51,12 @@ static const unsigned char chiral_magnet_flow_rows[chiral_magnet_FLOWS] = { 0, 1
 /* Whether all parameters are finite, and positive where they have to be. */
 static int chiral_magnet_allowed(const chiral_magnet_params *params, size_t sites, size_t bonds)
 {
-    if (!(isfinite(params->J) && isfinite(params->D) && isfinite(params->K) && isfinite(params->B))) return 0;
+    (void)sites;
     for (size_t k = 0; params->Dx != NULL && k < bonds; ++k)
         if (!isfinite(params->Dx[k])) return 0;
     for (size_t k = 0; params->Dy != NULL && k < bonds; ++k)
         if (!isfinite(params->Dy[k])) return 0;
-    (void)sites;
-    return 1;
+    return isfinite(params->J) && isfinite(params->D) && isfinite(params->K) && isfinite(params->B);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -158,13 +157,13 @@ static inline double chiral_magnet_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double chiral_magnet_sin_lane(double u) { return chiral_magnet_turned_sin(u, 0.0); }
 
-/* what all other sites b add to the forces of H_1 at a site a
-   what all other sites b add to the forces of H_1 at a site a, where x, y, z stand for its y, z, x, the other
-      way, across bonds
-   what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its z, x, y, with
-      other parameters at bonds, the other way
-   what all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, z, x, with
-      other parameters at bonds, across bonds */
+/* What all other sites b add to the forces of H_1 at a site a.
+   What all other sites b add to the forces of H_1 at a site a, where x, y, z stand for its y, z, x, the other
+      way, across bonds.
+   What all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its z, x, y, with
+      other parameters at bonds, the other way.
+   What all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, z, x, with
+      other parameters at bonds, across bonds. */
 static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row)
 {
     const double c1 = coef[1];
@@ -182,14 +181,14 @@ static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magn
     }
 }
 
-/* the flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, y turned
-   the flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, z turned, where x, y, z stand for its
-      z, x, y
-   the flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned, where x, y, z stand for its y, z, x
-   the flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned, where x, y, z stand for its z, x, y
-   the flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): x, y turned
-   the flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): y, z turned, where x, y, z stand for its
-      y, z, x */
+/* The flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, y turned.
+   The flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, z turned, where x, y, z stand for its
+      z, x, y.
+   The flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned, where x, y, z stand for its y, z, x.
+   The flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned, where x, y, z stand for its z, x, y.
+   The flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): x, y turned.
+   The flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): y, z turned, where x, y, z stand for its
+      y, z, x. */
 static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magnet_row *row)
 {
     const double c0 = coef[0];
@@ -207,9 +206,9 @@ static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magn
     }
 }
 
-/* what all other sites b add to the forces of H_2 at a site a
-   what all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, z, x
-   what all other sites b add to the forces of H_4 at a site a, where x, y, z stand for its z, x, y */
+/* What all other sites b add to the forces of H_2 at a site a.
+   What all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, z, x.
+   What all other sites b add to the forces of H_4 at a site a, where x, y, z stand for its z, x, y. */
 static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet_row *row)
 {
     const double c2 = coef[2];
@@ -225,7 +224,7 @@ static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet
     }
 }
 
-/* the flow of H_4 = sum of -(J*(z[a]*z[b]) + (B*z + K*z**2)): x, y turned */
+/* The flow of H_4 = sum of -(J*(z[a]*z[b]) + (B*z + K*z**2)): x, y turned. */
 static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_row *row)
 {
     const double c0 = coef[0], c3 = coef[3], c4 = coef[4];
@@ -301,7 +300,7 @@ static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, c
     }
 }
 
-/* what a site b adds to the forces at a site a */
+/* What a site b adds to the forces at a site a. */
 static inline void chiral_magnet_bond_forces(const chiral_magnet_row *row)
 {
     const double J = row->s->params.J, D = row->s->params.D;
@@ -325,7 +324,7 @@ static inline void chiral_magnet_bond_forces(const chiral_magnet_row *row)
     }
 }
 
-/* the energy of a bond */
+/* The energy of a bond. */
 static inline void chiral_magnet_bond_energy(const chiral_magnet_row *row)
 {
     const double J = row->s->params.J, D = row->s->params.D;
@@ -346,7 +345,7 @@ static inline void chiral_magnet_bond_energy(const chiral_magnet_row *row)
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void chiral_magnet_energy_row(const chiral_magnet_row *row, double *restrict out)
 {
     chiral_magnet_bond_energy(row);
@@ -359,7 +358,7 @@ static void chiral_magnet_energy_row(const chiral_magnet_row *row, double *restr
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void chiral_magnet_casimirs_row(const chiral_magnet_row *row, double *restrict out)
 {
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
@@ -370,7 +369,7 @@ static void chiral_magnet_casimirs_row(const chiral_magnet_row *row, double *res
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void chiral_magnet_vector_field_row(const chiral_magnet_row *row, double *restrict out)
 {
     chiral_magnet_bond_forces(row);
@@ -477,7 +476,7 @@ static void chiral_magnet_put_at_bond(const chiral_magnet_solver *s, double *at,
 enum { chiral_magnet_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
@@ -580,6 +579,7 @@ static chiral_magnet_status chiral_magnet_set_step(chiral_magnet_solver *s, doub
     return chiral_magnet_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int chiral_magnet_all_hold(const chiral_magnet_solver *s, double *const *x)
 {
     for (size_t k = 0; k < chiral_magnet_DIM; ++k)
@@ -587,6 +587,7 @@ static int chiral_magnet_all_hold(const chiral_magnet_solver *s, double *const *
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void chiral_magnet_copy(double *const *to, double *const *from, const chiral_magnet_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -645,11 +646,15 @@ static int chiral_magnet_try(chiral_magnet_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
 {
     chiral_magnet_status status = chiral_magnet_set_step(s, h);
     if (status != chiral_magnet_OK || steps == 0) return status;
-    chiral_magnet_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) chiral_magnet_copy(s->x, s->before, s);
+    else chiral_magnet_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = chiral_magnet_STRETCH; s->steps < end && status == chiral_magnet_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;

@@ -1,7 +1,7 @@
 /*
  * The declarations of chiral_magnet.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f1480982336e22db9dadad5489aba3d5782d32ce232562e62079179f41244798
+ * body-sha256: 315caebe06d4e267f918d941360e581ca91966c68bec0ca762d3d6405cb12509
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define chiral_magnet_AXES 1
-#define chiral_magnet_DIM 3
+#define chiral_magnet_AXES 1 /* i */
+#define chiral_magnet_DIM 3  /* fields of a site: x, y, z */
 #define chiral_magnet_ORDER 2
-#define chiral_magnet_CASIMIRS 1
+#define chiral_magnet_CASIMIRS 1 /* C */
 #define chiral_magnet_PHIGEN_VERSION "0.1.0"
 #define chiral_magnet_SPEC_SHA256 "951098f106e3e9505e7b54f47119d35c2adcfdd59783776db46bd20c3077d190"
 
-/* Axes, the slowest first: i. Fields of a site: x, y, z. Casimirs: C. */
 typedef struct {
     double J;         /* default 1.0 */
     double D;         /* default 0.5 */
@@ -36,9 +35,9 @@ enum { chiral_magnet_BOND_ARRAYS = 2 };   /* parameters at bonds */
 typedef enum { chiral_magnet_OK = 0, chiral_magnet_NO_CONVERGENCE, chiral_magnet_SINGULAR,
     chiral_magnet_NOT_FINITE, chiral_magnet_BAD_ARGUMENT } chiral_magnet_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with chiral_magnet_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites.
+   Set it up with chiral_magnet_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[chiral_magnet_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c102d6cae868bac87d69055bd023a67b239a3ebf4d14e7ee26c8d111f2a103dd
+ * body-sha256: e4cd33e4ba0d5f952e4076c682a5f6eeb89137b171871b7505a51cb8a89513eb
  */
 #include "dnls.h"
 #include <float.h>
@@ -53,9 +53,8 @@ static const unsigned char dnls_flow_rows[dnls_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7
 /* Whether all parameters are finite, and positive where they have to be. */
 static int dnls_allowed(const dnls_params *params, size_t sites)
 {
-    if (!(isfinite(params->beta))) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->beta);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -155,7 +154,7 @@ static inline double dnls_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double dnls_sin_lane(double u) { return dnls_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of -p*p[i+1]: q shifted */
+/* The flow of H_1 = sum of -p*p[i+1]: q shifted. */
 static inline void dnls_sweep1(const double *coef, const dnls_row *row)
 {
     const double c0 = coef[0];
@@ -167,7 +166,7 @@ static inline void dnls_sweep1(const double *coef, const dnls_row *row)
     }
 }
 
-/* the flow of H_2 = sum of -q*q[i+1]: p shifted */
+/* The flow of H_2 = sum of -q*q[i+1]: p shifted. */
 static inline void dnls_sweep2(const double *coef, const dnls_row *row)
 {
     const double c0 = coef[0];
@@ -179,7 +178,7 @@ static inline void dnls_sweep2(const double *coef, const dnls_row *row)
     }
 }
 
-/* the flow of H_3 = sum of 1/8*(beta*(p**2 + q**2)**2): q, p turned */
+/* The flow of H_3 = sum of 1/8*(beta*(p**2 + q**2)**2): q, p turned. */
 static inline void dnls_sweep3(const double *coef, const dnls_row *row)
 {
     const double c1 = coef[1];
@@ -218,7 +217,7 @@ static void dnls_sweep_piece(const dnls_solver *s, int part, const double *coef,
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void dnls_energy_row(const dnls_row *row, double *restrict out)
 {
     const double beta = row->s->params.beta;
@@ -231,7 +230,7 @@ static void dnls_energy_row(const dnls_row *row, double *restrict out)
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void dnls_vector_field_row(const dnls_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -250,7 +249,7 @@ static void dnls_vector_field_row(const dnls_row *row, double *restrict out)
 enum { dnls_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { dnls_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_RESERVED;
@@ -336,6 +335,7 @@ static dnls_status dnls_set_step(dnls_solver *s, double h)
     return dnls_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int dnls_all_hold(const dnls_solver *s, double *const *x)
 {
     for (size_t k = 0; k < dnls_DIM; ++k)
@@ -343,6 +343,7 @@ static int dnls_all_hold(const dnls_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void dnls_copy(double *const *to, double *const *from, const dnls_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -388,11 +389,15 @@ static int dnls_try(dnls_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
 {
     dnls_status status = dnls_set_step(s, h);
     if (status != dnls_OK || steps == 0) return status;
-    dnls_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) dnls_copy(s->x, s->before, s);
+    else dnls_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_STRETCH; s->steps < end && status == dnls_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -470,7 +475,9 @@ static void dnls_fill(const dnls_solver *s, void kernel(const dnls_row *, double
 }
 
 void dnls_density(const dnls_solver *s, double *out) { dnls_fill(s, dnls_energy_row, out); }
+
 void dnls_casimirs(const dnls_solver *s, double *out) { (void)s, (void)out; }
+
 void dnls_vector_field(const dnls_solver *s, double *out) { dnls_fill(s, dnls_vector_field_row, out); }
 
 const char *dnls_status_string(dnls_status status)

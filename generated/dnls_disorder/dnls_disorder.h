@@ -1,7 +1,7 @@
 /*
  * The declarations of dnls_disorder.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e28f9f6846c5a8bb9a5605ed6d889aa26fdeb4cd37d7d5d37bc5eb995e836152
+ * body-sha256: 0e062797848dfe722f25f73c48efeae24828d99f860eb927203c7dacc7992a78
  */
 #ifndef DNLS_DISORDER_H
 #define DNLS_DISORDER_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define dnls_disorder_AXES 1
-#define dnls_disorder_DIM 2
+#define dnls_disorder_AXES 1 /* i */
+#define dnls_disorder_DIM 2  /* fields of a site: q, p */
 #define dnls_disorder_ORDER 4
 #define dnls_disorder_CASIMIRS 0
 #define dnls_disorder_PHIGEN_VERSION "0.1.0"
 #define dnls_disorder_SPEC_SHA256 "42d91db27e3f486cfdaf2925c387320de242ded35973e01dfa602c1731ae5ee2"
 
-/* Axes, the slowest first: i. Fields of a site: q, p. Casimirs: none. */
 typedef struct {
     double beta;     /* default 0.72 */
     const double *e; /* at sites: energies of the sites */
@@ -30,9 +29,9 @@ enum { dnls_disorder_COEFFICIENTS = 52 }; /* numbers that depend on params and h
 typedef enum { dnls_disorder_OK = 0, dnls_disorder_NO_CONVERGENCE, dnls_disorder_SINGULAR,
     dnls_disorder_NOT_FINITE, dnls_disorder_BAD_ARGUMENT } dnls_disorder_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with dnls_disorder_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with dnls_disorder_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[dnls_disorder_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a51cd319efaf3ed2299fb1aaec55ebb0368d3022294db48f0a6caf8422f252b9
+ * body-sha256: fa152888ffb093eb4cf6b303cba7aef6e588c9e1cf76c690c43d5f147ececc6d
  */
 #include "food_web.h"
 #include <float.h>
@@ -161,7 +161,7 @@ static inline double food_web_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* what all other sites b add to the forces of H_1 at a site a */
+/* What all other sites b add to the forces of H_1 at a site a. */
 static inline void food_web_gather1(const double *coef, const food_web_row *row)
 {
     (void)coef;
@@ -179,7 +179,7 @@ static inline void food_web_gather1(const double *coef, const food_web_row *row)
     }
 }
 
-/* the flow of H_1 = sum of x - k*log(x): x scaled */
+/* The flow of H_1 = sum of x - k*log(x): x scaled. */
 static inline void food_web_sweep1(const double *coef, const food_web_row *row)
 {
     const double c0 = coef[0];
@@ -202,7 +202,7 @@ static void food_web_sweep_piece(const food_web_solver *s, int flow, const doubl
     food_web_sweep1(coef, &row);
 }
 
-/* what a site b adds to the forces at a site a */
+/* What a site b adds to the forces at a site a. */
 static inline void food_web_bond_forces(const food_web_row *row)
 {
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
@@ -219,7 +219,7 @@ static inline void food_web_bond_forces(const food_web_row *row)
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void food_web_energy_row(const food_web_row *row, double *restrict out)
 {
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
@@ -230,7 +230,7 @@ static void food_web_energy_row(const food_web_row *row, double *restrict out)
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void food_web_vector_field_row(const food_web_row *row, double *restrict out)
 {
     food_web_bond_forces(row);
@@ -329,7 +329,7 @@ static void food_web_put_at_bond(const food_web_solver *s, double *at, const dou
 enum { food_web_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
@@ -443,6 +443,7 @@ static food_web_status food_web_set_step(food_web_solver *s, double h)
     return food_web_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int food_web_all_hold(const food_web_solver *s, double *const *x)
 {
     for (size_t k = 0; k < food_web_DIM; ++k)
@@ -450,6 +451,7 @@ static int food_web_all_hold(const food_web_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void food_web_copy(double *const *to, double *const *from, const food_web_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -506,11 +508,15 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    food_web_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) food_web_copy(s->x, s->before, s);
+    else food_web_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -589,7 +595,9 @@ static void food_web_fill(const food_web_solver *s, void kernel(const food_web_r
 }
 
 void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }
+
 void food_web_casimirs(const food_web_solver *s, double *out) { (void)s, (void)out; }
+
 void food_web_vector_field(const food_web_solver *s, double *out)
 {
     food_web_fill(s, food_web_vector_field_row, out);

@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 90e5facf95b233903c2202c257202e9dc511bee60cc09d3fe921e4bebd747b71
+ * body-sha256: 6a1bd14d8132a764b9ecc558e415d8725328fd321c2c19781287367ce795869d
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define food_web_AXES 1
-#define food_web_DIM 1
+#define food_web_AXES 1 /* i */
+#define food_web_DIM 1  /* fields of a site: x */
 #define food_web_ORDER 4
 #define food_web_CASIMIRS 0
 #define food_web_PHIGEN_VERSION "0.1.0"
 #define food_web_SPEC_SHA256 "16de8419a3297fb765426a07b8e18fed9d20fb7f25dc58b93db682eba04bd5c3"
 
-/* Axes, the slowest first: i. Fields of a site: x. Casimirs: none. */
 typedef struct {
     const double *A; /* at bonds: how much the eater gains; NULL for the default at all of them */
     const double *k; /* at sites: balance; NULL for the default at all of them */
@@ -32,9 +31,9 @@ enum { food_web_BOND_ARRAYS = 1 };   /* parameters at bonds */
 typedef enum { food_web_OK = 0, food_web_NO_CONVERGENCE, food_web_SINGULAR, food_web_NOT_FINITE,
     food_web_BAD_ARGUMENT } food_web_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with food_web_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites.
+   Set it up with food_web_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[food_web_AXES];
     size_t sites, rows;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 66f8a7e2e2cd64175163c9b221add2cd65a382ca068cd34814e51d6aeef9eec3
+ * body-sha256: 445f2242b7f25aed73580cae8fff6a8a2564d094711dc96ded7f37a8d70a143c
  */
 #include "fput.h"
 #include <float.h>
@@ -55,9 +55,8 @@ static const fput_stage fput_stages_of[] = { { 1, 1, 1, 2 }, { 0, 0, 0, 1 } };
 /* Whether all parameters are finite, and positive where they have to be. */
 static int fput_allowed(const fput_params *params, size_t sites)
 {
-    if (!(isfinite(params->alpha) && isfinite(params->beta))) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->alpha) && isfinite(params->beta);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -128,8 +127,8 @@ static inline fput_row fput_piece_of(const fput_solver *s, size_t unit)
     return row;
 }
 
-/* the flow of H_1 = sum of 1/3*(alpha*(q[i+1] - q)**3) + (1/2*(q[i+1] - q)**2 + 1/4*(beta*(q[i+1] - q)**4)):
-      p shifted */
+/* The flow of H_1 = sum of 1/3*(alpha*(q[i+1] - q)**3) + (1/2*(q[i+1] - q)**2 + 1/4*(beta*(q[i+1] - q)**4)):
+      p shifted. */
 static inline void fput_sweep1(const double *coef, const fput_row *row)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
@@ -146,7 +145,7 @@ static inline void fput_sweep1(const double *coef, const fput_row *row)
     }
 }
 
-/* the flow of H_2 = sum of 1/2*p**2: q shifted */
+/* The flow of H_2 = sum of 1/2*p**2: q shifted. */
 static inline void fput_sweep2(const double *coef, const fput_row *row)
 {
     const double c3 = coef[3];
@@ -182,7 +181,7 @@ static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, 
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void fput_energy_row(const fput_row *row, double *restrict out)
 {
     const double alpha = row->s->params.alpha, beta = row->s->params.beta;
@@ -197,7 +196,7 @@ static void fput_energy_row(const fput_row *row, double *restrict out)
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void fput_vector_field_row(const fput_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -251,7 +250,7 @@ static void fput_wait(void)
 enum { fput_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { fput_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / fput_RESERVED;
@@ -343,6 +342,7 @@ static fput_status fput_set_step(fput_solver *s, double h)
     return fput_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int fput_all_hold(const fput_solver *s, double *const *x)
 {
     for (size_t k = 0; k < fput_DIM; ++k)
@@ -350,6 +350,7 @@ static int fput_all_hold(const fput_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void fput_copy(double *const *to, double *const *from, const fput_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -475,11 +476,15 @@ static int fput_try(fput_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 fput_status fput_integrate(fput_solver *s, double h, size_t steps)
 {
     fput_status status = fput_set_step(s, h);
     if (status != fput_OK || steps == 0) return status;
-    fput_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) fput_copy(s->x, s->before, s);
+    else fput_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = fput_STRETCH; s->steps < end && status == fput_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -579,7 +584,9 @@ static void fput_fill(const fput_solver *s, void kernel(const fput_row *, double
 }
 
 void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }
+
 void fput_casimirs(const fput_solver *s, double *out) { (void)s, (void)out; }
+
 void fput_vector_field(const fput_solver *s, double *out) { fput_fill(s, fput_vector_field_row, out); }
 
 /* ---- Steps by hand ---- */

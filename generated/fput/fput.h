@@ -1,7 +1,7 @@
 /*
  * The declarations of fput.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6f0b4ce44efaeb6ad8ceb27558b189ebf0db2efa344dedf03d4fcea0d7d33b9f
+ * body-sha256: 88a278d072f838e28801ef59eacd7985c60993cb13b31b49408954e5cab6df67
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define fput_AXES 1
-#define fput_DIM 2
+#define fput_AXES 1 /* i */
+#define fput_DIM 2  /* fields of a site: q, p */
 #define fput_ORDER 4
 #define fput_CASIMIRS 0
 #define fput_PHIGEN_VERSION "0.1.0"
 #define fput_SPEC_SHA256 "920c8e7d73465dacb3469db42d998ea7ea21c0581ec9a57019e9692074a2c0da"
 
-/* Axes, the slowest first: i. Fields of a site: q, p. Casimirs: none. */
 typedef struct {
     double alpha; /* default 0.25 */
     double beta;  /* default 0.1 */
@@ -30,9 +29,9 @@ enum { fput_COEFFICIENTS = 56 }; /* numbers that depend on params and h only */
 typedef enum { fput_OK = 0, fput_NO_CONVERGENCE, fput_SINGULAR, fput_NOT_FINITE,
     fput_BAD_ARGUMENT } fput_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with fput_init; a copy of the struct is the same solver,
-   not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with fput_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[fput_AXES];
     size_t sites, rows;
@@ -88,8 +87,8 @@ void fput_density(const fput_solver *s, double *out);
 void fput_casimirs(const fput_solver *s, double *out);
 void fput_vector_field(const fput_solver *s, double *out);
 
-/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, … before
-   fput_stages(), each a sweep over all planes: the sites of one place along the first axis. Number
+/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ...
+   before fput_stages(), each a sweep over all planes: the sites of one place along the first axis. Number
    fput_stages() is the last stage of a step and the first of the next together, as fput_integrate does them.
    A stage may be made in any number of pieces, in any order, with the bits of fput_step; before that, the
    planes beside a piece that it reads must have made the stages before. */

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 5164fd9b56b773aba1a48594d4630942c14f13ce23dceff2459cc0c4aa2623aa
+ * body-sha256: 1bf00dcaf199d8d0e08782fb6f7e633a56ceb41cddbfcef043cb1be11404c087
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -58,10 +58,9 @@ static const heisenberg_stage heisenberg_stages_of[] = { { 1, 1, 1, 6 }, { 1, 1,
 /* Whether all parameters are finite, and positive where they have to be. */
 static int heisenberg_allowed(const heisenberg_params *params, size_t sites)
 {
-    if (!(isfinite(params->J))) return 0;
     for (size_t k = 0; params->B != NULL && k < sites; ++k)
         if (!isfinite(params->B[k])) return 0;
-    return 1;
+    return isfinite(params->J);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -186,7 +185,7 @@ static inline double heisenberg_versin_near(double t)
         (-2.480158698886182e-05 + z * (2.755707789915398e-07 + z * -2.0790896078016366e-09)))));
 }
 
-/* the flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z turned */
+/* The flow of H_1 = sum of -(J*(x*x[i+1]) + (J*(x*x[k+1]) + J*(x*x[j+1]))): y, z turned. */
 static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -210,7 +209,7 @@ static inline void heisenberg_sweep1_near(const double *coef, const heisenberg_r
     }
 }
 
-/* the same for large arguments of functions */
+/* The same for large arguments of functions. */
 static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -234,7 +233,7 @@ static inline void heisenberg_sweep1_far(const double *coef, const heisenberg_ro
     }
 }
 
-/* the flow of H_2 = sum of -(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1]))): x, z turned */
+/* The flow of H_2 = sum of -(J*(y*y[i+1]) + (J*(y*y[k+1]) + J*(y*y[j+1]))): x, z turned. */
 static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -258,7 +257,7 @@ static inline void heisenberg_sweep2_near(const double *coef, const heisenberg_r
     }
 }
 
-/* the same for large arguments of functions */
+/* The same for large arguments of functions. */
 static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -282,7 +281,7 @@ static inline void heisenberg_sweep2_far(const double *coef, const heisenberg_ro
     }
 }
 
-/* the flow of H_3 = sum of -(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1]))): x, y turned */
+/* The flow of H_3 = sum of -(J*(z*z[i+1]) + J*(z*z[j+1]) + (B*z + J*(z*z[k+1]))): x, y turned. */
 static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -306,7 +305,7 @@ static inline void heisenberg_sweep3_near(const double *coef, const heisenberg_r
     }
 }
 
-/* the same for large arguments of functions */
+/* The same for large arguments of functions. */
 static inline void heisenberg_sweep3_far(const double *coef, const heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -413,7 +412,7 @@ static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const do
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void heisenberg_energy_row(const heisenberg_row *row, double *restrict out)
 {
     const double J = row->s->params.J;
@@ -435,7 +434,7 @@ static void heisenberg_energy_row(const heisenberg_row *row, double *restrict ou
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void heisenberg_casimirs_row(const heisenberg_row *row, double *restrict out)
 {
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
@@ -447,7 +446,7 @@ static void heisenberg_casimirs_row(const heisenberg_row *row, double *restrict 
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void heisenberg_vector_field_row(const heisenberg_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -518,7 +517,7 @@ enum { heisenberg_STRETCH = 32 };   /* steps before the state is looked at: what
 enum { heisenberg_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
 enum { heisenberg_BUFFER = 256 };   /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
@@ -661,6 +660,7 @@ static heisenberg_status heisenberg_set_step(heisenberg_solver *s, double h)
     return heisenberg_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int heisenberg_all_hold(const heisenberg_solver *s, double *const *x)
 {
     for (size_t k = 0; k < heisenberg_DIM; ++k)
@@ -669,6 +669,7 @@ static int heisenberg_all_hold(const heisenberg_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void heisenberg_copy(double *const *to, double *const *from, const heisenberg_solver *s)
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
@@ -811,11 +812,16 @@ static int heisenberg_close(heisenberg_solver *s)
     return done;
 }
 
+/* Functions for small arguments give no number for larger ones. The state is looked at after a stretch of
+   steps only: where it is not finite, these are made again one by one, and that which fails by functions for
+   arguments of any size. */
 heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t steps)
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    heisenberg_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) heisenberg_copy(s->x, s->before, s);
+    else heisenberg_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7bb3e7584af9234364a79885a732303f65d8fee16d0a9998896495470d2f9c2d
+ * body-sha256: c7d0994562de25c2c891e194787c18cb6d9948d50c2e106fbdfae632b14374d4
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define heisenberg_AXES 3
-#define heisenberg_DIM 3
+#define heisenberg_AXES 3 /* the slowest first: i, j, k */
+#define heisenberg_DIM 3  /* fields of a site: x, y, z */
 #define heisenberg_ORDER 2
-#define heisenberg_CASIMIRS 1
+#define heisenberg_CASIMIRS 1 /* C */
 #define heisenberg_PHIGEN_VERSION "0.1.0"
 #define heisenberg_SPEC_SHA256 "db9e76c21c97df18ba40343805d35a8a7c249010c0d791ca8dab69a55383c332"
 
-/* Axes, the slowest first: i, j, k. Fields of a site: x, y, z. Casimirs: C. */
 typedef struct {
     double J;        /* default 1.0 */
     const double *B; /* at sites: field along z; NULL for the default at all of them */
@@ -30,9 +29,9 @@ enum { heisenberg_COEFFICIENTS = 18 }; /* numbers that depend on params and h on
 typedef enum { heisenberg_OK = 0, heisenberg_NO_CONVERGENCE, heisenberg_SINGULAR, heisenberg_NOT_FINITE,
     heisenberg_BAD_ARGUMENT } heisenberg_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with heisenberg_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is many rows: a row is all sites along the last axis, with copies of the other end beside them.
+   Set it up with heisenberg_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[heisenberg_AXES];
     size_t sites, rows;
@@ -89,11 +88,11 @@ void heisenberg_density(const heisenberg_solver *s, double *out);
 void heisenberg_casimirs(const heisenberg_solver *s, double *out);
 void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 
-/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, … before
-   heisenberg_stages(), each a sweep over all planes: the sites of one place along the first axis. Number
-   heisenberg_stages() is the last stage of a step and the first of the next together, as heisenberg_integrate
-   does them. A stage may be made in any number of pieces, in any order, with the bits of heisenberg_step;
-   before that, the planes beside a piece that it reads must have made the stages before. */
+/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ...
+   before heisenberg_stages(), each a sweep over all planes: the sites of one place along the first axis.
+   Number heisenberg_stages() is the last stage of a step and the first of the next together, as
+   heisenberg_integrate does them. A stage may be made in any number of pieces, in any order, with the bits of
+   heisenberg_step; before that, the planes beside a piece that it reads must have made the stages before. */
 typedef struct {
     /* planes before the first one swept, and after the last one, that are read */
     size_t behind, ahead;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6fc8a2dee5b7f872186abb13e1d671ba8fd4b8e931a967b433a21731b4c0a641
+ * body-sha256: 7154d94d850487edd807b6ec6285fa03ca0752145260a10e33ad03535e5d4bd2
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -66,9 +66,8 @@ static const unsigned char heisenberg_plane_flow_rows[heisenberg_plane_FLOWS] = 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int heisenberg_plane_allowed(const heisenberg_plane_params *params, size_t sites)
 {
-    if (!(isfinite(params->J) && isfinite(params->delta))) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->J) && isfinite(params->delta);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -189,8 +188,8 @@ static inline double heisenberg_plane_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double heisenberg_plane_sin_lane(double u) { return heisenberg_plane_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned the flow of H_2 = sum of
-   -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned, where x, y, z stand for its y, z, x */
+/* The flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned. The flow of H_2 = sum of
+   -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned, where x, y, z stand for its y, z, x. */
 static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenberg_plane_row *row)
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
@@ -214,7 +213,7 @@ static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenbe
     }
 }
 
-/* the flow of H_3 = sum of -(J*(z[i+1]*(delta*z)) + J*(z[j+1]*(delta*z))): x, y turned */
+/* The flow of H_3 = sum of -(J*(z[i+1]*(delta*z)) + J*(z[j+1]*(delta*z))): x, y turned. */
 static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_plane_row *row)
 {
     const double c1 = coef[1], w2 = row->present[2], w3 = row->present[3];
@@ -264,7 +263,7 @@ static void heisenberg_plane_sweep_piece(const heisenberg_plane_solver *s, int p
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void heisenberg_plane_energy_row(const heisenberg_plane_row *row, double *restrict out)
 {
     const double J = row->s->params.J, delta = row->s->params.delta, w2 = row->present[2];
@@ -284,7 +283,7 @@ static void heisenberg_plane_energy_row(const heisenberg_plane_row *row, double 
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void heisenberg_plane_casimirs_row(const heisenberg_plane_row *row, double *restrict out)
 {
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
@@ -296,7 +295,7 @@ static void heisenberg_plane_casimirs_row(const heisenberg_plane_row *row, doubl
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void heisenberg_plane_vector_field_row(const heisenberg_plane_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -331,7 +330,7 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_row *row, d
 enum { heisenberg_plane_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { heisenberg_plane_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_plane_RESERVED;
@@ -458,6 +457,7 @@ static heisenberg_plane_status heisenberg_plane_set_step(heisenberg_plane_solver
     return heisenberg_plane_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s, double *const *x)
 {
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
@@ -466,6 +466,7 @@ static int heisenberg_plane_all_hold(const heisenberg_plane_solver *s, double *c
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void heisenberg_plane_copy(double *const *to, double *const *from, const heisenberg_plane_solver *s)
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
@@ -515,11 +516,15 @@ static int heisenberg_plane_try(heisenberg_plane_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
 {
     heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
     if (status != heisenberg_plane_OK || steps == 0) return status;
-    heisenberg_plane_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) heisenberg_plane_copy(s->x, s->before, s);
+    else heisenberg_plane_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_plane_STRETCH; s->steps < end && status == heisenberg_plane_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;

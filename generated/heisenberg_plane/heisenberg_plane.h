@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg_plane.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 51ca20ae34aa43684f2091bca0a00082d0943bf0a7970b158df064bb95b7793b
+ * body-sha256: 019472fed12b5b7992ae3347c6e175b97d8e024fb456bed2920d5b9d10c806c6
  */
 #ifndef HEISENBERG_PLANE_H
 #define HEISENBERG_PLANE_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define heisenberg_plane_AXES 2
-#define heisenberg_plane_DIM 3
+#define heisenberg_plane_AXES 2 /* the slowest first: i, j */
+#define heisenberg_plane_DIM 3  /* fields of a site: x, y, z */
 #define heisenberg_plane_ORDER 4
-#define heisenberg_plane_CASIMIRS 1
+#define heisenberg_plane_CASIMIRS 1 /* C */
 #define heisenberg_plane_PHIGEN_VERSION "0.1.0"
 #define heisenberg_plane_SPEC_SHA256 "b4d9835fedde5fe8efc99c52b6d75d2aea230d5d018b706b644d6c59a4034bd1"
 
-/* Axes, the slowest first: i, j. Fields of a site: x, y, z. Casimirs: C. */
 typedef struct {
     double J;     /* default 1.0 */
     double delta; /* default 0.9 */
@@ -30,9 +29,9 @@ enum { heisenberg_plane_COEFFICIENTS = 52 }; /* numbers that depend on params an
 typedef enum { heisenberg_plane_OK = 0, heisenberg_plane_NO_CONVERGENCE, heisenberg_plane_SINGULAR,
     heisenberg_plane_NOT_FINITE, heisenberg_plane_BAD_ARGUMENT } heisenberg_plane_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with heisenberg_plane_init; a copy of the struct is the
-   same solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is many rows: a row is all sites along the last axis, with copies of the other end beside them.
+   Set it up with heisenberg_plane_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[heisenberg_plane_AXES];
     size_t sites, rows;

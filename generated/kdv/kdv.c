@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: adae566f89ac7bd6bc89112a35fb1f26921e296ca8cafe53d2269dbbcc24c7f3
+ * body-sha256: df08a6461068fdfec1025949b3593c03add2eee45eef3fa6fb1e4310e2a0f92e
  */
 #include "kdv.h"
 #include <float.h>
@@ -47,9 +47,8 @@ static const double kdv_times[kdv_ROWS_OF_FLOWS] = { 1.0 };
 /* Whether all parameters are finite, and positive where they have to be. */
 static int kdv_allowed(const kdv_params *params, size_t sites)
 {
-    if (!(isfinite(params->delta) && isfinite(params->d) && params->d > 0.0)) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->delta) && isfinite(params->d) && params->d > 0.0;
 }
 
 /* Everything that depends on parameters and the time of a stage only. */
@@ -157,7 +156,7 @@ static size_t kdv_matrix_of(size_t sites, double *memory, kdv_matrix *m)
     return total + inner + border;
 }
 
-/* y at a site from x there and y around it */
+/* Y at a site from x there and y around it. */
 static inline void kdv_relax(const double *coef, const kdv_row *row)
 {
     double *restrict out_u = row->out[0];
@@ -186,7 +185,7 @@ static void kdv_relax_piece(const kdv_solver *s, const double *coef, double *con
     kdv_ends(to[0], s->length, row.from, row.to);
 }
 
-/* what a stage adds to x at a site, from y around it */
+/* What a stage adds to x at a site, from y around it. */
 static inline void kdv_increment(const double *coef, const kdv_row *row)
 {
     double *restrict out_u = row->out[0];
@@ -214,7 +213,7 @@ static void kdv_increment_piece(const kdv_solver *s, const double *coef, double 
     kdv_ends(to[0], s->length, row.from, row.to);
 }
 
-/* how y at a site follows y around it */
+/* How y at a site follows y around it. */
 static inline void kdv_slope(const double *coef, const kdv_row *row)
 {
     double *restrict out_u = row->out[0];
@@ -241,7 +240,7 @@ static void kdv_slope_piece(const kdv_solver *s, const double *coef, double *con
     kdv_slope(coef, &row);
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void kdv_energy_row(const kdv_row *row, double *restrict out)
 {
     const double delta = row->s->params.delta, d = row->s->params.d;
@@ -254,7 +253,7 @@ static void kdv_energy_row(const kdv_row *row, double *restrict out)
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void kdv_casimirs_row(const kdv_row *row, double *restrict out)
 {
     const double d = row->s->params.d;
@@ -266,7 +265,7 @@ static void kdv_casimirs_row(const kdv_row *row, double *restrict out)
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void kdv_vector_field_row(const kdv_row *row, double *restrict out)
 {
     const double delta = row->s->params.delta, d = row->s->params.d;
@@ -296,7 +295,7 @@ static void kdv_vector_field_row(const kdv_row *row, double *restrict out)
 
 enum { kdv_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / (kdv_RESERVED + 8 * kdv_BAND * kdv_DIM);
@@ -401,6 +400,7 @@ static kdv_status kdv_set_step(kdv_solver *s, double h)
     return kdv_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int kdv_all_hold(const kdv_solver *s, double *const *x)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
@@ -408,6 +408,7 @@ static int kdv_all_hold(const kdv_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void kdv_copy(double *const *to, double *const *from, const kdv_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -847,7 +848,9 @@ static void kdv_fill(const kdv_solver *s, void kernel(const kdv_row *, double *r
 }
 
 void kdv_density(const kdv_solver *s, double *out) { kdv_fill(s, kdv_energy_row, out); }
+
 void kdv_casimirs(const kdv_solver *s, double *out) { kdv_fill(s, kdv_casimirs_row, out); }
+
 void kdv_vector_field(const kdv_solver *s, double *out) { kdv_fill(s, kdv_vector_field_row, out); }
 
 const char *kdv_status_string(kdv_status status)

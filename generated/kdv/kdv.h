@@ -1,7 +1,7 @@
 /*
  * The declarations of kdv.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e17ded288b83b26e490e74f02f494c860b793a4c019c771ae8a6b1902e5dd2fc
+ * body-sha256: 069e26bd85a1c23bce7bf363d9c17488f56a3534510e1685ac82570a1399bc1f
  */
 #ifndef KDV_H
 #define KDV_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define kdv_AXES 1
-#define kdv_DIM 1
+#define kdv_AXES 1 /* i */
+#define kdv_DIM 1  /* fields of a site: u */
 #define kdv_ORDER 2
-#define kdv_CASIMIRS 1
+#define kdv_CASIMIRS 1 /* mass */
 #define kdv_PHIGEN_VERSION "0.1.0"
 #define kdv_SPEC_SHA256 "32cf81a7dcc830b212362da02129fd35222f755f500facee761ebba58d437add"
 
-/* Axes, the slowest first: i. Fields of a site: u. Casimirs: mass. */
 typedef struct {
     double delta; /* default 0.022 */
     double d;     /* spacing */
@@ -36,9 +35,9 @@ typedef struct {
     double *difference[kdv_DIFFERENCES][kdv_DIM];
 } kdv_guess;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with kdv_init; a copy of the struct is the same solver,
-   not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with kdv_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[kdv_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 322cece28c3dd454c40e3fef392c2f84954fe941e6b2f3be6cff338d9a3a279a
+ * body-sha256: ac27021553cc8a84f447120f74194da40ee22900bdb47b131884e46de4f7afd9
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -51,9 +51,8 @@ static const unsigned char klein_gordon_flow_rows[klein_gordon_FLOWS] = { 0, 1, 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int klein_gordon_allowed(const klein_gordon_params *params, size_t sites)
 {
-    if (!(isfinite(params->d) && params->d > 0.0)) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->d) && params->d > 0.0;
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -121,7 +120,7 @@ static inline klein_gordon_row klein_gordon_piece_of(const klein_gordon_solver *
     return row;
 }
 
-/* the flow of H_1 = sum of 1/4*(q**2 - 1)**2 + 1/2*(d**(-2)*(q[i+1] - q)**2): p shifted */
+/* The flow of H_1 = sum of 1/4*(q**2 - 1)**2 + 1/2*(d**(-2)*(q[i+1] - q)**2): p shifted. */
 static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
@@ -134,7 +133,7 @@ static inline void klein_gordon_sweep1(const double *coef, const klein_gordon_ro
     }
 }
 
-/* the flow of H_2 = sum of 1/2*p**2: q shifted */
+/* The flow of H_2 = sum of 1/2*p**2: q shifted. */
 static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_row *row)
 {
     const double c1 = coef[1];
@@ -163,7 +162,7 @@ static void klein_gordon_sweep_piece(const klein_gordon_solver *s, int part, con
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void klein_gordon_energy_row(const klein_gordon_row *row, double *restrict out)
 {
     const double d = row->s->params.d;
@@ -178,7 +177,7 @@ static void klein_gordon_energy_row(const klein_gordon_row *row, double *restric
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void klein_gordon_vector_field_row(const klein_gordon_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -199,7 +198,7 @@ static void klein_gordon_vector_field_row(const klein_gordon_row *row, double *r
 enum { klein_gordon_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { klein_gordon_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
@@ -287,6 +286,7 @@ static klein_gordon_status klein_gordon_set_step(klein_gordon_solver *s, double 
     return klein_gordon_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int klein_gordon_all_hold(const klein_gordon_solver *s, double *const *x)
 {
     for (size_t k = 0; k < klein_gordon_DIM; ++k)
@@ -294,6 +294,7 @@ static int klein_gordon_all_hold(const klein_gordon_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void klein_gordon_copy(double *const *to, double *const *from, const klein_gordon_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -342,11 +343,15 @@ static int klein_gordon_try(klein_gordon_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
 {
     klein_gordon_status status = klein_gordon_set_step(s, h);
     if (status != klein_gordon_OK || steps == 0) return status;
-    klein_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) klein_gordon_copy(s->x, s->before, s);
+    else klein_gordon_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = klein_gordon_STRETCH; s->steps < end && status == klein_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -434,6 +439,7 @@ void klein_gordon_density(const klein_gordon_solver *s, double *out)
 }
 
 void klein_gordon_casimirs(const klein_gordon_solver *s, double *out) { (void)s, (void)out; }
+
 void klein_gordon_vector_field(const klein_gordon_solver *s, double *out)
 {
     klein_gordon_fill(s, klein_gordon_vector_field_row, out);

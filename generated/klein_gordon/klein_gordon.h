@@ -1,7 +1,7 @@
 /*
  * The declarations of klein_gordon.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 205b0f0d8931df3b4eb3a8f14c32a140dad4d7652a2f60e8d8c42e5eba893877
+ * body-sha256: 975c1405e9687a716ddf54367628dfadc5098578e149e4426cd0a93c037875a1
  */
 #ifndef KLEIN_GORDON_H
 #define KLEIN_GORDON_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define klein_gordon_AXES 1
-#define klein_gordon_DIM 2
+#define klein_gordon_AXES 1 /* i */
+#define klein_gordon_DIM 2  /* fields of a site: q, p */
 #define klein_gordon_ORDER 4
 #define klein_gordon_CASIMIRS 0
 #define klein_gordon_PHIGEN_VERSION "0.1.0"
 #define klein_gordon_SPEC_SHA256 "7112ca265099ca014624ad4b2296070ddc860c26540d0b80acc378e27176e991"
 
-/* Axes, the slowest first: i. Fields of a site: q, p. Casimirs: none. */
 typedef struct {
     double d; /* spacing */
 } klein_gordon_params;
@@ -29,9 +28,9 @@ enum { klein_gordon_COEFFICIENTS = 28 }; /* numbers that depend on params and h 
 typedef enum { klein_gordon_OK = 0, klein_gordon_NO_CONVERGENCE, klein_gordon_SINGULAR,
     klein_gordon_NOT_FINITE, klein_gordon_BAD_ARGUMENT } klein_gordon_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with klein_gordon_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with klein_gordon_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[klein_gordon_AXES];
     size_t sites, rows;

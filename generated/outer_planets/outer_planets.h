@@ -1,7 +1,7 @@
 /*
  * The declarations of outer_planets.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 61e965d7c88569bb64fdf55e197dc8f093517b40838293ed892bf4bce8541039
+ * body-sha256: 39cf556a3747bd57f76c99f1c423eca528acd3171406da65255ecbc0b4d95634
  */
 #ifndef OUTER_PLANETS_H
 #define OUTER_PLANETS_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define outer_planets_AXES 1
-#define outer_planets_DIM 6
+#define outer_planets_AXES 1 /* i */
+#define outer_planets_DIM 6  /* fields of a site: x, y, z, px, py, pz */
 #define outer_planets_ORDER 4
 #define outer_planets_CASIMIRS 0
 #define outer_planets_PHIGEN_VERSION "0.1.0"
 #define outer_planets_SPEC_SHA256 "4872d6ba15e2cf42961dec733b70ccb6eb8874221d7c80170561b402f7c63524"
 
-/* Axes, the slowest first: i. Fields of a site: x, y, z, px, py, pz. Casimirs: none. */
 typedef struct {
     double G;        /* default 0.000295912208286 */
     const double *m; /* at sites: masses */
@@ -31,9 +30,9 @@ enum { outer_planets_GATHERED = 3 };      /* sums over other sites that are held
 typedef enum { outer_planets_OK = 0, outer_planets_NO_CONVERGENCE, outer_planets_SINGULAR,
     outer_planets_NOT_FINITE, outer_planets_BAD_ARGUMENT } outer_planets_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with outer_planets_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites.
+   Set it up with outer_planets_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[outer_planets_AXES];
     size_t sites, rows;

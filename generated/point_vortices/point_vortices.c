@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 3e04759dc4188a41794c1dc10b27959871832d26e0ab82ed7b9ae05db424b7ea
+ * body-sha256: 30b204d64239aecd973f1a2d30905e8ccd762a38f4a96c841449a39ab60645c5
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -108,7 +108,7 @@ static inline point_vortices_row point_vortices_piece_of(const point_vortices_so
     return row;
 }
 
-/* what a site b adds to the forces at a site a */
+/* What a site b adds to the forces at a site a. */
 static inline void point_vortices_pair_forces(const point_vortices_row *row)
 {
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
@@ -128,7 +128,7 @@ static inline void point_vortices_pair_forces(const point_vortices_row *row)
     }
 }
 
-/* the energy of a pair */
+/* The energy of a pair. */
 static inline void point_vortices_pair_energy(const point_vortices_row *row)
 {
     const double *restrict G_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
@@ -146,7 +146,7 @@ static inline void point_vortices_pair_energy(const point_vortices_row *row)
     }
 }
 
-/* what a site b adds to the forces at a site a, and to their variations */
+/* What a site b adds to the forces at a site a, and to their variations. */
 static inline void point_vortices_pair_slopes(const point_vortices_row *row)
 {
     const double *varied_x_0 = row->varied[0], *varied_y_0 = row->varied[1];
@@ -182,7 +182,7 @@ static inline void point_vortices_pair_slopes(const point_vortices_row *row)
     }
 }
 
-/* y at a site from x there and y around it */
+/* Y at a site from x there and y around it. */
 static inline void point_vortices_relax(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
@@ -210,7 +210,7 @@ static void point_vortices_relax_piece(const point_vortices_solver *s, const dou
     point_vortices_relax(coef, &row);
 }
 
-/* what a stage adds to x at a site, from y around it */
+/* What a stage adds to x at a site, from y around it. */
 static inline void point_vortices_increment(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
@@ -236,7 +236,7 @@ static void point_vortices_increment_piece(const point_vortices_solver *s, const
     point_vortices_increment(coef, &row);
 }
 
-/* how y at a site follows y around it */
+/* How y at a site follows y around it. */
 static inline void point_vortices_slope(const double *coef, const point_vortices_row *row)
 {
     double *restrict out_x = row->out[0], *restrict out_y = row->out[1];
@@ -263,7 +263,7 @@ static void point_vortices_slope_piece(const point_vortices_solver *s, const dou
     point_vortices_slope(coef, &row);
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void point_vortices_energy_row(const point_vortices_row *row, double *restrict out)
 {
     point_vortices_pair_energy(row);
@@ -273,7 +273,7 @@ static void point_vortices_energy_row(const point_vortices_row *row, double *res
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void point_vortices_vector_field_row(const point_vortices_row *row, double *restrict out)
 {
     point_vortices_pair_forces(row);
@@ -300,7 +300,7 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 
 enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
@@ -429,6 +429,7 @@ static point_vortices_status point_vortices_set_step(point_vortices_solver *s, d
     return point_vortices_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int point_vortices_all_hold(const point_vortices_solver *s, double *const *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
@@ -436,6 +437,7 @@ static int point_vortices_all_hold(const point_vortices_solver *s, double *const
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void point_vortices_copy(double *const *to, double *const *from, const point_vortices_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -848,6 +850,7 @@ void point_vortices_density(const point_vortices_solver *s, double *out)
 }
 
 void point_vortices_casimirs(const point_vortices_solver *s, double *out) { (void)s, (void)out; }
+
 void point_vortices_vector_field(const point_vortices_solver *s, double *out)
 {
     point_vortices_fill(s, point_vortices_vector_field_row, out);

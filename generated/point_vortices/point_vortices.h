@@ -1,7 +1,7 @@
 /*
  * The declarations of point_vortices.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 67168655f2a6e26e0fb8572bb07f601d8cb8454a54133529e0565ccdbc67261f
+ * body-sha256: 0ca8c02c960a7431aa27780c563b631264c55327d9b970f49a91d1c6f49c3409
  */
 #ifndef POINT_VORTICES_H
 #define POINT_VORTICES_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define point_vortices_AXES 1
-#define point_vortices_DIM 2
+#define point_vortices_AXES 1 /* i */
+#define point_vortices_DIM 2  /* fields of a site: x, y */
 #define point_vortices_ORDER 4
 #define point_vortices_CASIMIRS 0
 #define point_vortices_PHIGEN_VERSION "0.1.0"
 #define point_vortices_SPEC_SHA256 "804a59fbd6a75ce4716246b77b3269259aad5901c7b5e0f87e175f5913fb28ec"
 
-/* Axes, the slowest first: i. Fields of a site: x, y. Casimirs: none. */
 typedef struct {
     const double *G; /* at sites: circulation */
 } point_vortices_params;
@@ -39,9 +38,9 @@ typedef struct {
     double *difference[point_vortices_DIFFERENCES][point_vortices_DIM];
 } point_vortices_guess;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with point_vortices_init; a copy of the struct is the
-   same solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites.
+   Set it up with point_vortices_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[point_vortices_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2fcff92e8e864433b70b90c4309147406cba1fd71c408eed44e3abf59001945c
+ * body-sha256: 232a5805f00934acf9cc716704b457cbc388dd3c402e6e06bbd1bef3318c669f
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -51,9 +51,8 @@ static const unsigned char sine_gordon_flow_rows[sine_gordon_FLOWS] = { 0, 1, 2,
 /* Whether all parameters are finite, and positive where they have to be. */
 static int sine_gordon_allowed(const sine_gordon_params *params, size_t sites)
 {
-    if (!(isfinite(params->d) && params->d > 0.0)) return 0;
     (void)sites;
-    return 1;
+    return isfinite(params->d) && params->d > 0.0;
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -155,7 +154,7 @@ static inline double sine_gordon_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double sine_gordon_sin_lane(double u) { return sine_gordon_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of 1/2*(d**(-2)*(q[i+1] - q)**2) - cos(q): p shifted */
+/* The flow of H_1 = sum of 1/2*(d**(-2)*(q[i+1] - q)**2) - cos(q): p shifted. */
 static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row *row)
 {
     const double c0 = coef[0], c1 = coef[1];
@@ -168,7 +167,7 @@ static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row 
     }
 }
 
-/* the flow of H_2 = sum of 1 + 1/2*p**2: q shifted */
+/* The flow of H_2 = sum of 1 + 1/2*p**2: q shifted. */
 static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row *row)
 {
     const double c2 = coef[2];
@@ -197,7 +196,7 @@ static void sine_gordon_sweep_piece(const sine_gordon_solver *s, int part, const
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void sine_gordon_energy_row(const sine_gordon_row *row, double *restrict out)
 {
     const double d = row->s->params.d;
@@ -211,7 +210,7 @@ static void sine_gordon_energy_row(const sine_gordon_row *row, double *restrict 
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void sine_gordon_vector_field_row(const sine_gordon_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -231,7 +230,7 @@ static void sine_gordon_vector_field_row(const sine_gordon_row *row, double *res
 enum { sine_gordon_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { sine_gordon_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / sine_gordon_RESERVED;
@@ -319,6 +318,7 @@ static sine_gordon_status sine_gordon_set_step(sine_gordon_solver *s, double h)
     return sine_gordon_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int sine_gordon_all_hold(const sine_gordon_solver *s, double *const *x)
 {
     for (size_t k = 0; k < sine_gordon_DIM; ++k)
@@ -326,6 +326,7 @@ static int sine_gordon_all_hold(const sine_gordon_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void sine_gordon_copy(double *const *to, double *const *from, const sine_gordon_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -374,11 +375,15 @@ static int sine_gordon_try(sine_gordon_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
 {
     sine_gordon_status status = sine_gordon_set_step(s, h);
     if (status != sine_gordon_OK || steps == 0) return status;
-    sine_gordon_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) sine_gordon_copy(s->x, s->before, s);
+    else sine_gordon_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = sine_gordon_STRETCH; s->steps < end && status == sine_gordon_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -466,6 +471,7 @@ void sine_gordon_density(const sine_gordon_solver *s, double *out)
 }
 
 void sine_gordon_casimirs(const sine_gordon_solver *s, double *out) { (void)s, (void)out; }
+
 void sine_gordon_vector_field(const sine_gordon_solver *s, double *out)
 {
     sine_gordon_fill(s, sine_gordon_vector_field_row, out);

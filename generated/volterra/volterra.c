@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2d183c46116bcd308b2d9f54dd63fc4ddb066be6f1f31c627d1269d2182c3d71
+ * body-sha256: fc85c51087b2375a96e300ba32c0b6e6aad651d8fbd565deb29f4a9ec7de1f0e
  */
 #include "volterra.h"
 #include <float.h>
@@ -166,8 +166,8 @@ static inline double volterra_expm1_lane(double u)
     return rest + (power - 1.0) + (fabs(u) <= 700.0 ? 0.0 : (double)NAN);
 }
 
-/* the flow of H_1 = sum of a: a scaled
-   the flow of H_2 = sum of a: a scaled */
+/* The flow of H_1 = sum of a: a scaled.
+   The flow of H_2 = sum of a: a scaled. */
 static inline void volterra_sweep_a(const double *coef, const volterra_row *row)
 {
     const double c0 = coef[0];
@@ -196,7 +196,7 @@ static void volterra_sweep_piece(const volterra_solver *s, int part, const doubl
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void volterra_energy_row(const volterra_row *row, double *restrict out)
 {
     const double *restrict a_row = row->x[0];
@@ -207,7 +207,7 @@ static void volterra_energy_row(const volterra_row *row, double *restrict out)
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void volterra_casimirs_row(const volterra_row *row, double *restrict out)
 {
     const double *restrict a_row = row->x[0];
@@ -218,7 +218,7 @@ static void volterra_casimirs_row(const volterra_row *row, double *restrict out)
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void volterra_vector_field_row(const volterra_row *row, double *restrict out)
 {
     const double *restrict a_row = row->x[0];
@@ -233,7 +233,7 @@ static void volterra_vector_field_row(const volterra_row *row, double *restrict 
 enum { volterra_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { volterra_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / volterra_RESERVED;
@@ -320,6 +320,7 @@ static volterra_status volterra_set_step(volterra_solver *s, double h)
     return volterra_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int volterra_all_hold(const volterra_solver *s, double *const *x)
 {
     for (size_t k = 0; k < volterra_DIM; ++k)
@@ -327,6 +328,7 @@ static int volterra_all_hold(const volterra_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void volterra_copy(double *const *to, double *const *from, const volterra_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -372,11 +374,15 @@ static int volterra_try(volterra_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
 {
     volterra_status status = volterra_set_step(s, h);
     if (status != volterra_OK || steps == 0) return status;
-    volterra_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) volterra_copy(s->x, s->before, s);
+    else volterra_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = volterra_STRETCH; s->steps < end && status == volterra_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;
@@ -455,6 +461,7 @@ static void volterra_fill(const volterra_solver *s, void kernel(const volterra_r
 }
 
 void volterra_density(const volterra_solver *s, double *out) { volterra_fill(s, volterra_energy_row, out); }
+
 void volterra_casimirs(const volterra_solver *s, double *out)
 {
     volterra_fill(s, volterra_casimirs_row, out);

@@ -1,7 +1,7 @@
 /*
  * The declarations of volterra.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: eeefa614e0d60c7c280ea93f7b50f644fec597b8e6d12eba1be78299a841f9ab
+ * body-sha256: 18f0480474b291acd497aa37aaf8a6e064d49ce9461486d0e65a3993d7aad92e
  */
 #ifndef VOLTERRA_H
 #define VOLTERRA_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define volterra_AXES 1
-#define volterra_DIM 1
+#define volterra_AXES 1 /* i */
+#define volterra_DIM 1  /* fields of a site: a */
 #define volterra_ORDER 4
-#define volterra_CASIMIRS 1
+#define volterra_CASIMIRS 1 /* product */
 #define volterra_PHIGEN_VERSION "0.1.0"
 #define volterra_SPEC_SHA256 "c5b173d647010b0d2f2acd87d0dc22593f2b1c1fbce2fb51bb44ed0467462b1a"
 
-/* Axes, the slowest first: i. Fields of a site: a. Casimirs: product. */
 typedef struct {
     char unused; /* this system has no parameters */
 } volterra_params;
@@ -29,9 +28,9 @@ enum { volterra_COEFFICIENTS = 14 }; /* numbers that depend on params and h only
 typedef enum { volterra_OK = 0, volterra_NO_CONVERGENCE, volterra_SINGULAR, volterra_NOT_FINITE,
     volterra_BAD_ARGUMENT } volterra_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with volterra_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with volterra_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[volterra_AXES];
     size_t sites, rows;

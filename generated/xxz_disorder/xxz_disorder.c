@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e193efcea0af06b55ebe80f55298a5a0d5e0737feacd2384359927d268db8f69
+ * body-sha256: efa256ee18b4f88d6e0453da78a1a115271ac432dde025d4dcb57a3428e1ae01
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -53,11 +53,10 @@ static const unsigned char xxz_disorder_flow_rows[xxz_disorder_FLOWS] = { 0, 1, 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int xxz_disorder_allowed(const xxz_disorder_params *params, size_t sites)
 {
-    if (!(isfinite(params->J) && isfinite(params->delta))) return 0;
     if (params->B == NULL) return 0;
     for (size_t k = 0; params->B != NULL && k < sites; ++k)
         if (!isfinite(params->B[k])) return 0;
-    return 1;
+    return isfinite(params->J) && isfinite(params->delta);
 }
 
 /* Everything that depends on parameters and the time of a flow only. */
@@ -158,8 +157,8 @@ static inline double xxz_disorder_turned_sin(double u, double offset)
 /* sin u for the loops over lanes. */
 static inline double xxz_disorder_sin_lane(double u) { return xxz_disorder_turned_sin(u, 0.0); }
 
-/* the flow of H_1 = sum of J*(y*y[i+1]): x, z turned
-   the flow of H_2 = sum of J*(x*x[i+1]): y, z turned, where x, y, z stand for its z, x, y */
+/* The flow of H_1 = sum of J*(y*y[i+1]): x, z turned.
+   The flow of H_2 = sum of J*(x*x[i+1]): y, z turned, where x, y, z stand for its z, x, y. */
 static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder_row *row)
 {
     const double c0 = coef[0];
@@ -178,7 +177,7 @@ static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder
     }
 }
 
-/* the flow of H_3 = sum of B*z + J*(z[i+1]*(delta*z)): x, y turned */
+/* The flow of H_3 = sum of B*z + J*(z[i+1]*(delta*z)): x, y turned. */
 static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_row *row)
 {
     const double c1 = coef[1], c2 = coef[2];
@@ -222,7 +221,7 @@ static void xxz_disorder_sweep_piece(const xxz_disorder_solver *s, int part, con
     }
 }
 
-/* the density of the Hamiltonian, of sites of a row */
+/* The density of the Hamiltonian, at the sites of a row. */
 static void xxz_disorder_energy_row(const xxz_disorder_row *row, double *restrict out)
 {
     const double J = row->s->params.J, delta = row->s->params.delta;
@@ -236,7 +235,7 @@ static void xxz_disorder_energy_row(const xxz_disorder_row *row, double *restric
     }
 }
 
-/* the densities of the Casimirs, of sites of a row */
+/* The densities of the Casimirs, at the sites of a row. */
 static void xxz_disorder_casimirs_row(const xxz_disorder_row *row, double *restrict out)
 {
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
@@ -247,7 +246,7 @@ static void xxz_disorder_casimirs_row(const xxz_disorder_row *row, double *restr
     }
 }
 
-/* pi grad H, of sites of a row */
+/* Pi grad H, at the sites of a row. */
 static void xxz_disorder_vector_field_row(const xxz_disorder_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
@@ -270,7 +269,7 @@ static void xxz_disorder_vector_field_row(const xxz_disorder_row *row, double *r
 enum { xxz_disorder_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { xxz_disorder_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
@@ -374,6 +373,7 @@ static xxz_disorder_status xxz_disorder_set_step(xxz_disorder_solver *s, double 
     return xxz_disorder_OK;
 }
 
+/* Whether the fields are finite at all sites. */
 static int xxz_disorder_all_hold(const xxz_disorder_solver *s, double *const *x)
 {
     for (size_t k = 0; k < xxz_disorder_DIM; ++k)
@@ -381,6 +381,7 @@ static int xxz_disorder_all_hold(const xxz_disorder_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void xxz_disorder_copy(double *const *to, double *const *from, const xxz_disorder_solver *s)
 {
     const size_t block = (size_t)s->width * sizeof **from;
@@ -429,11 +430,15 @@ static int xxz_disorder_try(xxz_disorder_solver *s, size_t steps)
     return 0;
 }
 
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
+   one. */
 xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
 {
     xxz_disorder_status status = xxz_disorder_set_step(s, h);
     if (status != xxz_disorder_OK || steps == 0) return status;
-    xxz_disorder_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    /* undoes the last flow, which the next step makes with its first */
+    if (s->open) xxz_disorder_copy(s->x, s->before, s);
+    else xxz_disorder_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = xxz_disorder_STRETCH; s->steps < end && status == xxz_disorder_OK;) {
         size_t now = end - s->steps < stretch ? end - s->steps : stretch;

@@ -1,7 +1,7 @@
 /*
  * The declarations of xxz_disorder.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 77dd1e353a0d71bb9c6ca72565268773ded68a9291d1c4bf313df6a864c1ab1e
+ * body-sha256: c764bd6fd0d8f801e6f64320182744425d64d4999fda2294f3aa9e4b36b5525b
  */
 #ifndef XXZ_DISORDER_H
 #define XXZ_DISORDER_H
@@ -9,14 +9,13 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-#define xxz_disorder_AXES 1
-#define xxz_disorder_DIM 3
+#define xxz_disorder_AXES 1 /* i */
+#define xxz_disorder_DIM 3  /* fields of a site: x, y, z */
 #define xxz_disorder_ORDER 4
-#define xxz_disorder_CASIMIRS 1
+#define xxz_disorder_CASIMIRS 1 /* C */
 #define xxz_disorder_PHIGEN_VERSION "0.1.0"
 #define xxz_disorder_SPEC_SHA256 "57aba2c6c3ad4f3008d97959f0a4311ced73e77cf7bc96f76a9bd9865ce837b8"
 
-/* Axes, the slowest first: i. Fields of a site: x, y, z. Casimirs: C. */
 typedef struct {
     double J;        /* default 1.0 */
     double delta;    /* default 1.3 */
@@ -31,9 +30,9 @@ enum { xxz_disorder_COEFFICIENTS = 78 }; /* numbers that depend on params and h 
 typedef enum { xxz_disorder_OK = 0, xxz_disorder_NO_CONVERGENCE, xxz_disorder_SINGULAR,
     xxz_disorder_NOT_FINITE, xxz_disorder_BAD_ARGUMENT } xxz_disorder_status;
 
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis,
-   with copies of the other end beside it. Set it up with xxz_disorder_init; a copy of the struct is the same
-   solver, not another one. */
+/* The state is kept in memory of the caller.
+   A field is a row: all its sites, with copies of the other end beside them.
+   Set it up with xxz_disorder_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[xxz_disorder_AXES];
     size_t sites, rows;

@@ -74,7 +74,7 @@ enum { PHI_FAR_STEPS = 64 }; /* steps by functions for large arguments, after on
 #endif
 enum { PHI_BUFFER = 256 }; /* densities that are added in one go */
 
-/* Sizes as they have to be: the widths of rows and the number of rows, 0 if they are not allowed. */
+/* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
 static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 {
 #if PHI_BANDED
@@ -395,6 +395,7 @@ static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PH
 }
 #endif
 
+/* Whether the fields are finite at all sites. */
 static int phi_all_hold(const phi_solver *s, double *const *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
@@ -403,6 +404,7 @@ static int phi_all_hold(const phi_solver *s, double *const *x)
     return 1;
 }
 
+/* Fields, with what is beside their rows. */
 static void phi_copy(double *const *to, double *const *from, const phi_solver *s)
 {
     const size_t block = s->rows * (size_t)s->width * sizeof **from;
@@ -543,11 +545,13 @@ static void phi_fill(const phi_solver *s, void kernel(const phi_row *, double *r
 }
 
 void phi_density(const phi_solver *s, double *out) { phi_fill(s, phi_energy_row, out); }
+
 #if PHI_CASIMIRS
 void phi_casimirs(const phi_solver *s, double *out) { phi_fill(s, phi_casimirs_row, out); }
 #else
 void phi_casimirs(const phi_solver *s, double *out) { (void)s, (void)out; }
 #endif
+
 void phi_vector_field(const phi_solver *s, double *out) { phi_fill(s, phi_vector_field_row, out); }
 
 #if PHI_BY_HAND

@@ -13,8 +13,17 @@ typedef struct {
 } phi_guess;
 
 #endif
-/* The solver keeps the state in memory of the caller, row by row: a row is all sites along the last axis, with copies
-   of the other end beside it. Set it up with phi_init; a copy of the struct is the same solver, not another one. */
+/* The state is kept in memory of the caller.
+#if PHI_ONE_ROW && PHI_HALO
+   A field is a row: all its sites, with copies of the other end beside them.
+#elif PHI_ONE_ROW
+   A field is a row: all its sites.
+#elif PHI_HALO
+   A field is many rows: a row is all sites along the last axis, with copies of the other end beside them.
+#else
+   A field is many rows: a row is all sites along the last axis.
+#endif
+   Set it up with phi_init; a copy of the struct is the same solver, not another one. */
 typedef struct {
     size_t sizes[PHI_AXES];
     size_t sites, rows;
@@ -236,7 +245,7 @@ void phi_casimirs(const phi_solver *s, double *out);
 void phi_vector_field(const phi_solver *s, double *out);
 
 #if PHI_BY_HAND
-/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, … before
+/* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ... before
    phi_stages(), each a sweep over all planes: the sites of one place along the first axis. Number phi_stages() is the
    last stage of a step and the first of the next together, as phi_integrate does them. A stage may be made in any number
    of pieces, in any order, with the bits of phi_step; before that, the planes beside a piece that it reads must have

@@ -220,6 +220,12 @@ static int phi_close(phi_solver *s)
 }
 
 #endif
+#if PHI_NEAR
+/* Functions for small arguments give no number for larger ones. The state is looked at after a stretch of steps only: where
+   it is not finite, these are made again one by one, and that which fails by functions for arguments of any size. */
+#else
+/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by one. */
+#endif
 #if PHI_ADJOINT
 /* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
 static phi_status phi_march(phi_solver *s, size_t steps)
@@ -233,7 +239,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next step makes with its first */
+    else phi_copy(s->before, s->x, s);
 #endif
 #endif
     const size_t end = s->steps + steps;
@@ -276,7 +283,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    phi_copy(s->open ? s->x : s->before, s->open ? s->before : s->x, s);
+    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next step makes with its first */
+    else phi_copy(s->before, s->x, s);
 #endif
     status = phi_march(s, steps);
 #endif

@@ -19,7 +19,7 @@ from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, lower
-from phigen.targets.header import plain
+from phigen.targets.header import plain, sentence
 
 #: The kernel of the derivatives of a sweep along the fields at the site itself.
 BLOCK = "own_slope"
@@ -53,7 +53,8 @@ class Loop:
 
     def text(self, program: Program, purposes: Iterable[str] = ()) -> str:
         """The function, below what it is for."""
-        said = [line for one in dict.fromkeys(purposes or (self.purpose,)) for line in comment(plain(one), "   ")]
+        sentences = dict.fromkeys(plain(sentence(one)) for one in purposes or (self.purpose,))
+        said = [line for one in sentences for line in comment(one, "   ")]
         said[0] = f"/* {said[0].strip()}"
         head = f"static inline void {program.name}_{self.name}({self.arguments})"
         return "\n".join([*said[:-1], f"{said[-1]} */", head, "{", self.body + "}\n"])
@@ -187,7 +188,7 @@ def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
     name, code, partners = program.name, lower(kernel), layout.partners
     calls = seen_calls(program)
     names = SiteNames(program, layout, kernel, code, set(), calls, partners.field.names)
-    head = comment(f"/* {plain(kernel.purpose)}, of sites of a row */")
+    head = comment(f"/* {plain(sentence(kernel.purpose + ', at the sites of a row'))} */")
     head.append(f"static void {name}_{kernel.name}_row(const {name}_row *row, double *restrict out)\n{{")
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]

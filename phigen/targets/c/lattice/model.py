@@ -42,6 +42,7 @@ def declarations(program: Program, step: Sweeps) -> str:
     values = {
         "NAME": program.name,
         "axes": len(step.sites.axes),
+        "several": len(step.sites.axes) > 1,
         "axis_names": ", ".join(step.sites.axes),
         "n": program.dimension,
         "order": program.order,
@@ -49,7 +50,7 @@ def declarations(program: Program, step: Sweeps) -> str:
         "version": program.version,
         "sha256": program.about.spec_sha256,
         "coordinates": ", ".join(program.coordinates),
-        "casimirs": ", ".join(program.casimirs) or "none",
+        "casimirs": f" /* {', '.join(program.casimirs)} */" if program.casimirs else "",
         "noise": program.noise is not None,
         "members": listed or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
@@ -199,18 +200,17 @@ def _moments(step: Sweeps) -> list[float]:
 
 
 def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:
-    """The statements that return 0 for parameters that are not allowed."""
-    if asked:
-        yield f"if (!({' && '.join(asked)})) return 0;"
+    """The statements that return whether parameters are allowed."""
+    unused = ["params"] * (not asked and not arrays) + ["sites"] * all(at != "sites" for *_, at in arrays)
+    if unused:
+        yield ", ".join(f"(void){u}" for u in unused) + ";"
     for member, positive, required, at in arrays:
         if required:
             yield f"if (params->{member} == NULL) return 0;"
         wrong = f"!isfinite(params->{member}[k])" + f" || params->{member}[k] <= 0.0" * positive
         yield f"for (size_t k = 0; params->{member} != NULL && k < {at}; ++k)"
         yield f"    if ({wrong}) return 0;"
-    unused = ["params"] * (not asked and not arrays) + ["sites"] * all(at != "sites" for *_, at in arrays)
-    if unused:
-        yield ", ".join(f"(void){u}" for u in unused) + ";"
+    yield f"return {' && '.join(asked) or '1'};"
 
 
 def _braced(items: Sequence[object]) -> str:
