@@ -20,8 +20,8 @@ from phigen.targets.c import functions, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import declaration, function, members, printer
+from phigen.targets.c.lanes import KNOTS, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
-from phigen.targets.c.lanes import remembered
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
 from phigen.targets.header import header_lines, plain, sealed
@@ -307,6 +307,10 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         else "",
         "asked": " && ".join(asked),
         "fractions": ", ".join(map(repr, program.fractions)) if has["COMPOSED"] else "",
+        "knots": KNOTS,
+        "travels": [", ".join(map(repr, row)) for row in travels(program.fractions)]
+        if has["BLOCKS"] and has["COMPOSED"] and not has["PATH"]
+        else [],
         "times": ", ".join(map(repr, schedule.times)) if schedule else "",
         "multiples": ", ".join(map(repr, schedule.multiples)) if schedule else "",
         "path_slopes": ", ".join(map(str, step.recurrences.slopes))

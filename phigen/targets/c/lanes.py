@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate
+from math import prod
+
 from phigen.lanes.functions import NEAR_FUNCTIONS
 from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Traces
 from phigen.scheme.program import Program
@@ -29,6 +33,24 @@ def remembered(program: Program, lanes: Lanes | None) -> dict[str, int]:
     checks = min(CHECKS, window // 4)
     rows = 2 * ((values - window - ahead - checks + 1) // 2)
     return {"REMEMBERED": rows + checks + window + ahead - 1, "WINDOW": window, "AHEAD": ahead, "CHECKS": checks}
+
+
+#: Beginnings of steps whose slopes tell what a stage moves by: that of the next one, that of its own, and those before.
+KNOTS = 4
+
+
+def travels(fractions: Sequence[float]) -> list[list[float]]:
+    """For each stage what it moves by, in steps, as a sum of the slopes at the times 2 − `KNOTS` … 1, in steps too.
+
+    It is the integral of the polynomial through them, by Gauss' rule of three points, which is exact.
+    """
+    knots = range(2 - KNOTS, 2)
+    found = []
+    for begin, size in zip(accumulate(fractions[:-1], initial=0.0), fractions, strict=True):
+        times = [begin + size * (0.5 + offset) for offset in (-(0.15**0.5), 0.0, 0.15**0.5)]
+        bases = [[prod((t - j) / (k - j) for j in knots if j != k) for t in times] for k in knots]
+        found.append([size * (5 * a + 8 * b + 5 * c) / 18 for a, b, c in bases])
+    return found
 
 
 def grouped(program: Program, lanes: Lanes | None) -> bool:

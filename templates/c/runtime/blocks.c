@@ -11,7 +11,10 @@
 
 /* ---- Blocks of steps ---- */
 #if PHI_COMPOSED && !PHI_PATH
-enum { PHI_PAST = 8 }; /* slopes that a step by Adams' method goes on from */
+enum {
+    PHI_PAST = 8, /* slopes that a step by Adams' method goes on from */
+    PHI_SLOPES = PHI_PAST + PHI_LANES + 1 /* those where steps begin: of the last block, of this one, and where it ends */
+};
 
 #endif
 /* What all blocks share: coefficients, the same in each lane, and the recurrences by which they are foreseen. */
@@ -19,8 +22,8 @@ typedef struct {
     int PHI_OF(fits, PHI_STAGES); /* the fit that weight is of; -1 for none */
     phi_lanes PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS], PHI_OF(weight, PHI_STAGES)[PHI_WINDOW][PHI_DIM];
 #if PHI_COMPOSED && !PHI_PATH
-    int marching; /* whether the last steps were a block, with these slopes */
-    double slope[PHI_PAST + PHI_LANES][PHI_DIM]; /* where steps begin, the last one last */
+    int marching; /* whether the last steps were a block, whose slopes these are */
+    double slope[PHI_DIM][PHI_SLOPES];
 #endif
 } phi_table;
 
@@ -149,107 +152,161 @@ static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], do
 #if PHI_COMPOSED && !PHI_PATH
 enum {
     PHI_STRIDES = 2, /* of the Runge-Kutta method in a step: errors that all stages of it share */
-    PHI_MEETINGS = 3 /* evaluations of a stage until its point is nearly where alpha(y) = x */
+    PHI_MEETINGS = 2 /* evaluations of a stage until its point is nearly where alpha(y) = x; the first takes one more */
 };
 
 #define PHI_ASTRAY 1e-3 /* how far a prediction may be from its correction, in sizes of the value and of the step */
+#define PHI_FADING 0.4  /* how much of what was found out from a stage still counts after the next */
 
-/* Make a step by Adams' method of order 9, predicted by that of order 8, from x with the slope given, before which are those
-   of earlier steps. 0, and x as before, where the two differ much: the steps are too long for them then. */
+/* A step by the Runge-Kutta method, of one size or the other, from the time t. */
+static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM])
+{
+    double mean[PHI_DIM];
 #if PHI_TIMED
-static int phi_adams(const phi_solver *s, double t, double (*slope)[PHI_DIM], double x[PHI_DIM])
+    for (int part = 0; part < PHI_STRIDES; ++part)
+        phi_runge_kutta(s, t + part * h / PHI_STRIDES, h / PHI_STRIDES, x, mean);
 #else
-static int phi_adams(const phi_solver *s, double (*slope)[PHI_DIM], double x[PHI_DIM])
+    (void)t;
+    for (int part = 0; part < PHI_STRIDES; ++part) phi_runge_kutta(s, h / PHI_STRIDES, x, mean);
 #endif
+}
+
+/* The slope at x, where so many steps are done, counted from those of the last block. */
+static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, const double x[PHI_DIM])
+{
+    double here[PHI_DIM];
+#if PHI_TIMED
+    phi_slope(s, s->t + (done - PHI_PAST) * s->h, x, here);
+#else
+    phi_slope(s, x, here);
+#endif
+    for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
+}
+
+/* Make a step by Adams' method of order 9, predicted by that of order 8, from x, where so many steps are done. 0, and x as
+   before, where the two differ much: the steps are too long for them then. Slopes are known as far as x, and become known
+   where the prediction leads. */
+static int phi_adams(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, double x[PHI_DIM])
 {
     static const double predict[PHI_PAST] = { -36799.0 / 120960.0, 295767.0 / 120960.0, -1041723.0 / 120960.0,
         2102243.0 / 120960.0, -2664477.0 / 120960.0, 2183877.0 / 120960.0, -1152169.0 / 120960.0, 434241.0 / 120960.0 };
-    static const double correct[PHI_PAST] = { -33953.0 / 3628800.0, 312874.0 / 3628800.0, -1291214.0 / 3628800.0,
-        3146338.0 / 3628800.0, -5033120.0 / 3628800.0, 5595358.0 / 3628800.0, -4604594.0 / 3628800.0, 4467094.0 / 3628800.0 };
-    static const double next = 1070017.0 / 3628800.0;
-    double predicted[PHI_DIM], corrected[PHI_DIM], ahead[PHI_DIM];
+    static const double correct[PHI_PAST + 1] = { -33953.0 / 3628800.0, 312874.0 / 3628800.0, -1291214.0 / 3628800.0,
+        3146338.0 / 3628800.0, -5033120.0 / 3628800.0, 5595358.0 / 3628800.0, -4604594.0 / 3628800.0, 4467094.0 / 3628800.0,
+        1070017.0 / 3628800.0 };
+    double predicted[PHI_DIM], corrected[PHI_DIM];
+    const int first = done + 1 - PHI_PAST;
     int far = 0;
     for (int i = 0; i < PHI_DIM; ++i) {
-        double open = 0.0, closed = 0.0;
-        for (int k = 0; k < PHI_PAST; ++k) {
-            open += predict[k] * slope[k + 1 - PHI_PAST][i];
-            closed += correct[k] * slope[k + 1 - PHI_PAST][i];
-        }
-        predicted[i] = x[i] + s->h * open;
-        corrected[i] = x[i] + s->h * closed;
+        double sum = 0.0;
+        for (int k = 0; k < PHI_PAST; ++k) sum += predict[k] * slope[i][first + k];
+        predicted[i] = x[i] + s->h * sum;
     }
-#if PHI_TIMED
-    phi_slope(s, t + s->h, predicted, ahead);
-#else
-    phi_slope(s, predicted, ahead);
-#endif
+    phi_note_slope(s, slope, done + 1, predicted);
     for (int i = 0; i < PHI_DIM; ++i) {
-        corrected[i] += s->h * next * ahead[i];
-        far += !(fabs(corrected[i] - predicted[i]) <= PHI_ASTRAY * (fabs(x[i]) + fabs(s->h * ahead[i])));
+        double sum = 0.0;
+        for (int k = 0; k <= PHI_PAST; ++k) sum += correct[k] * slope[i][first + k];
+        corrected[i] = x[i] + s->h * sum;
+        far += !(fabs(corrected[i] - predicted[i]) <= PHI_ASTRAY * (fabs(x[i]) + fabs(s->h * slope[i][done + 1])));
     }
     if (far > 0) return 0;
     memcpy(x, corrected, sizeof corrected);
     return 1;
 }
 
-/* Where all steps begin, one after the other: by Adams' method, as long as that will do, where the slopes of the last block
-   are known, or else by that of Runge and Kutta. */
+/* The slopes where steps of this size would have come from. */
+static void phi_look_back(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES])
+{
+    double x[PHI_DIM];
+    memcpy(x, s->x, sizeof x);
+    for (int k = 0; k < PHI_PAST; ++k) {
+        phi_stride(s, s->t - k * s->h, -s->h, x);
+        phi_note_slope(s, slope, PHI_PAST - 1 - k, x);
+    }
+}
+
+/* Where all steps begin, one after the other: by Adams' method, as long as that will do, or else by that of Runge and
+   Kutta. */
 static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI_DIM])
 {
-    double x[PHI_DIM], mean[PHI_DIM];
+    double x[PHI_DIM];
+    int by_adams = 1;
     memcpy(x, s->x, sizeof x);
-    memmove(table->slope, table->slope + PHI_LANES, PHI_PAST * sizeof table->slope[0]);
+    for (int i = 0; i < PHI_DIM && table->marching; ++i)
+        memmove(table->slope[i], table->slope[i] + PHI_LANES, PHI_PAST * sizeof table->slope[i][0]);
+    if (!table->marching) phi_look_back(s, table->slope);
     for (int lane = 0; lane < PHI_LANES; ++lane) {
-        double (*slope)[PHI_DIM] = table->slope + PHI_PAST + lane;
         for (int i = 0; i < PHI_DIM; ++i) begin[i][lane] = x[i];
-#if PHI_TIMED
-        const double t = s->t + lane * s->h;
-        phi_slope(s, t, x, *slope);
-        if (lane == PHI_LANES - 1) break;
-        table->marching = table->marching && phi_adams(s, t, slope, x);
-        for (int part = 0; part < PHI_STRIDES && !table->marching; ++part)
-            phi_runge_kutta(s, t + part * s->h / PHI_STRIDES, s->h / PHI_STRIDES, x, mean);
-#else
-        phi_slope(s, x, *slope);
-        if (lane == PHI_LANES - 1) break;
-        table->marching = table->marching && phi_adams(s, slope, x);
-        for (int part = 0; part < PHI_STRIDES && !table->marching; ++part)
-            phi_runge_kutta(s, s->h / PHI_STRIDES, x, mean);
-#endif
+        phi_note_slope(s, table->slope, PHI_PAST + lane, x);
+        by_adams = by_adams && phi_adams(s, table->slope, PHI_PAST + lane, x);
+        if (!by_adams) phi_stride(s, s->t + lane * s->h, s->h, x);
     }
+    phi_note_slope(s, table->slope, PHI_PAST + PHI_LANES, x);
     table->marching = 1;
 }
 
-/* Move the points of a stage by a part of what the stage before moves by. */
-static void phi_go_on(phi_model *model, phi_model *before, double part)
+/* What a stage moves by along the exact motion, in all lanes. */
+static void phi_travel(const phi_solver *s, phi_table *table, int stage, phi_lanes moved[PHI_DIM])
+{
+    for (int i = 0; i < PHI_DIM; ++i) {
+        phi_lanes sum = { 0.0 };
+        for (int k = 0; k < PHI_KNOTS; ++k) {
+            const double part = s->h * phi_travels[stage][k], *from = &table->slope[i][PHI_PAST + 2 - PHI_KNOTS + k];
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += part * from[lane];
+        }
+        memcpy(moved[i], sum, sizeof sum);
+    }
+}
+
+/* Begin a stage with half of what the exact motion moves by, less what half of it is thought to miss. */
+static void phi_begin_stage(phi_model *model, phi_lanes begin[restrict PHI_DIM], phi_lanes moved[restrict PHI_DIM],
+    phi_lanes missed[restrict PHI_DIM], double part)
 {
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] += part * before->increment[i][lane];
+        for (int lane = 0; lane < PHI_LANES; ++lane)
+            model->y[i][lane] = begin[i][lane] + (0.5 * moved[i][lane] - part * missed[i][lane]);
+    }
+}
+
+/* Bring the points of a stage nearer to where alpha(y) is its begin. */
+static void phi_meet(phi_lanes coef[restrict], phi_model *model, phi_lanes begin[restrict PHI_DIM])
+{
+    phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) model->y[i][lane] = begin[i][lane] - model->displacement[i][lane];
     }
 }
 
 /* Guesses where no recurrence is known. From the beginnings of all steps on each lane makes the stages of its own step, by
-   iteration. */
+   iteration. What half of the exact motion misses is of third order in the size of a stage, where y is the mean of its ends,
+   and otherwise of second: the factor is fitted to the stages before. */
 static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model *model)
 {
-    phi_lanes begin[PHI_DIM];
+    phi_lanes begin[PHI_DIM], moved[PHI_DIM], missed[PHI_DIM];
+    double weight = 0.0;
     phi_march(s, table, begin);
+    memset(missed, 0, sizeof missed);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
         phi_model *this_stage = model + stage;
-        memcpy(this_stage->y, begin, sizeof begin);
-        if (stage > 0) phi_go_on(this_stage, this_stage - 1, 0.5 * phi_fractions[stage] / phi_fractions[stage - 1]);
-        for (int meeting = 0; meeting < PHI_MEETINGS; ++meeting) {
-            phi_evaluate_lanes(table->coef[stage], this_stage->y, this_stage->displacement, this_stage->increment);
-            for (int i = 0; i < PHI_DIM; ++i) {
-                PHI_EACH_LANE
-                for (int lane = 0; lane < PHI_LANES; ++lane) this_stage->y[i][lane] = begin[i][lane] - this_stage->displacement[i][lane];
-            }
-        }
+#if PHI_CENTRED
+        const double power = phi_fractions[stage] * phi_fractions[stage] * phi_fractions[stage];
+#else
+        const double power = phi_fractions[stage] * phi_fractions[stage];
+#endif
+        phi_travel(s, table, stage, moved);
+        phi_begin_stage(this_stage, begin, moved, missed, stage > 0 ? power / weight : 0.0);
+        for (int meeting = stage > 0; meeting <= PHI_MEETINGS; ++meeting) phi_meet(table->coef[stage], this_stage, begin);
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
-            for (int lane = 0; lane < PHI_LANES; ++lane) begin[i][lane] += this_stage->increment[i][lane];
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                const double miss = this_stage->displacement[i][lane] + 0.5 * moved[i][lane];
+                missed[i][lane] = PHI_FADING * missed[i][lane] + power * miss;
+                begin[i][lane] += this_stage->increment[i][lane];
+            }
         }
+        weight = PHI_FADING * weight + power * power;
     }
 }
 
