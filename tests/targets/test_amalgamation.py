@@ -81,6 +81,11 @@ def with_derivatives(name, composition):
         ("sir_epidemic", "suzuki"),
         ("kepler", "auto"),
         ("pendulum_euler", "auto"),
+        ("toda", "auto"),
+        ("klein_gordon", "auto"),
+        ("heisenberg_plane", "auto"),
+        ("kdv", "suzuki"),
+        ("point_vortices", "auto"),
     ],
 )
 @pytest.mark.parametrize("profile", ["fast", "small"])

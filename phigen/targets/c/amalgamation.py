@@ -14,31 +14,6 @@ from dataclasses import dataclass, field
 
 from phigen import resources
 
-#: Loops over the rows of a lattice, and places in them: what a lattice with one axis lacks.
-_OVER_ROWS = re.compile(r"^( *)for \(size_t r = 0; r < s->rows; \+\+r\)(?: (.*))?$")
-_ONE_ROW = (
-    (re.compile(r" \+ \(ptrdiff_t\)r \* s->width| \+ r \* \(size_t\)s->length"), ""),
-    (re.compile(r" \+ row\.at\[0\]|row\.at\[0\] \+ "), ""),
-    (re.compile(r"(?:\(ptrdiff_t\))?s->rows \* (?=(?:\(size_t\))?s->width)"), ""),
-    (re.compile(r"phi_piece_of\(s, r\)"), "phi_row_of(s)"),
-    (re.compile(r"sizes\[PHI_AXES - 1\]"), "sizes[0]"),
-)
-
-#: What lies beside rows: nothing, where sites read of no others along them.
-_NO_HALO = (
-    (re.compile(r" [-+] (?:2 \* )?PHI_(?:LEAD|HALO)\b"), ""),
-    (re.compile(r"= -PHI_(?:LEAD|HALO)\b"), "= 0"),
-    (re.compile(r"PHI_LEAD \+ \((.*) \+ 7\) / 8 \* 8;"), r"\1;"),
-)
-
-#: Arguments that say whether those of functions may be large: what a lattice has whose functions are the same for all.
-_NEVER_FAR = (
-    (re.compile(r"(?<!number), int far(?=[,)])| && \(far \|\| status != PHI_NOT_FINITE\)"), ""),
-    (re.compile(r", (?:far|s->far > 0|g->far|s->wide)(?=[,)])|(?<=coef), 1(?=[,)])|(?<=phi_stages\(s), 1"), ""),
-    (re.compile(r"phi_relaxed\(s, NULL, 1, "), "phi_relaxed(s, NULL, "),
-)
-
-
 _NAME = re.compile(r"\bPHI_\w+")
 _DEFINITION = re.compile(r"#define (\w+)(?:\(([^)]*)\))?(?: (.*))?$")
 
@@ -135,19 +110,9 @@ class Amalgam:
 
     def own(self, lines: Sequence[str]) -> list[str]:
         """Lines of the runtime with what macros stand for, and with the prefix of the solver."""
-        kept = [self._expanded_line(line) for line in self._without_heads(lines)]
-        kept = _without_loops(kept, _OVER_ROWS, _ONE_ROW) if self.switches.get("ONE_ROW") else kept
-        left_out = [*(() if self.switches.get("NEAR", True) else _NEVER_FAR)]
-        left_out += () if self.switches.get("HALO", True) else _NO_HALO
-        for pattern, text in left_out:
-            kept = [pattern.sub(text, line) for line in kept]
-        return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
-
-    def _without_heads(self, lines: Sequence[str]) -> list[str]:
-        """The lines without loops whose heads are macros that stand for nothing."""
         nothing = [name for name, macro in self._macros.items() if macro == Macro(None, "")]
-        over = re.compile(rf"^( *)(?:{'|'.join(nothing)})(?: (.*))?$")
-        return _without_loops(lines, over, ()) if nothing else [*lines]
+        kept = [self._expanded_line(line) for line in _without_heads(lines, nothing)]
+        return [re.sub(r"\b(?:phi|PHI)_", f"{self.name}_", line) for line in kept]
 
     def _expanded_line(self, line: str) -> str:
         """The line with what macros stand for. A comma, or nothing, has no blank before it."""
@@ -179,10 +144,9 @@ def _arguments(line: str, at: int) -> tuple[list[str], int]:
     raise ValueError(f"a macro whose arguments do not end on its line: {line.strip()}")
 
 
-def _without_loops(
-    lines: Sequence[str], over: re.Pattern[str], alone: Sequence[tuple[re.Pattern[str], str]]
-) -> list[str]:
-    """The lines without loops of which but one turn is made, and with other texts where that one is ``alone``."""
+def _without_heads(lines: Sequence[str], heads: Sequence[str]) -> list[str]:
+    """The lines without these heads of loops; what is below a head, in braces or not, is there by itself."""
+    over = re.compile(rf"^( *)(?:{'|'.join(heads)})(?: (.*))?$") if heads else re.compile("(?!)")
     kept: list[str] = []
     ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
     for line in lines:
@@ -199,6 +163,4 @@ def _without_loops(
             ends.append((found[1], f"{found[1]}}}" if found[2] else ""))
         else:
             kept.append(f"{found[1]}{found[2]}"[shift:])
-    for pattern, text in alone:
-        kept = [pattern.sub(text, line) for line in kept]
     return kept

@@ -93,7 +93,11 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
         rows *= sizes[a];
     }
 #endif
-    size_t wide = PHI_LEAD + ((sizes[PHI_AXES - 1] + 7) / 8 * 8 + PHI_HALO + 7) / 8 * 8;
+#if PHI_HALO
+    size_t wide = PHI_LEAD + ((sizes[PHI_LAST_AXIS] + 7) / 8 * 8 + PHI_HALO + 7) / 8 * 8;
+#else
+    size_t wide = (sizes[PHI_LAST_AXIS] + 7) / 8 * 8;
+#endif
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
 #if PHI_ONE_ROW
@@ -148,10 +152,10 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 /* Values of sites, the last axis fastest, into rows. */
 static void phi_put(const phi_solver *s, double *rows, const double *values)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        double *row = rows + (ptrdiff_t)r * s->width;
-        memset(row - PHI_LEAD, 0, (size_t)s->width * sizeof *row);
-        memcpy(row, values + r * (size_t)s->length, (size_t)s->length * sizeof *row);
+    PHI_EACH_ROW {
+        double *row = PHI_ROW_AT(rows);
+        memset(PHI_MEMORY_OF(row), 0, (size_t)s->width * sizeof *row);
+        memcpy(row, PHI_VALUES_AT(values), (size_t)s->length * sizeof *row);
 #if PHI_HALO
         phi_ends(row, s->length, 0, s->length);
 #endif
@@ -162,7 +166,7 @@ static void phi_put(const phi_solver *s, double *rows, const double *values)
 /* The values of a parameter at sites, or one value for all. */
 static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
 {
-    for (ptrdiff_t i = -PHI_LEAD; i < (ptrdiff_t)s->rows * s->width - PHI_LEAD; ++i) rows[i] = value;
+    for (ptrdiff_t i = PHI_LEAST; i < PHI_MEMORY_OF(PHI_BEYOND); ++i) rows[i] = value;
     if (values != NULL) phi_put(s, rows, values);
 }
 
@@ -248,7 +252,7 @@ static int phi_finite(const double *values, size_t count)
 /* Go on as if rounding had left out nothing. */
 static void phi_forget(phi_solver *s)
 {
-    for (size_t k = 0; k < PHI_DIM; ++k) memset(s->carry[k] - PHI_LEAD, 0, s->rows * (size_t)s->width * sizeof *s->carry[k]);
+    for (size_t k = 0; k < PHI_DIM; ++k) memset(PHI_MEMORY_OF(s->carry[k]), 0, PHI_DOUBLES * sizeof *s->carry[k]);
     s->open = 0;
 }
 
@@ -287,7 +291,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     if (!isfinite(t0)) return PHI_BAD_ARGUMENT;
 #endif
     const phi_params own = params != NULL ? *params : phi_default_params;
-    const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_AXES - 1], sites = rows * length;
+    const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_LAST_AXIS], sites = rows * length;
 #if PHI_GRAPH
     const size_t count = bonds != NULL ? bonds->count : 0;
     if (!phi_few(sites, count) || !phi_connected(bonds, sites) || !phi_finite(x0, PHI_DIM * sites) ||
@@ -316,14 +320,14 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->t = s->now = t0;
 #endif
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
+    double *aligned = PHI_FIRST_SITE((double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64));
     const size_t block = phi_block(rows, width);
 #if !PHI_ONE_ROW
-    s->lines = (ptrdiff_t *)(void *)(aligned - PHI_LEAD + PHI_RESERVED * block);
+    s->lines = (ptrdiff_t *)(void *)(PHI_MEMORY_OF(aligned) + PHI_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
 #endif
 #if PHI_BANDED
-    s->matrix = aligned - PHI_LEAD + PHI_RESERVED * block;
+    s->matrix = PHI_MEMORY_OF(aligned) + PHI_RESERVED * block;
 #endif
     for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
     for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
@@ -342,7 +346,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     phi_put_parameters(s, &own);
 #endif
 #if PHI_GRAPH
-    phi_connect(s, bonds, aligned - PHI_LEAD + PHI_RESERVED * block);
+    phi_connect(s, bonds, PHI_MEMORY_OF(aligned) + PHI_RESERVED * block);
 #if PHI_BOND_PARAMETERS
     phi_put_at_bonds(s, &own);
 #endif
@@ -399,20 +403,20 @@ static void phi_renew(const phi_solver *s, int row, size_t steps, double coef[PH
 static int phi_all_hold(const phi_solver *s, double *const *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            if (!phi_finite(x[k] + (ptrdiff_t)r * s->width, (size_t)s->length)) return 0;
+        PHI_EACH_ROW
+            if (!phi_finite(PHI_ROW_AT(x[k]), (size_t)s->length)) return 0;
     return 1;
 }
 
 /* Fields, with what is beside their rows. */
 static void phi_copy(double *const *to, double *const *from, const phi_solver *s)
 {
-    const size_t block = s->rows * (size_t)s->width * sizeof **from;
-    for (size_t k = 0; k < PHI_DIM; ++k) memcpy(to[k] - PHI_LEAD, from[k] - PHI_LEAD, block);
+    const size_t block = PHI_DOUBLES * sizeof **from;
+    for (size_t k = 0; k < PHI_DIM; ++k) memcpy(PHI_MEMORY_OF(to[k]), PHI_MEMORY_OF(from[k]), block);
 #if PHI_COMPENSATED
     const size_t into = to == s->before ? PHI_DIM : 0; /* one of them is x, the other one before */
     for (size_t k = 0; k < PHI_DIM; ++k)
-        memcpy(s->carry[into + k] - PHI_LEAD, s->carry[PHI_DIM - into + k] - PHI_LEAD, block);
+        memcpy(PHI_MEMORY_OF(s->carry[into + k]), PHI_MEMORY_OF(s->carry[PHI_DIM - into + k]), block);
 #endif
 }
 
@@ -420,7 +424,7 @@ static void phi_copy(double *const *to, double *const *from, const phi_solver *s
 /* The fields of a tangent vector. */
 static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
 {
-    const size_t block = s->rows * (size_t)s->width;
+    const size_t block = PHI_DOUBLES;
     for (size_t k = 0; k < PHI_DIM; ++k) v[k] = s->tangents + (number * PHI_DIM + k) * block;
 }
 
@@ -437,8 +441,8 @@ phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 static void phi_take(const phi_solver *s, double *const *fields, double *x)
 {
     for (size_t k = 0; k < PHI_DIM; ++k)
-        for (size_t r = 0; r < s->rows; ++r)
-            memcpy(x + k * s->sites + r * (size_t)s->length, fields[k] + (ptrdiff_t)r * s->width, (size_t)s->length * sizeof *x);
+        PHI_EACH_ROW
+            memcpy(PHI_VALUES_AT(x + k * s->sites), PHI_ROW_AT(fields[k]), (size_t)s->length * sizeof *x);
 }
 
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
@@ -519,8 +523,8 @@ phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
 double phi_hamiltonian(const phi_solver *s)
 {
     double density[PHI_BUFFER], sum = 0.0, rest = 0.0;
-    for (size_t r = 0; r < s->rows; ++r) {
-        phi_row row = phi_piece_of(s, r);
+    PHI_EACH_ROW {
+        phi_row row = PHI_WHOLE_ROW;
         for (row.to = 0; row.to < s->length;) {
             row.from = row.to;
             row.to = s->length - row.from > PHI_BUFFER ? row.from + PHI_BUFFER : s->length;
@@ -538,9 +542,9 @@ double phi_hamiltonian(const phi_solver *s)
 /* A kernel that fills arrays over the sites, for all rows. */
 static void phi_fill(const phi_solver *s, void kernel(const phi_row *, double *restrict), double *out)
 {
-    for (size_t r = 0; r < s->rows; ++r) {
-        const phi_row row = phi_piece_of(s, r);
-        kernel(&row, out + r * (size_t)s->length);
+    PHI_EACH_ROW {
+        const phi_row row = PHI_WHOLE_ROW;
+        kernel(&row, PHI_VALUES_AT(out));
     }
 }
 

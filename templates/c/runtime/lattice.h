@@ -1,7 +1,7 @@
 #ifndef PHI_FILE_LATTICE_H
 #define PHI_FILE_LATTICE_H
 #include "declarations.h"
-#include "macros/guesses.h"
+#include "macros/lattices.h"
 #include "macros/stages.h"
 #include "status.h"
 

@@ -62,7 +62,7 @@ static double *phi_keep(const phi_solver *s, int sweep, double *to)
     size_t first, end = phi_share(phi_units(s), &first);
     for (int f = 0; f < PHI_DIM; ++f) {
         if (!phi_keeps[phi_part_of(s, sweep)][f]) continue;
-        phi_keep_units(s, s->x[f] - PHI_LEAD, to, first, end);
+        phi_keep_units(s, PHI_MEMORY_OF(s->x[f]), to, first, end);
         to += phi_block(s->rows, s->width);
     }
     return to;
@@ -82,9 +82,9 @@ static void phi_keep_steps(const phi_solver *s, size_t steps)
             for (int k = 0, sweep; (sweep = phi_sweep_of(s, own, k)) >= 0; ++k) {
                 kept = phi_keep(s, sweep, kept);
 #if PHI_BY_COLOUR
-                phi_sweep_colour(s, sweep, flow.coef, s->far > 0);
+                phi_sweep_colour(s, sweep, flow.coef PHI_AND_FAR(s->far > 0));
 #else
-                phi_sweep_part(s, sweep, flow.coef, s->far > 0);
+                phi_sweep_part(s, sweep, flow.coef PHI_AND_FAR(s->far > 0));
 #endif
             }
         }
@@ -98,7 +98,7 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
     double *const *x, double *const *bar)
 {
     size_t first, end = phi_share(phi_units(s), &first);
-    phi_back_rows(s, sweep, coef, g->far, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+    phi_back_rows(s, sweep, coef PHI_AND_FAR(g->far), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #if PHI_HANDS
     if (!phi_hands[phi_part_of(s, sweep)]) return;
     phi_wait();
@@ -119,9 +119,9 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
     const phi_transpose *g = flow->g;
 #if PHI_HANDS
     if (flow->go > 1) phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
-    else phi_back_rows(s, flow->part, flow->coef, g->far, s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+    else phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
 #else
-    phi_back_rows(s, flow->part, flow->coef, g->far, s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+    phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
 #endif
 }
 
@@ -184,7 +184,7 @@ static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t b
 /* The state that a leg of a segment begins with. */
 static void phi_fields_of_leg(const phi_transpose *g, size_t leg, double *fields[PHI_DIM])
 {
-    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = g->kept + (leg * PHI_DIM + f) * g->block + PHI_LEAD;
+    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->kept + (leg * PHI_DIM + f) * g->block);
 }
 
 /* The largest value of a field, in an order that lets loops vectorise. */
@@ -192,8 +192,8 @@ static double phi_largest_of(const phi_solver *s, const double *field)
 {
     double lanes[8] = { 0.0 };
     const ptrdiff_t whole = s->length - s->length % 8;
-    for (size_t r = 0; r < s->rows; ++r) {
-        const double *row = field + (ptrdiff_t)r * s->width;
+    PHI_EACH_ROW {
+        const double *row = PHI_ROW_AT(field);
         for (ptrdiff_t i = 0; i < whole; i += 8)
             for (int l = 0; l < 8; ++l) lanes[l] = fabs(row[i + l]) > lanes[l] ? fabs(row[i + l]) : lanes[l];
         for (ptrdiff_t i = whole; i < s->length; ++i) lanes[0] = fabs(row[i]) > lanes[0] ? fabs(row[i]) : lanes[0];
@@ -206,8 +206,8 @@ static double phi_largest_of(const phi_solver *s, const double *field)
 static int phi_differ_by(const phi_solver *s, const double *one, const double *other, double most)
 {
     int near = 1;
-    for (size_t r = 0; r < s->rows; ++r) {
-        const double *first = one + (ptrdiff_t)r * s->width, *second = other + (ptrdiff_t)r * s->width;
+    PHI_EACH_ROW {
+        const double *first = PHI_ROW_AT(one), *second = PHI_ROW_AT(other);
         for (ptrdiff_t i = 0; i < s->length; ++i) near &= fabs(first[i] - second[i]) <= most;
     }
     return near;
@@ -245,7 +245,7 @@ static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t
         for (int f = PHI_DIM - 1; f >= 0; --f)
             if (kept != NULL && phi_keeps[phi_part_of(s, sweep)][f]) {
                 kept -= g->block;
-                x[f] = kept + PHI_LEAD;
+                x[f] = PHI_FIRST_SITE(kept);
             }
         phi_sweep_back(s, g, sweep, flow.coef, row, x, bar);
     }
@@ -269,7 +269,7 @@ static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, i
         for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)
             for (int f = 0; f < PHI_DIM; ++f) {
                 if (!phi_keeps[phi_part_of(s, sweep)][f]) continue;
-                if (!seen[f]) g->x[f] = left + PHI_LEAD;
+                if (!seen[f]) g->x[f] = PHI_FIRST_SITE(left);
                 seen[f] = 1;
                 left += g->block;
             }
@@ -286,7 +286,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
         if (PHI_FLOWS > 1) {
             phi_flow last;
             phi_find_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last);
-            phi_sweep_part(s, last.part, last.coef, g->far); /* to be undone */
+            phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* to be undone */
             phi_go_all_back(s, &last, 1);
             last.go = 2;
             phi_go_all_back(s, &last, phi_hands[last.part - 1]);
@@ -300,8 +300,8 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
         for (size_t unit = first; unit < end; ++unit) {
             const phi_row row = phi_piece_of(s, unit);
             for (int f = 0; f < PHI_DIM; ++f) {
-                const double *restrict from = g->row_bar[f] + row.at[0];
-                double *restrict to = g->bar[f] + row.at[0];
+                const double *restrict from = PHI_HERE(g->row_bar[f]);
+                double *restrict to = PHI_HERE(g->bar[f]);
                 for (ptrdiff_t i = row.from; i < row.to; ++i) to[i] += from[i];
             }
         }

@@ -17,7 +17,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 {
     for (size_t f = 0; f < PHI_DIM; ++f) {
         phi_put(s, g->row_bar[f], row_bar + f * s->sites);
-        for (size_t i = 0; i < g->block; ++i) (g->bar[f] - PHI_LEAD)[i] += (g->row_bar[f] - PHI_LEAD)[i];
+        for (size_t i = 0; i < g->block; ++i) (PHI_MEMORY_OF(g->bar[f]))[i] += (PHI_MEMORY_OF(g->row_bar[f]))[i];
     }
     (void)steps;
 }
@@ -30,22 +30,22 @@ static phi_status phi_stage_back(phi_solver *s, phi_transpose *g, double *kept P
     memcpy(side, g->bar, sizeof side);
     memcpy(side, g->row_bar, sizeof *side * PHI_DIM);
     for (size_t f = 0; f < PHI_DIM; ++f) {
-        s->y[2][f] = kept + f * g->block + PHI_LEAD;
+        s->y[2][f] = PHI_FIRST_SITE(kept + f * g->block);
 #if PHI_STARTS
         s->x[f] = s->y[2][f] + PHI_DIM * g->block;
 #endif
-        memset(side[f] - PHI_LEAD, 0, g->block * sizeof **side);
+        memset(PHI_MEMORY_OF(side[f]), 0, g->block * sizeof **side);
     }
     phi_pull(s, PHI_ADVANCE_BACK, coef, g->bar, side, side);
     int now = 0;
     s->side = side;
     phi_predict(s, side PHI_AND_GUESS);
-    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, 1, 0.0, &now);
+    phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FAR(1), 0.0, &now);
     if (status != PHI_OK) {
         s->stiff = 1;
         now = 0;
         phi_predict(s, side PHI_AND_GUESS);
-        status = phi_middle(s, coef, 1, HUGE_VAL, &now);
+        status = phi_middle(s, coef PHI_AND_FAR(1), HUGE_VAL, &now);
     }
     s->side = NULL;
     if (status != PHI_OK) return PHI_SINGULAR;

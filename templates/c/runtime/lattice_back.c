@@ -33,9 +33,9 @@ static void phi_keep_units(const phi_solver *s, const double *from, double *to, 
 {
 #if PHI_ONE_ROW
     const ptrdiff_t begin = (ptrdiff_t)first * PHI_PIECE, stop = end == phi_units(s) ? s->length : (ptrdiff_t)end * PHI_PIECE;
-    if (first < end) memcpy(to + PHI_LEAD + begin, from + PHI_LEAD + begin, (size_t)(stop - begin) * sizeof *to);
+    if (first < end) memcpy(PHI_FIRST_SITE(to) + begin, PHI_FIRST_SITE(from) + begin, (size_t)(stop - begin) * sizeof *to);
 #if PHI_HALO
-    if (first < end) phi_ends(to + PHI_LEAD, s->length, begin, stop);
+    if (first < end) phi_ends(PHI_FIRST_SITE(to), s->length, begin, stop);
 #endif
 #else
     const size_t begin = first * (size_t)s->width, stop = end * (size_t)s->width;
@@ -54,7 +54,7 @@ static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_
         at[k] = s->lines[index * PHI_LINES + (size_t)k];
         for (int a = 0; a < PHI_AXES - 1; ++a) {
             const ptrdiff_t p = place[a] + phi_lines[k][a];
-            if (phi_open[a] && (p < 0 || p >= (ptrdiff_t)s->sizes[a])) at[k] = (ptrdiff_t)s->rows * s->width;
+            if (phi_open[a] && (p < 0 || p >= (ptrdiff_t)s->sizes[a])) at[k] = PHI_BEYOND;
         }
     }
 }
@@ -70,11 +70,11 @@ static void phi_pull_rows(const phi_solver *s, int kernel, const double *coef, d
     for (size_t unit = first; unit < end && from != to; ++unit) {
         const phi_row row = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_DIM; ++k) {
-            double *sum = to[k] + row.at[0];
-            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][row.at[0] + i];
+            double *sum = PHI_HERE(to[k]);
+            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][PHI_SITE(i)];
         }
     }
-    phi_back_rows(s, kernel, coef, s->wide, v, to, s->shares + (coef - s->coef), first, end);
+    phi_back_rows(s, kernel, coef PHI_AND_FAR(s->wide), v, to, s->shares + (coef - s->coef), first, end);
 #if PHI_HANDS
     if (!phi_hands[kernel - 1]) return;
     phi_wait();

@@ -84,7 +84,7 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
     const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1;
     const ptrdiff_t reach = sites < apart ? sites / 2 : PHI_REACH;
     for (int k = 0; k < PHI_DIM; ++k) {
-        for (ptrdiff_t i = -PHI_HALO; i < sites + PHI_HALO; ++i) s->v[k][i] = 0.0;
+        for (ptrdiff_t i = PHI_LEAST_COPY; i < PHI_AND_COPIES(sites); ++i) s->v[k][i] = 0.0;
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
         phi_ends(s->v[k], sites, 0, sites);
     }

@@ -45,7 +45,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #if PHI_NOISE
     for (size_t unit = 0; drawing && unit < units; ++unit) phi_draw_piece(s, s->steps, number > 0, unit);
 #endif
-    phi_sweep_rows(s, part, coef, far, 0, units);
+    phi_sweep_rows(s, part, coef PHI_AND_FAR(far), 0, units);
     s->from = 0;
     s->to = s->length;
 #if PHI_HALO
@@ -55,7 +55,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #if PHI_NOISE
     for (size_t unit = from * units; drawing && unit < to * units; ++unit) phi_draw_piece(s, s->steps, number > 0, unit);
 #endif
-    phi_sweep_rows(s, part, coef, far, from * units, to * units);
+    phi_sweep_rows(s, part, coef PHI_AND_FAR(far), from * units, to * units);
 #endif
     return PHI_OK;
 }
@@ -74,7 +74,7 @@ phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to,
     for (size_t plane = from; plane < to; ++plane) {
         size_t rows, length;
         const double *at = phi_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length) memcpy(x, at + (ptrdiff_t)r * s->width, length * sizeof *x);
+        for (size_t r = 0; r < rows; ++r, x += length) memcpy(x, PHI_ROW_AT(at), length * sizeof *x);
     }
     return PHI_OK;
 }
@@ -87,7 +87,7 @@ phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, c
         size_t rows, length;
         double *at = phi_plane(s, field, plane, &rows, &length);
         for (size_t r = 0; r < rows; ++r, x += length) {
-            memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
+            memcpy(PHI_ROW_AT(at), x, length * sizeof *x);
 #if !PHI_ONE_ROW
 #if PHI_HALO
             phi_ends(at + (ptrdiff_t)r * s->width, s->length, 0, s->length);

@@ -8,10 +8,10 @@
 /* ---- The flows ---- */
 #if PHI_BY_COLOUR
 /* One part of H, of one colour. */
-static void phi_sweep_colour(const phi_solver *s, int part, const double *coef, int far)
+static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #else
 /* One part of H. */
-static void phi_sweep_part(const phi_solver *s, int part, const double *coef, int far)
+static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #endif
 {
 #if PHI_SHARED
@@ -23,7 +23,7 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
         phi_tangent_rows(s, part, coef, v, first, end);
     }
 #endif
-    phi_sweep_rows(s, part, coef, far, first, end);
+    phi_sweep_rows(s, part, coef PHI_AND_FAR(far), first, end);
     phi_wait();
 #else
     const size_t units = phi_units(s);
@@ -34,24 +34,24 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef, in
 #pragma omp parallel for if (s->sites > 4096)
 #endif
 #endif
-    for (size_t unit = 0; unit < units; ++unit) phi_sweep_piece(s, part, coef, far, unit);
+    for (size_t unit = 0; unit < units; ++unit) phi_sweep_piece(s, part, coef PHI_AND_FAR(far), unit);
 #endif
 }
 
 #if PHI_BY_COLOUR
 /* The first flow, those between it and the last, the last, or those between, backwards. */
-static void phi_sweep_part(const phi_solver *s, int kind, const double *coef, int far)
+static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FAR)
 {
 #if PHI_TIMED
     const int last = s->flows; /* the time advances after all of them */
 #else
     const int last = s->flows - 1;
 #endif
-    if (kind == 0 || kind == 2) phi_sweep_colour(s, kind == 0 ? 0 : last, coef, far);
+    if (kind == 0 || kind == 2) phi_sweep_colour(s, kind == 0 ? 0 : last, coef PHI_AND_FAR(far));
     if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) phi_sweep_colour(s, flow, coef, far);
+        for (int flow = 1; flow < last; ++flow) phi_sweep_colour(s, flow, coef PHI_AND_FAR(far));
     if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) phi_sweep_colour(s, flow, coef, far);
+        for (int flow = last - 1; flow > 0; --flow) phi_sweep_colour(s, flow, coef PHI_AND_FAR(far));
 }
 
 #endif
@@ -92,7 +92,7 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 {
     phi_flow flow;
     phi_find_flow(s, steps, number, &flow);
-    phi_sweep_part(s, flow.part, flow.coef, s->far > 0);
+    phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(s->far > 0));
 }
 
 #elif PHI_NOISE
@@ -106,7 +106,7 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
     const double *coef = s->coef + phi_flow_rows[number] * PHI_ROW;
     (void)steps;
 #endif
-    phi_sweep_part(s, phi_flow_parts[number], coef, s->far > 0);
+    phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FAR(s->far > 0));
 }
 
 #else
@@ -121,7 +121,7 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
     const double *coef = s->coef + row * PHI_ROW;
     (void)steps;
 #endif
-    phi_sweep_part(s, phi_flow_parts[joined ? 0 : number], coef, s->far > 0);
+    phi_sweep_part(s, phi_flow_parts[joined ? 0 : number], coef PHI_AND_FAR(s->far > 0));
 }
 
 #endif

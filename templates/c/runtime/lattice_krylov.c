@@ -23,7 +23,7 @@ static double phi_product(const phi_solver *s, double *const *x, double *const *
         const ptrdiff_t whole = row.to - (row.to - row.from) % PHI_WIDTH;
         s->sums[unit] = 0.0;
         for (int k = 0; k < PHI_DIM; ++k) {
-            const double *one = x[k] + row.at[0], *other = y[k] + row.at[0];
+            const double *one = PHI_HERE(x[k]), *other = PHI_HERE(y[k]);
             double lanes[PHI_WIDTH] = { 0.0 };
             for (ptrdiff_t i = row.from; i < whole; i += PHI_WIDTH)
                 for (int l = 0; l < PHI_WIDTH; ++l) lanes[l] += one[i + l] * other[i + l];
@@ -44,8 +44,8 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
     for (size_t unit = 0; unit < units; ++unit) {
         const phi_row row = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_DIM; ++k) {
-            const double *one = x[k] + row.at[0], *other = y[k] + row.at[0];
-            double *sum = to[k] + row.at[0];
+            const double *one = PHI_HERE(x[k]), *other = PHI_HERE(y[k]);
+            double *sum = PHI_HERE(to[k]);
             PHI_EACH_SITE
             for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = a * one[i] + b * other[i];
 #if PHI_HALO
@@ -79,7 +79,7 @@ static void phi_multiply(const phi_solver *s, const double *coef, int now, doubl
     const double by = 0x1p-26 * sqrt((double)(PHI_DIM * s->sites));
     phi_combine(s, s->y[2], 1.0, s->y[now], by, v);
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_relax_piece(s, coef, 1, s->y[2], to, unit);
+    for (size_t unit = 0; unit < units; ++unit) phi_relax_piece(s, coef PHI_AND_FAR(1), s->y[2], to, unit);
     phi_combine(s, to, 1.0 / by, s->y[1 - now], -1.0 / by, to);
     phi_combine(s, to, 1.0, v, 1.0, to);
 }
@@ -121,9 +121,9 @@ static void phi_invert_blocks(const phi_solver *s, const double *coef, int now)
         for (ptrdiff_t i = row.from; i < row.to; ++i) {
             double b[PHI_DIM][PHI_DIM];
             for (int k = 0; k < PHI_DIM * PHI_DIM; ++k)
-                b[k / PHI_DIM][k % PHI_DIM] = (k % (PHI_DIM + 1) == 0) - s->block[k][row.at[0] + i];
+                b[k / PHI_DIM][k % PHI_DIM] = (k % (PHI_DIM + 1) == 0) - s->block[k][PHI_SITE(i)];
             phi_invert_block(b);
-            for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) s->block[k][row.at[0] + i] = b[k / PHI_DIM][k % PHI_DIM];
+            for (int k = 0; k < PHI_DIM * PHI_DIM; ++k) s->block[k][PHI_SITE(i)] = b[k / PHI_DIM][k % PHI_DIM];
         }
     }
 }
@@ -136,15 +136,15 @@ static void phi_apply_blocks(const phi_solver *s, double *const *v, double *cons
     for (size_t unit = 0; unit < units; ++unit) {
         const phi_row row = phi_piece_of(s, unit);
         for (int k = 0; k < PHI_DIM; ++k) {
-            double *sum = to[k] + row.at[0];
-            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][row.at[0] + i];
+            double *sum = PHI_HERE(to[k]);
+            for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = from == NULL ? 0.0 : from[k][PHI_SITE(i)];
             for (int l = 0; l < PHI_DIM; ++l) {
 #if PHI_ADJOINT
                 const int entry = s->side != NULL ? l * PHI_DIM + k : k * PHI_DIM + l;
 #else
                 const int entry = k * PHI_DIM + l;
 #endif
-                const double *one = v[l] + row.at[0], *by = s->block[entry] + row.at[0];
+                const double *one = PHI_HERE(v[l]), *by = PHI_HERE(s->block[entry]);
                 PHI_EACH_SITE
                 for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] += by[i] * one[i];
             }

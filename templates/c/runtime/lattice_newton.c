@@ -21,9 +21,9 @@
 static double phi_distance(const phi_solver *s, int side, double added)
 {
     double sum = 0.0;
-    for (size_t r = 0; r < s->rows; ++r)
+    PHI_EACH_ROW
         for (int k = 0; k < PHI_DIM; ++k) {
-            const double *y = s->y[side][k] + (ptrdiff_t)r * s->width, *x = s->x[k] + (ptrdiff_t)r * s->width;
+            const double *y = PHI_ROW_AT(s->y[side][k]), *x = PHI_ROW_AT(s->x[k]);
             for (ptrdiff_t i = 0; i < s->length; ++i) sum += fabs(y[i] - x[i]) + added * fabs(x[i]);
         }
     return sum;
@@ -36,24 +36,24 @@ static double phi_corrected(phi_solver *s, const double *coef, int now)
 #if PHI_BANDED
     if (s->factored != coef && !phi_factorise(s, coef, now)) return HUGE_VAL;
     s->factored = coef;
-    if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    if (!isfinite(phi_relaxed(s, coef PHI_AND_FAR(1), now))) return HUGE_VAL;
     phi_eliminate(s, now);
 #else
-    if (!isfinite(phi_relaxed(s, coef, 1, now))) return HUGE_VAL;
+    if (!isfinite(phi_relaxed(s, coef PHI_AND_FAR(1), now))) return HUGE_VAL;
     phi_combine(s, s->space[0], 1.0, s->y[now], -1.0, s->y[1 - now]);
 #if PHI_SITE_BLOCKS
     phi_invert_blocks(s, coef, now);
 #endif
     if (!isfinite(phi_krylov(s, coef, now, s->y[now], s->y[1 - now]))) return HUGE_VAL;
 #endif
-    return phi_relaxed(s, NULL, 1, now);
+    return phi_relaxed(s, NULL PHI_AND_FAR(1), now);
 }
 
 /* How far from x a solution is one of the motion. */
 static double phi_range(phi_solver *s, const double *coef)
 {
     phi_copy(s->y[0], s->x, s);
-    phi_relaxed(s, coef, 1, 0);
+    phi_relaxed(s, coef PHI_AND_FAR(1), 0);
     return PHI_PLAUSIBLE * phi_distance(s, 1, 1.0);
 }
 
@@ -64,11 +64,11 @@ enum { PHI_PATIENCE = 10 };   /* ... after so many sweeps */
 
 /* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where these have failed, by
    corrections, and then no farther from x than in that range. It is in s->y[*now]. */
-static phi_status phi_middle(phi_solver *s, const double *coef, int far, double range, int *now)
+static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, double range, int *now)
 {
     double before = 0.0;
     for (int count = 0; count < PHI_MOST_SWEEPS; ++count) {
-        const double change = s->stiff ? phi_corrected(s, coef, *now) : phi_relaxed(s, coef, far, *now);
+        const double change = s->stiff ? phi_corrected(s, coef, *now) : phi_relaxed(s, coef PHI_AND_FAR(far), *now);
         const double shrunk = before - change;
         const phi_status failed = count == 0 && !s->stiff ? PHI_NOT_FINITE : PHI_NO_CONVERGENCE;
         ++s->sweeps;

@@ -34,8 +34,8 @@ static void phi_draw_piece(const phi_solver *s, size_t steps, int part, size_t u
     const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h);
     const phi_row row = phi_piece_of(s, unit);
     for (int k = 0; k < PHI_SOURCES; k += 2) {
-        double *one = s->x[PHI_DRAWN + k] + row.at[0];
-        double *other = s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)] + row.at[0];
+        double *one = PHI_HERE(s->x[PHI_DRAWN + k]);
+        double *other = PHI_HERE(s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)]);
         for (ptrdiff_t i = row.from; i < row.to; ++i) {
 #if PHI_BY_HAND || !PHI_ONE_ROW
             const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
@@ -51,7 +51,7 @@ static void phi_draw_piece(const phi_solver *s, size_t steps, int part, size_t u
         }
     }
 #if PHI_HALO
-    for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(s->x[PHI_DRAWN + k] + row.at[0], s->length, row.from, row.to);
+    for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(PHI_HERE(s->x[PHI_DRAWN + k]), s->length, row.from, row.to);
 #endif
 }
 

@@ -21,7 +21,7 @@ static void phi_measure(const phi_solver *s, int now, size_t unit, double *chang
     const phi_row row = phi_piece_of(s, unit);
     const ptrdiff_t whole = row.to - (row.to - row.from) % PHI_WIDTH;
     for (int k = 0; k < PHI_DIM; ++k) {
-        const double *restrict before = s->y[now][k] + row.at[0], *restrict after = s->y[1 - now][k] + row.at[0];
+        const double *restrict before = PHI_HERE(s->y[now][k]), *restrict after = PHI_HERE(s->y[1 - now][k]);
         double changes[PHI_WIDTH] = { 0.0 }, sizes[PHI_WIDTH] = { 0.0 };
         for (ptrdiff_t i = row.from; i < whole; i += PHI_WIDTH)
             for (int l = 0; l < PHI_WIDTH; ++l) {
@@ -60,7 +60,7 @@ static void phi_pull(const phi_solver *s, int kernel, const double *coef, double
 #else
 /* How far y moves from s->y[now] to the other, by a sweep, or without coefficients as it is. Not finite if y is not. */
 #endif
-static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
+static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int now)
 {
     const size_t units = phi_units(s);
     double change[PHI_DIM] = { 0.0 }, size[PHI_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
@@ -72,7 +72,7 @@ static double phi_relaxed(phi_solver *s, const double *coef, int far, int now)
 #endif
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) phi_relax_piece(s, coef, far, s->y[now], s->y[1 - now], unit);
+        if (coef != NULL) phi_relax_piece(s, coef PHI_AND_FAR(far), s->y[now], s->y[1 - now], unit);
         phi_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
@@ -95,7 +95,7 @@ static void phi_predict(const phi_solver *s, double *const *x PHI_AND_INT_STAGE)
     PHI_EACH_PIECE
     for (size_t row = 0; row < s->rows; ++row)
         for (int k = 0; k < PHI_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)row * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+            const ptrdiff_t first = PHI_FIRST_COPY((ptrdiff_t)row * s->width), end = first + PHI_WITH_COPIES(s->length);
             for (ptrdiff_t i = first; i < end; ++i) s->y[0][k][i] = x[k][i];
             for (int d = 0; d < PHI_OF(s->guess, stage).order; ++d) {
                 const double *difference = PHI_OF(s->guess, stage).difference[d][k];
@@ -113,7 +113,7 @@ static void phi_remember(phi_solver *s, double *const *from PHI_AND_INT_STAGE, i
     for (size_t row = 0; row < s->rows; ++row) {
         double own[PHI_DIFFERENCES] = { 0.0 };
         for (int k = 0; k < PHI_DIM; ++k) {
-            const ptrdiff_t first = (ptrdiff_t)row * s->width - PHI_HALO, end = first + s->length + 2 * PHI_HALO;
+            const ptrdiff_t first = PHI_FIRST_COPY((ptrdiff_t)row * s->width), end = first + PHI_WITH_COPIES(s->length);
             const double *restrict y = s->y[now][k], *restrict x = from[k];
             for (ptrdiff_t i = first; i < end; ++i) {
                 double next = y[i] - x[i];
@@ -164,13 +164,13 @@ static double *phi_keep_stage(const phi_solver *s, int now, double *to)
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit)
         for (size_t k = 0; k < PHI_KEPT * PHI_DIM; ++k)
-            phi_keep_units(s, kept[k / PHI_DIM][k % PHI_DIM] - PHI_LEAD, to + k * block, unit, unit + 1);
+            phi_keep_units(s, PHI_MEMORY_OF(kept[k / PHI_DIM][k % PHI_DIM]), to + k * block, unit, unit + 1);
     return to + PHI_KEPT * PHI_DIM * block;
 }
 
 #endif
 /* The stages of a step. */
-static phi_status phi_stages(phi_solver *s, int far)
+static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 {
     const size_t units = phi_units(s);
 #if PHI_ADJOINT
@@ -194,13 +194,17 @@ static phi_status phi_stages(phi_solver *s, int far)
 #endif
         int now = 0;
         phi_predict(s, s->x PHI_AND_GUESS);
-        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef, far, 0.0, &now);
+        phi_status status = s->stiff ? PHI_NO_CONVERGENCE : phi_middle(s, coef PHI_AND_FAR(far), 0.0, &now);
+#if PHI_NEAR
         if (status != PHI_OK && (far || status != PHI_NOT_FINITE)) {
+#else
+        if (status != PHI_OK) {
+#endif
             s->stiff = 1;
             now = 0;
             const double range = phi_range(s, coef);
             phi_predict(s, s->x PHI_AND_GUESS);
-            status = phi_middle(s, coef, far, range, &now);
+            status = phi_middle(s, coef PHI_AND_FAR(far), range, &now);
         }
 #if PHI_TANGENT
         for (size_t k = 0; k < s->vectors && status == PHI_OK; ++k) status = phi_vary(s, coef, now, k);
@@ -213,7 +217,7 @@ static phi_status phi_stages(phi_solver *s, int far)
         phi_remember(s, s->x PHI_AND_STAGE, now);
 #endif
         PHI_EACH_PIECE
-        for (size_t unit = 0; unit < units; ++unit) phi_increment_piece(s, coef, far, s->y[now], s->x, unit);
+        for (size_t unit = 0; unit < units; ++unit) phi_increment_piece(s, coef PHI_AND_FAR(far), s->y[now], s->x, unit);
     }
     return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }
@@ -227,7 +231,7 @@ static phi_status phi_try(phi_solver *s)
     phi_copy(s->x, s->before, s);
     phi_forget(s);
 #endif
-    const phi_status status = phi_stages(s, 1);
+    const phi_status status = phi_stages(s PHI_AND_FAR(1));
     if (status == PHI_OK) return status;
     phi_copy(s->x, s->before, s);
     phi_forget(s);

@@ -8,13 +8,13 @@
 /* ---- Tangent vectors ---- */
 size_t phi_tangent_size(const phi_solver *s, size_t count)
 {
-    const size_t block = PHI_DIM * s->rows * (size_t)s->width;
+    const size_t block = PHI_DIM * PHI_DOUBLES;
     return count > SIZE_MAX / 16 / block - 2 ? 0 : (count + 2) * block * sizeof(double) + 64;
 }
 
 #if PHI_SERIES
 /* A step that carries tangent vectors along. */
-static phi_status phi_carry(phi_solver *s) { return phi_stages(s, 1); }
+static phi_status phi_carry(phi_solver *s) { return phi_stages(s PHI_AND_FAR(1)); }
 #else
 /* A step that carries tangent vectors along, by functions for arguments of any size. */
 static phi_status phi_carry(phi_solver *s)
@@ -35,7 +35,7 @@ phi_status phi_integrate_tangent(phi_solver *s, double h, size_t steps, size_t c
 {
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || v == NULL || work == NULL || !phi_finite(v, count * PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
-    s->tangents = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + PHI_LEAD;
+    s->tangents = PHI_FIRST_SITE((double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64));
     double *fields[PHI_DIM];
     for (size_t k = 0; k < count; ++k) {
         phi_vector(s, k, fields);

@@ -140,10 +140,10 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
         if ((room - g->longest * of_step) / of_state < steps / g->longest + 1) g->longest = fit > 2 ? fit / 2 : 1;
     }
     g->most = (room - g->longest * of_step) / of_state;
-    for (int f = 0; f < PHI_ARRAYS; ++f, next += block) g->bar[f] = g->row_bar[f] = next + PHI_LEAD;
-    for (int f = 0; f < PHI_DIM; ++f, next += block) g->row_bar[f] = next + PHI_LEAD;
-    for (int f = 0; f < PHI_DIM; ++f, next += block) g->end[f] = next + PHI_LEAD;
-    for (int k = 0; k < PHI_HANDED; ++k, next += block + (size_t)s->width) g->handed[k] = next + PHI_LEAD;
+    for (int f = 0; f < PHI_ARRAYS; ++f, next += block) g->bar[f] = g->row_bar[f] = PHI_FIRST_SITE(next);
+    for (int f = 0; f < PHI_DIM; ++f, next += block) g->row_bar[f] = PHI_FIRST_SITE(next);
+    for (int f = 0; f < PHI_DIM; ++f, next += block) g->end[f] = PHI_FIRST_SITE(next);
+    for (int k = 0; k < PHI_HANDED; ++k, next += block + (size_t)s->width) g->handed[k] = PHI_FIRST_SITE(next);
 #if PHI_BOND_PARAMETERS
     for (int k = PHI_ARRAYS; k < PHI_BARS; ++k, next += phi_at_bonds(s)) g->bar[k] = g->row_bar[k] = next;
 #endif
@@ -171,7 +171,7 @@ static int phi_is_stopped(const phi_solver *s, phi_transpose *g, size_t steps)
 /* The fields of the state that a segment begins with. */
 static void phi_fields_of_state(const phi_transpose *g, size_t number, double *fields[PHI_DIM])
 {
-    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = g->states + (number * PHI_DIM + f) * g->block + PHI_LEAD;
+    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->states + (number * PHI_DIM + f) * g->block);
 }
 
 /* Another segment begins here, after so many steps. */

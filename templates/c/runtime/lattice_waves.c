@@ -28,7 +28,7 @@ static size_t phi_slices(const phi_solver *s, size_t *units)
 static size_t phi_depth(const phi_solver *s, size_t arrays)
 {
     size_t units;
-    const size_t slices = phi_slices(s, &units), bytes = s->rows * (size_t)s->width * arrays * sizeof(double);
+    const size_t slices = phi_slices(s, &units), bytes = PHI_DOUBLES * arrays * sizeof(double);
     const size_t held = PHI_CACHE / (bytes / slices) / PHI_SPAN, room = slices / PHI_THREADS / (2 * PHI_SPAN);
     const size_t depth = held < room ? held : room;
 #if PHI_TANGENT
@@ -44,9 +44,9 @@ static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t fr
     (void)phi_slices(s, &units);
 #if PHI_UNDONE
     if (flow->go > 0) phi_go_back(s, flow, from * units, to * units);
-    else phi_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+    else phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from * units, to * units);
 #else
-    phi_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+    phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from * units, to * units);
 #endif
 }
 
@@ -78,7 +78,7 @@ static void phi_make_waves(const phi_solver *s, size_t steps)
             phi_find_flow(s, s->steps + done / each, joined ? PHI_FLOWS : number, flows + count);
         }
         if (count > 1) phi_make_wave(s, flows, count);
-        else phi_sweep_part(s, flows->part, flows->coef, s->far > 0);
+        else phi_sweep_part(s, flows->part, flows->coef PHI_AND_FAR(s->far > 0));
     }
 }
 #endif

@@ -8,6 +8,7 @@
 #define PHI_DIM 2
 #define PHI_CASIMIRS 0
 
+#define PHI_HALO 1
 #define PHI_OPEN 1
 #define PHI_OPEN_ROWS 1
 #define PHI_COLOURS 0

@@ -7,7 +7,6 @@
 const phi_params phi_default_params = { 1.5 };
 
 /* Strang's splitting: half a drift, a kick, half a drift; and two halves together. */
-#define PHI_HALO 1
 enum { PHI_LEAD = 8, PHI_RESERVED = PHI_ARRAYS + PHI_DIM };
 enum { PHI_LINES = 3, PHI_ROW = 1, PHI_FLOWS = 3, PHI_JOINED = 2, PHI_ROWS_OF_FLOWS = 3, PHI_WEIGHTS = 2 };
 

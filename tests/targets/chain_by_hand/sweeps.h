@@ -10,9 +10,8 @@ static double phi_force(double g, const phi_row *row, ptrdiff_t i)
     return -g * sin(q[i]) + (before[i] - q[i]) + (after[i] - q[i]) + right * (q[i + 1] - q[i]) + left * (q[i - 1] - q[i]);
 }
 
-static void phi_sweep_piece(const phi_solver *s, int part, const double *coef, int far, size_t unit)
+static void phi_sweep_piece(const phi_solver *s, int part, const double *coef, size_t unit)
 {
-    (void)far;
     const phi_row row = phi_piece_of(s, unit);
     double *q = s->x[0] + row.at[0], *p = s->x[1] + row.at[0];
     for (ptrdiff_t i = row.from; i < row.to; ++i)
