@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: f0149833cca04a523e660dd0396a832887161b2888b35e10c217ea3153e6eed9
+ * body-sha256: 8de4172f119c0f7b1de3a39e1ee3bedfa927d8fd02c6b9ea968be60449aa9ac9
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -743,13 +743,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } dzhanibekov_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static dzhanibekov_status dzhanibekov_begin_member(const dzhanibekov_members *all, size_t m,
     const double x[dzhanibekov_DIM], const double *gauge, dzhanibekov_solver *s)
 {
     const dzhanibekov_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const dzhanibekov_status status = dzhanibekov_init_gauge(s, params, x, gauge);
-    /* no step yet, but all for one */
     return status == dzhanibekov_OK ? dzhanibekov_integrate(s, all->h[m * all->own], 0) : status;
 }
 

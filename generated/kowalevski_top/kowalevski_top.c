@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 60983d883791de4fe6ca222cda4c49a840ec4cad1b62cb941f31fbab71c9515a
+ * body-sha256: 7ca954780e9a7a4fc951673b56255a687e060ecb934d9e26e1d3024d5f44ab7e
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -1412,7 +1412,7 @@ static kowalevski_top_status kowalevski_top_stage(kowalevski_top_solver *s)
     return kowalevski_top_attempt(s);
 }
 
-/* Steps one by one; s->attitude is left to kowalevski_top_read_attitude. */
+/* Steps one by one. */
 static kowalevski_top_status kowalevski_top_single_steps(kowalevski_top_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return kowalevski_top_BAD_ARGUMENT;
@@ -3086,7 +3086,7 @@ static kowalevski_top_status kowalevski_top_single(kowalevski_top_solver *s)
 kowalevski_top_status kowalevski_top_integrate(kowalevski_top_solver *s, double h, size_t steps)
 {
     kowalevski_top_table table;
-    kowalevski_top_status status = kowalevski_top_single_steps(s, h, 0); /* what depends on h */
+    kowalevski_top_status status = kowalevski_top_single_steps(s, h, 0); /* makes all that depends on h */
     table.fits = -1;
     while (status == kowalevski_top_OK && steps > 0) {
         if (steps >= kowalevski_top_LANES && s->blocks.single_steps == 0)
@@ -3119,13 +3119,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } kowalevski_top_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static kowalevski_top_status kowalevski_top_begin_member(const kowalevski_top_members *all, size_t m,
     const double x[kowalevski_top_DIM], kowalevski_top_solver *s)
 {
     const kowalevski_top_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const kowalevski_top_status status = kowalevski_top_init(s, params, x);
-    /* no step yet, but all for one */
     return status == kowalevski_top_OK ? kowalevski_top_integrate(s, all->h[m * all->own], 0) : status;
 }
 

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: a807b8f2cdc41c45507fc61cc39e2e1a0767e75b6c446d01c37c6763a5b7a768
+ * body-sha256: 276e67d238e558f78aafd339757eb331aad96903133cab79ed1c41888541a9c6
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -517,7 +517,7 @@ static lotka_volterra_status lotka_volterra_stage(lotka_volterra_solver *s)
     return lotka_volterra_attempt(s);
 }
 
-/* Steps one by one; s->attitude is left to lotka_volterra_read_attitude. */
+/* Steps one by one. */
 static lotka_volterra_status lotka_volterra_single_steps(lotka_volterra_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return lotka_volterra_BAD_ARGUMENT;
@@ -1200,7 +1200,7 @@ static lotka_volterra_status lotka_volterra_single(lotka_volterra_solver *s)
 lotka_volterra_status lotka_volterra_integrate(lotka_volterra_solver *s, double h, size_t steps)
 {
     lotka_volterra_table table;
-    lotka_volterra_status status = lotka_volterra_single_steps(s, h, 0); /* what depends on h */
+    lotka_volterra_status status = lotka_volterra_single_steps(s, h, 0); /* makes all that depends on h */
     table.fits = -1;
     while (status == lotka_volterra_OK && steps > 0) {
         if (steps >= lotka_volterra_LANES && s->blocks.single_steps == 0)
@@ -1233,13 +1233,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } lotka_volterra_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static lotka_volterra_status lotka_volterra_begin_member(const lotka_volterra_members *all, size_t m,
     const double x[lotka_volterra_DIM], lotka_volterra_solver *s)
 {
     const lotka_volterra_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const lotka_volterra_status status = lotka_volterra_init(s, params, x);
-    /* no step yet, but all for one */
     return status == lotka_volterra_OK ? lotka_volterra_integrate(s, all->h[m * all->own], 0) : status;
 }
 

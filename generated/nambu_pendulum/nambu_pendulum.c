@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 8e089f952f500a28a0ca4112db8dd69cdcc02b1f461810dc5856a06ac95a5d84
+ * body-sha256: e56265c1a5d7d38c4e593b1395cc7c148e68742f9eae2094105ae613d413471f
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -685,7 +685,7 @@ static nambu_pendulum_status nambu_pendulum_stage(nambu_pendulum_solver *s)
     return nambu_pendulum_attempt(s);
 }
 
-/* Steps one by one; s->attitude is left to nambu_pendulum_read_attitude. */
+/* Steps one by one. */
 static nambu_pendulum_status nambu_pendulum_single_steps(nambu_pendulum_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return nambu_pendulum_BAD_ARGUMENT;
@@ -1947,7 +1947,7 @@ static nambu_pendulum_status nambu_pendulum_single(nambu_pendulum_solver *s)
 nambu_pendulum_status nambu_pendulum_integrate(nambu_pendulum_solver *s, double h, size_t steps)
 {
     nambu_pendulum_table table;
-    nambu_pendulum_status status = nambu_pendulum_single_steps(s, h, 0); /* what depends on h */
+    nambu_pendulum_status status = nambu_pendulum_single_steps(s, h, 0); /* makes all that depends on h */
     table.fits = -1;
     while (status == nambu_pendulum_OK && steps > 0) {
         if (steps >= nambu_pendulum_LANES && s->blocks.single_steps == 0)
@@ -1980,13 +1980,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } nambu_pendulum_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static nambu_pendulum_status nambu_pendulum_begin_member(const nambu_pendulum_members *all, size_t m,
     const double x[nambu_pendulum_DIM], nambu_pendulum_solver *s)
 {
     const nambu_pendulum_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const nambu_pendulum_status status = nambu_pendulum_init(s, params, x);
-    /* no step yet, but all for one */
     return status == nambu_pendulum_OK ? nambu_pendulum_integrate(s, all->h[m * all->own], 0) : status;
 }
 

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 8a3889cbeaa39d53341bec6b247d14a09d3768cd58bb43ee8c56c595158552e6
+ * body-sha256: 5366a9b950c66d73bb0e03ef5a7df78dd4d1d349bd4766917f2507f4833a6f55
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -860,7 +860,7 @@ static rigid_body_status rigid_body_stage(rigid_body_solver *s)
     return rigid_body_attempt(s);
 }
 
-/* Steps one by one; s->attitude is left to rigid_body_read_attitude. */
+/* Steps one by one. */
 static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h, size_t steps)
 {
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
@@ -1575,7 +1575,7 @@ static rigid_body_status rigid_body_single(rigid_body_solver *s)
 rigid_body_status rigid_body_integrate(rigid_body_solver *s, double h, size_t steps)
 {
     rigid_body_table table;
-    rigid_body_status status = rigid_body_single_steps(s, h, 0); /* what depends on h */
+    rigid_body_status status = rigid_body_single_steps(s, h, 0); /* makes all that depends on h */
     table.fits = -1;
     while (status == rigid_body_OK && steps > 0) {
         if (steps >= rigid_body_LANES && s->blocks.single_steps == 0) rigid_body_choose_guess(s, steps);
@@ -1608,13 +1608,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } rigid_body_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, size_t m,
     const double x[rigid_body_DIM], const double *gauge, rigid_body_solver *s)
 {
     const rigid_body_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const rigid_body_status status = rigid_body_init_gauge(s, params, x, gauge);
-    /* no step yet, but all for one */
     return status == rigid_body_OK ? rigid_body_integrate(s, all->h[m * all->own], 0) : status;
 }
 

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 1efad08547932fdb29675911101ebfeb8bf750d8529c17a828c5f0373a7ac4e9
+ * body-sha256: 63180ef07994d77a76c4ac18c2e5ffb679f939daac749d1f542da5397799c7f7
  */
 #include "satellite.h"
 #include <float.h>
@@ -1287,13 +1287,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } satellite_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static satellite_status satellite_begin_member(const satellite_members *all, size_t m,
     const double x[satellite_DIM], satellite_solver *s)
 {
     const satellite_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const satellite_status status = satellite_init(s, params, x);
-    /* no step yet, but all for one */
     return status == satellite_OK ? satellite_integrate(s, all->h[m * all->own], 0) : status;
 }
 

@@ -9,7 +9,7 @@
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Members of an
  *   ensemble; Ensembles
- * body-sha256: 4de9f66f7b224d8e75daedf33e0226679ef75586dc19c177b73992bd60617434
+ * body-sha256: be8df93b1124b4857c15f3dbed5f0918aeb8d3a87b3d6c41d6c2e9cc972ee4b2
  */
 #include "toda3_quadratic.h"
 #include <float.h>
@@ -824,13 +824,12 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } toda3_quadratic_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static toda3_quadratic_status toda3_quadratic_begin_member(const toda3_quadratic_members *all, size_t m,
     const double x[toda3_quadratic_DIM], toda3_quadratic_solver *s)
 {
     const toda3_quadratic_params *params = all->params != NULL ? all->params + m * all->own : NULL;
     const toda3_quadratic_status status = toda3_quadratic_init(s, params, x);
-    /* no step yet, but all for one */
     return status == toda3_quadratic_OK ? toda3_quadratic_integrate(s, all->h[m * all->own], 0) : status;
 }
 

@@ -270,7 +270,7 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 {
     if (s == NULL || rows_bar == NULL || x0_bar == NULL || trail == NULL || stride == 0) return PHI_BAD_ARGUMENT;
     const phi_solver before = *s;
-    phi_status status = phi_integrate(s, h, 0); /* what depends on h */
+    phi_status status = phi_integrate(s, h, 0); /* makes all that depends on h */
     if (status != PHI_OK) return status;
     phi_kept *kept = (phi_kept *)trail;
     phi_cotangent bar;

@@ -580,7 +580,7 @@ static phi_status phi_single(phi_solver *s)
 phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 {
     phi_table table;
-    phi_status status = phi_single_steps(s, h, 0); /* what depends on h */
+    phi_status status = phi_single_steps(s, h, 0); /* makes all that depends on h */
     PHI_EACH_STAGE PHI_OF(table.fits, stage) = -1;
 #if PHI_COMPOSED && !PHI_PATH
     table.marching = 0;

@@ -37,7 +37,7 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } phi_members;
 
-/* Start a member at a state, with what is its own. */
+/* Start a member at a state, with what is its own, and with all that its step size asks for. */
 #if PHI_GAUGE
 static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM], const double *gauge,
     phi_solver *s)
@@ -53,7 +53,7 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
 #else
     const phi_status status = phi_init(s, params, x);
 #endif
-    return status == PHI_OK ? phi_integrate(s, all->h[m * all->own], 0) : status; /* no step yet, but all for one */
+    return status == PHI_OK ? phi_integrate(s, all->h[m * all->own], 0) : status;
 }
 
 /* The same at the state that the ensemble has for it, which is x then. */

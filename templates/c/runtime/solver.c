@@ -185,7 +185,11 @@ static phi_status phi_stages(phi_solver *s)
 
 #endif
 #if PHI_BLOCKS
+#if PHI_ATTITUDE
 /* Steps one by one; s->attitude is left to phi_read_attitude. */
+#else
+/* Steps one by one. */
+#endif
 static phi_status phi_single_steps(phi_solver *s, double h, size_t steps)
 #elif PHI_NOISE
 phi_status phi_integrate_along(phi_solver *s, double h, size_t steps, const double *dw)
