@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 445f2242b7f25aed73580cae8fff6a8a2564d094711dc96ded7f37a8d70a143c
+ * body-sha256: 94c7652458509a63919e1d2c7f77965e31eb633e64f01b2aee1be35aa97d7e31
  */
 #include "fput.h"
 #include <float.h>
@@ -395,18 +395,13 @@ static void fput_make_flow(const fput_solver *s, size_t steps, int number)
    so far. What a flow reads is what it reads where flows are made one by one: the bits are the same. */
 enum { fput_DEEPEST = 16, fput_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
 
-/* The slices of the lattice, each of so many units: of one row its pieces. */
-static size_t fput_slices(const fput_solver *s, size_t *units)
-{
-    *units = 1;
-    return fput_units(s);
-}
+/* The slices of the lattice, the pieces of its row. */
+static size_t fput_slices(const fput_solver *s) { return fput_units(s); }
 
 /* How many flows over so many arrays are made at once. */
 static size_t fput_depth(const fput_solver *s, size_t arrays)
 {
-    size_t units;
-    const size_t slices = fput_slices(s, &units), bytes = (size_t)s->width * arrays * sizeof(double);
+    const size_t slices = fput_slices(s), bytes = (size_t)s->width * arrays * sizeof(double);
     const size_t held = fput_CACHE / (bytes / slices) / fput_SPAN,
         room = slices / fput_THREADS / (2 * fput_SPAN);
     const size_t depth = held < room ? held : room;
@@ -416,17 +411,14 @@ static size_t fput_depth(const fput_solver *s, size_t arrays)
 
 static void fput_make_slices(const fput_solver *s, const fput_flow *flow, size_t from, size_t to)
 {
-    size_t units;
-    (void)fput_slices(s, &units);
-    fput_sweep_rows(s, flow->part, flow->coef, from * units, to * units);
+    fput_sweep_rows(s, flow->part, flow->coef, from, to);
 }
 
 /* So many flows, one after the other. */
 static void fput_make_wave(const fput_solver *s, const fput_flow *flows, size_t count)
 {
-    size_t units, from;
-    const size_t slices = fput_slices(s, &units), to = fput_share(slices, &from), next = to == slices ? 0
-        : to;
+    size_t from;
+    const size_t slices = fput_slices(s), to = fput_share(slices, &from), next = to == slices ? 0 : to;
     for (size_t front = from; front < to; ++front)
         for (size_t k = 0; k < count && front >= from + 2 * k * fput_SPAN; ++k)
             fput_make_slices(s, flows + k, front - k * fput_SPAN, front - k * fput_SPAN + 1);
@@ -601,9 +593,6 @@ fput_status fput_describe(size_t number, fput_stage *about)
 
 fput_status fput_begin(fput_solver *s, double h) { return fput_set_step(s, h); }
 
-/* The rows of a plane. */
-static size_t fput_rows_of_plane(const fput_solver *s) { return s->rows / (fput_AXES > 1 ? s->sizes[0] : 1); }
-
 fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size_t to)
 {
     if (s == NULL || !s->prepared || number > fput_FLOWS || from > to || to > s->sizes[0])
@@ -612,7 +601,7 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
     const int joined = number == fput_FLOWS, part = fput_flow_parts[joined ? 0 : number];
     const int row = joined ? fput_JOINED : fput_flow_rows[number];
     const double *coef = s->coef + row * fput_ROW;
-    const size_t units = fput_AXES > 1 ? fput_rows_of_plane(s) : fput_units(s);
+    const size_t units = fput_units(s);
     s->open = 0;
     s->from = (ptrdiff_t)from;
     s->to = (ptrdiff_t)to;
@@ -623,22 +612,10 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
     return fput_OK;
 }
 
-/* A plane of a field: the first of its values, and how many rows it has, of so many values. */
-static double *fput_plane(const fput_solver *s, size_t field, size_t plane, size_t *rows, size_t *length)
-{
-    *rows = fput_rows_of_plane(s);
-    *length = fput_AXES > 1 ? (size_t)s->length : 1;
-    return s->x[field] + (fput_AXES > 1 ? (ptrdiff_t)(plane * *rows) * s->width : (ptrdiff_t)plane);
-}
-
 fput_status fput_planes(const fput_solver *s, size_t field, size_t from, size_t to, double *x)
 {
     if (s == NULL || field >= fput_DIM || from > to || to > s->sizes[0]) return fput_BAD_ARGUMENT;
-    for (size_t plane = from; plane < to; ++plane) {
-        size_t rows, length;
-        const double *at = fput_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length) memcpy(x, at, length * sizeof *x);
-    }
+    memcpy(x, s->x[field] + from, (to - from) * sizeof *x);
     return fput_OK;
 }
 
@@ -646,13 +623,7 @@ fput_status fput_put_planes(fput_solver *s, size_t field, size_t from, size_t to
 {
     if (s == NULL || field >= fput_DIM || from > to || to > s->sizes[0]) return fput_BAD_ARGUMENT;
     s->open = 0;
-    for (size_t plane = from; plane < to; ++plane) {
-        size_t rows, length;
-        double *at = fput_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length) {
-            memcpy(at, x, length * sizeof *x);
-        }
-    }
+    memcpy(s->x[field] + from, x, (to - from) * sizeof *x);
     fput_ends(s->x[field], s->length, 0, s->length);
     return fput_OK;
 }

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 1bf00dcaf199d8d0e08782fb6f7e633a56ceb41cddbfcef043cb1be11404c087
+ * body-sha256: 0963fe372f6ed89f14ec3089fc7fb4058cbd9b022db8179d51f76c0e1bde5f1f
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -716,19 +716,13 @@ static void heisenberg_make_flow(const heisenberg_solver *s, size_t steps, int n
    come so far. What a flow reads is what it reads where flows are made one by one: the bits are the same. */
 enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
 
-/* The slices of the lattice, each of so many units: of one row its pieces. */
-static size_t heisenberg_slices(const heisenberg_solver *s, size_t *units)
-{
-    *units = s->rows / s->sizes[0];
-    return s->sizes[0];
-}
+/* The slices of the lattice, each all rows of one place along the first axis. */
+static size_t heisenberg_slices(const heisenberg_solver *s) { return s->sizes[0]; }
 
 /* How many flows over so many arrays are made at once. */
 static size_t heisenberg_depth(const heisenberg_solver *s, size_t arrays)
 {
-    size_t units;
-    const size_t slices = heisenberg_slices(s, &units),
-        bytes = s->rows * (size_t)s->width * arrays * sizeof(double);
+    const size_t slices = heisenberg_slices(s), bytes = s->rows * (size_t)s->width * arrays * sizeof(double);
     const size_t held = heisenberg_CACHE / (bytes / slices) / heisenberg_SPAN,
         room = slices / heisenberg_THREADS / (2 * heisenberg_SPAN);
     const size_t depth = held < room ? held : room;
@@ -739,17 +733,18 @@ static size_t heisenberg_depth(const heisenberg_solver *s, size_t arrays)
 static void heisenberg_make_slices(const heisenberg_solver *s, const heisenberg_flow *flow, size_t from,
     size_t to)
 {
-    size_t units;
-    (void)heisenberg_slices(s, &units);
-    heisenberg_sweep_rows(s, flow->part, flow->coef, s->far > 0, from * units, to * units);
+    const size_t rows = s->rows / s->sizes[0];
+    from *= rows;
+    to *= rows;
+    heisenberg_sweep_rows(s, flow->part, flow->coef, s->far > 0, from, to);
 }
 
 /* So many flows, one after the other. */
 static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_flow *flows, size_t count)
 {
-    size_t units, from;
-    const size_t slices = heisenberg_slices(s, &units), to = heisenberg_share(slices, &from),
-        next = to == slices ? 0 : to;
+    size_t from;
+    const size_t slices = heisenberg_slices(s), to = heisenberg_share(slices, &from), next = to == slices ? 0
+        : to;
     for (size_t front = from; front < to; ++front)
         for (size_t k = 0; k < count && front >= from + 2 * k * heisenberg_SPAN; ++k)
             heisenberg_make_slices(s, flows + k, front - k * heisenberg_SPAN,
@@ -968,10 +963,7 @@ heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about)
 heisenberg_status heisenberg_begin(heisenberg_solver *s, double h) { return heisenberg_set_step(s, h); }
 
 /* The rows of a plane. */
-static size_t heisenberg_rows_of_plane(const heisenberg_solver *s)
-{
-    return s->rows / (heisenberg_AXES > 1 ? s->sizes[0] : 1);
-}
+static size_t heisenberg_rows_of_plane(const heisenberg_solver *s) { return s->rows / s->sizes[0]; }
 
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to)
 {
@@ -980,31 +972,19 @@ heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far,
     const int joined = number == heisenberg_FLOWS, part = heisenberg_flow_parts[joined ? 0 : number];
     const int row = joined ? heisenberg_JOINED : heisenberg_flow_rows[number];
     const double *coef = s->coef + row * heisenberg_ROW;
-    const size_t units = heisenberg_AXES > 1 ? heisenberg_rows_of_plane(s) : heisenberg_units(s);
+    const size_t units = heisenberg_rows_of_plane(s);
     s->open = 0;
     heisenberg_sweep_rows(s, part, coef, far, from * units, to * units);
     return heisenberg_OK;
-}
-
-/* A plane of a field: the first of its values, and how many rows it has, of so many values. */
-static double *heisenberg_plane(const heisenberg_solver *s, size_t field, size_t plane, size_t *rows,
-    size_t *length)
-{
-    *rows = heisenberg_rows_of_plane(s);
-    *length = heisenberg_AXES > 1 ? (size_t)s->length : 1;
-    return s->x[field] + (heisenberg_AXES > 1 ? (ptrdiff_t)(plane * *rows) * s->width : (ptrdiff_t)plane);
 }
 
 heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
     double *x)
 {
     if (s == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0]) return heisenberg_BAD_ARGUMENT;
-    for (size_t plane = from; plane < to; ++plane) {
-        size_t rows, length;
-        const double *at = heisenberg_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length)
-            memcpy(x, at + (ptrdiff_t)r * s->width, length * sizeof *x);
-    }
+    const size_t rows = heisenberg_rows_of_plane(s), length = (size_t)s->length;
+    for (size_t r = from * rows; r < to * rows; ++r, x += length)
+        memcpy(x, s->x[field] + (ptrdiff_t)r * s->width, length * sizeof *x);
     return heisenberg_OK;
 }
 
@@ -1013,13 +993,11 @@ heisenberg_status heisenberg_put_planes(heisenberg_solver *s, size_t field, size
 {
     if (s == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0]) return heisenberg_BAD_ARGUMENT;
     s->open = 0;
-    for (size_t plane = from; plane < to; ++plane) {
-        size_t rows, length;
-        double *at = heisenberg_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length) {
-            memcpy(at + (ptrdiff_t)r * s->width, x, length * sizeof *x);
-            heisenberg_ends(at + (ptrdiff_t)r * s->width, s->length, 0, s->length);
-        }
+    const size_t rows = heisenberg_rows_of_plane(s), length = (size_t)s->length;
+    for (size_t r = from * rows; r < to * rows; ++r, x += length) {
+        double *row = s->x[field] + (ptrdiff_t)r * s->width;
+        memcpy(row, x, length * sizeof *x);
+        heisenberg_ends(row, s->length, 0, s->length);
     }
     return heisenberg_OK;
 }

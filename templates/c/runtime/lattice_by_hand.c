@@ -17,9 +17,11 @@ phi_status phi_describe(size_t number, phi_stage *about)
 
 phi_status phi_begin(phi_solver *s, double h) { return phi_set_step(s, h); }
 
+#if !PHI_ONE_ROW
 /* The rows of a plane. */
-static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / (PHI_AXES > 1 ? s->sizes[0] : 1); }
+static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / s->sizes[0]; }
 
+#endif
 phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)
 {
     if (s == NULL || !s->prepared || number > PHI_FLOWS || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
@@ -34,7 +36,11 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #else
     const double *coef = s->coef + row * PHI_ROW;
 #endif
-    const size_t units = PHI_AXES > 1 ? phi_rows_of_plane(s) : phi_units(s);
+#if PHI_ONE_ROW
+    const size_t units = phi_units(s);
+#else
+    const size_t units = phi_rows_of_plane(s);
+#endif
     s->open = 0;
 #if PHI_NOISE
     const int drawing = number == 0 || number == PHI_FLOWS - PHI_SOURCES;
@@ -60,22 +66,15 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
     return PHI_OK;
 }
 
-/* A plane of a field: the first of its values, and how many rows it has, of so many values. */
-static double *phi_plane(const phi_solver *s, size_t field, size_t plane, size_t *rows, size_t *length)
-{
-    *rows = phi_rows_of_plane(s);
-    *length = PHI_AXES > 1 ? (size_t)s->length : 1;
-    return s->x[field] + (PHI_AXES > 1 ? (ptrdiff_t)(plane * *rows) * s->width : (ptrdiff_t)plane);
-}
-
 phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to, double *x)
 {
     if (s == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
-    for (size_t plane = from; plane < to; ++plane) {
-        size_t rows, length;
-        const double *at = phi_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length) memcpy(x, PHI_ROW_AT(at), length * sizeof *x);
-    }
+#if PHI_ONE_ROW
+    memcpy(x, s->x[field] + from, (to - from) * sizeof *x);
+#else
+    const size_t rows = phi_rows_of_plane(s), length = (size_t)s->length;
+    for (size_t r = from * rows; r < to * rows; ++r, x += length) memcpy(x, PHI_ROW_AT(s->x[field]), length * sizeof *x);
+#endif
     return PHI_OK;
 }
 
@@ -83,22 +82,20 @@ phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, c
 {
     if (s == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
     s->open = 0;
-    for (size_t plane = from; plane < to; ++plane) {
-        size_t rows, length;
-        double *at = phi_plane(s, field, plane, &rows, &length);
-        for (size_t r = 0; r < rows; ++r, x += length) {
-            memcpy(PHI_ROW_AT(at), x, length * sizeof *x);
-#if !PHI_ONE_ROW
-#if PHI_HALO
-            phi_ends(at + (ptrdiff_t)r * s->width, s->length, 0, s->length);
-#endif
-#endif
-        }
-    }
 #if PHI_ONE_ROW
+    memcpy(s->x[field] + from, x, (to - from) * sizeof *x);
 #if PHI_HALO
     phi_ends(s->x[field], s->length, 0, s->length);
 #endif
+#else
+    const size_t rows = phi_rows_of_plane(s), length = (size_t)s->length;
+    for (size_t r = from * rows; r < to * rows; ++r, x += length) {
+        double *row = PHI_ROW_AT(s->x[field]);
+        memcpy(row, x, length * sizeof *x);
+#if PHI_HALO
+        phi_ends(row, s->length, 0, s->length);
+#endif
+    }
 #endif
     return PHI_OK;
 }

@@ -12,23 +12,18 @@
    are made one by one: the bits are the same. */
 enum { PHI_DEEPEST = 16, PHI_CACHE = 1 << 21 }; /* flows at once; bytes that they may go over */
 
-/* The slices of the lattice, each of so many units: of one row its pieces. */
-static size_t phi_slices(const phi_solver *s, size_t *units)
-{
 #if PHI_ONE_ROW
-    *units = 1;
-    return phi_units(s);
+/* The slices of the lattice, the pieces of its row. */
+static size_t phi_slices(const phi_solver *s) { return phi_units(s); }
 #else
-    *units = s->rows / s->sizes[0];
-    return s->sizes[0];
+/* The slices of the lattice, each all rows of one place along the first axis. */
+static size_t phi_slices(const phi_solver *s) { return s->sizes[0]; }
 #endif
-}
 
 /* How many flows over so many arrays are made at once. */
 static size_t phi_depth(const phi_solver *s, size_t arrays)
 {
-    size_t units;
-    const size_t slices = phi_slices(s, &units), bytes = PHI_DOUBLES * arrays * sizeof(double);
+    const size_t slices = phi_slices(s), bytes = PHI_DOUBLES * arrays * sizeof(double);
     const size_t held = PHI_CACHE / (bytes / slices) / PHI_SPAN, room = slices / PHI_THREADS / (2 * PHI_SPAN);
     const size_t depth = held < room ? held : room;
 #if PHI_TANGENT
@@ -40,21 +35,24 @@ static size_t phi_depth(const phi_solver *s, size_t arrays)
 
 static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t from, size_t to)
 {
-    size_t units;
-    (void)phi_slices(s, &units);
+#if !PHI_ONE_ROW
+    const size_t rows = s->rows / s->sizes[0];
+    from *= rows;
+    to *= rows;
+#endif
 #if PHI_UNDONE
-    if (flow->go > 0) phi_go_back(s, flow, from * units, to * units);
-    else phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from * units, to * units);
+    if (flow->go > 0) phi_go_back(s, flow, from, to);
+    else phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from, to);
 #else
-    phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from * units, to * units);
+    phi_sweep_rows(s, flow->part, flow->coef PHI_AND_FAR(s->far > 0), from, to);
 #endif
 }
 
 /* So many flows, one after the other. */
 static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t count)
 {
-    size_t units, from;
-    const size_t slices = phi_slices(s, &units), to = phi_share(slices, &from), next = to == slices ? 0 : to;
+    size_t from;
+    const size_t slices = phi_slices(s), to = phi_share(slices, &from), next = to == slices ? 0 : to;
     for (size_t front = from; front < to; ++front)
         for (size_t k = 0; k < count && front >= from + 2 * k * PHI_SPAN; ++k)
             phi_make_slices(s, flows + k, front - k * PHI_SPAN, front - k * PHI_SPAN + 1);
