@@ -82,12 +82,15 @@ class Packs:
     """Members with explicit steps, one in each lane.
 
     ``kernels`` are those of a step, or of the flows of a splitting. ``near`` are the functions that are polynomials
-    near 0: where these do not reach, there is a longer way.
+    near 0: where these do not reach, there is a longer way. ``back`` are the transposes of the flows, if members are
+    pulled back in packs too, so many ``abreast``.
     """
 
     kernels: tuple[Kernel, ...]
     calls: frozenset[str]
     near: tuple[str, ...]
+    back: tuple[Kernel, ...] = ()
+    abreast: int = 0
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,8 @@ def _of_steps(program: Program) -> Blocks | Packs | None:
             return _packs(program, (step.increment,), ())
         case Splitting() as step:
             used = operations(step.flows)
-            return _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
+            packs = _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
+            return packs and _with_back(program, packs, step)
     return None
 
 
@@ -245,6 +249,17 @@ def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -
     if program.held or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MOST_STACK:
         return None
     return Packs(tuple(kernels), with_formulas(ops), near)
+
+
+def _with_back(program: Program, packs: Packs, step: Splitting) -> Packs:
+    """Packs that members are pulled back in, if the transposes of the flows can be computed in lanes too."""
+    back = step.adjoint.steps if step.adjoint else ()
+    ops = operations(back)
+    kept = 2 * _DOUBLE * LANES**2 * program.dimension  # bytes of a segment of one pack; they grow with the square
+    abreast = next((k for k in (PACKS, 2, 1) if 2 * k**2 * kept <= MOST_STACK), 0)
+    if not abreast or library_calls(ops) or library_powers(back):
+        return packs
+    return replace(packs, calls=packs.calls | with_formulas(ops), back=back, abreast=abreast)
 
 
 def _block(program: Program, more: int = 0, once: int = 0) -> int:

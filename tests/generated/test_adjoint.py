@@ -266,6 +266,27 @@ def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypat
         assert bars == pytest.approx(together.parameters_bar[name], rel=1e-10, abs=1e-13)
 
 
+def test_members_of_splittings_are_pulled_back_in_packs(monkeypatch):
+    """As each is alone: in segments, with rows, and numbers of its own; one whose angles are too large for the short
+    ways of lanes to the last bit, since it is done by itself. The second group is not full."""
+    compiled = compile_spec(spec.loads(f"phigen: 1\nname: t\n{TOP}order: 4\nadjoint: true\n"), scheme="splitting")
+    assert "t_pull_group(" in files(compiled, "c")["t.c"]
+    monkeypatch.setattr(runs, "_REPAID", 1)
+    made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 42, 5
+    many, h = np.array([0.4, 0.9, 0.3]) + 0.1 * rng.random((count, 3)), H * (1 + 0.1 * rng.random(count))
+    many[far] *= 40
+    own = {name: value * (1 + 0.1 * rng.random(count)) for name, value in made.interface.parameters.items()}
+    bar = rng.normal(size=(4, *many.shape))
+    one, two = (made.pullback(many, h, 23, bar, 9, threads=n, parameters=own) for n in (1, 2))
+    assert np.array_equal(one.x0_bar, two.x0_bar)
+    for m in range(count):
+        alone = made.pullback(many[m], h[m], 23, bar[:, m], 9, parameters={k: v[m] for k, v in own.items()})
+        near = 0 if m == far else 1e-13 * np.max(np.abs(alone.x0_bar))
+        assert np.max(np.abs(one.x1[:, m] - alone.x1)) <= near
+        assert np.max(np.abs(one.x0_bar[m] - alone.x0_bar)) <= near
+        assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in own) <= near
+
+
 def test_jacobian_has_columns_for_state_and_parameters():
     made, x = solver(compilation("newton"), "c"), start("newton")
     x1, by_x0, by = made.jacobian(x, H, I2=1.9)

@@ -10,7 +10,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from phigen.lanes.lowering import Blocks, Lanes, Rows, Traces, in_lanes
+from phigen.lanes.lowering import Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
@@ -20,7 +20,7 @@ from phigen.targets.c import functions, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import declaration, function, members, printer
-from phigen.targets.c.lanes import KNOTS, remembered, travels
+from phigen.targets.c.lanes import KNOTS, printed_back, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
@@ -127,6 +127,8 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
         found["adjoint_flows.h"] = splitting.adjoint(program, step, step.adjoint) if step.adjoint else ""
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"]):
         found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
+    if has["ABREAST"] and isinstance(lanes, Packs):
+        found["adjoint_flows_lanes.h"] = printed_back(program, lanes)
     declarations = render("c", "declarations.h", _declarations(program, lanes, has))
     return {"declarations.h": declarations, "model.h": _model(program, lanes, has, found.values()), **found}
 
@@ -265,6 +267,8 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         sizes += paths.sizes(lanes.path, lanes.slope_terms)
     if has["ALONG"] and isinstance(step, Path) and step.back:
         sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
+    if has["ABREAST"] and isinstance(lanes, Packs):
+        sizes.append(("BACK_PACKS", lanes.abreast, "packs of members that are pulled back together"))
     return sizes + (splitting.sizes(step) if isinstance(step, Splitting) else [])
 
 

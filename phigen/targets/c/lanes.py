@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from itertools import accumulate
 from math import prod
 
-from phigen.lanes.functions import NEAR_FUNCTIONS
+from phigen.lanes.functions import NEAR_FUNCTIONS, operations
 from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Traces
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
@@ -71,10 +71,21 @@ def printed(program: Program, lanes: Lanes) -> list[str]:
     return found + (_packs(program, lanes) if isinstance(lanes, Packs) else [])
 
 
+def printed_back(program: Program, packs: Packs) -> str:
+    """The transposes of the flows of packs."""
+    assert isinstance(program.step, Splitting)
+    return "\n".join(splitting.adjoint_in_lanes(program, program.step, packs.back, _short(program)))
+
+
+def _short(program: Program) -> dict[str, str]:
+    """What loops over lanes call where arguments are small."""
+    return {**lane_calls(program), **{f: f"{program.name}_{f}_near" for f in NEAR_FUNCTIONS}}
+
+
 def _packs(program: Program, packs: Packs) -> list[str]:
     if not isinstance(program.step, Splitting):
         return [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
-    short = {f: f"{program.name}_{f}_near" for f in NEAR_FUNCTIONS}
-    found = functions.near(program, packs.near)
-    found += splitting.in_lanes(program, program.step, "", {**lane_calls(program), **short})
+    called = operations([*packs.kernels, *packs.back])
+    found = functions.near(program, [f for f in NEAR_FUNCTIONS if f in called])
+    found += splitting.in_lanes(program, program.step, "", _short(program))
     return found + (splitting.in_lanes(program, program.step, "_far", lane_calls(program)) if packs.near else [])

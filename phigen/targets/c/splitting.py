@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from phigen.scheme.kernel import Kernel, Output
@@ -70,25 +70,35 @@ def tangent(program: Program, step: Splitting) -> str:
 
 def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
     """The transposes of the flows."""
-    flows = step.schedule.flows
-    found, parts = [], []
-    for k, kernel in enumerate(adjoint.steps, 1):
+    flows, (kernels, own) = step.schedule.flows, _transposed(program, step, adjoint.steps)
+    own["part_of"] = ", ".join(str(part + 1) for part, _ in flows)
+    own["row_of"] = ", ".join(str(row) for _, row in flows)
+    own["unused"] = not any(kernel.outputs[1].values for kernel in kernels)
+    found = [function(program, kernel, functions=_functions(program)) for kernel in kernels]
+    return "\n".join([*found, render("c", "adjoint_flows.c", own)])
+
+
+def adjoint_in_lanes(
+    program: Program, step: Splitting, back: Sequence[Kernel], functions: Mapping[str, str]
+) -> list[str]:
+    """Those of members of packs, which call ``functions``."""
+    kernels, own = _transposed(program, step, back)
+    found = [function(program, kernel, lanes=True, functions=functions) for kernel in kernels]
+    return [*found, render("c", "adjoint_flows_lanes.c", own)]
+
+
+def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], dict[str, object]]:
+    """The transposes of the flows without what they do not reach, and what the templates read."""
+    kernels, parts = [], []
+    for k, kernel in enumerate(back, 1):
         reached = [[i for i, e in enumerate(o.values) if not e.is_zero] for o in kernel.outputs]
         outputs = [
             replace(o, values=tuple(o.values[i] for i in i_s)) for o, i_s in zip(kernel.outputs, reached, strict=True)
         ]
-        found.append(function(program, replace(kernel, outputs=tuple(outputs)), functions=_functions(program)))
-        label = f"case {k}" if k < len(adjoint.steps) else "default"
+        kernels.append(replace(kernel, outputs=tuple(outputs)))
+        label = f"case {k}" if k < len(back) else "default"
         parts.append((label, k, *(list(enumerate(i_s)) for i_s in reached)))
-    own = {
-        "NAME": program.name,
-        "n": program.dimension,
-        "row": max(1, step.row),
-        "parts": parts,
-        "part_of": ", ".join(str(part + 1) for part, _ in flows),
-        "row_of": ", ".join(str(row) for _, row in flows),
-    }
-    return "\n".join([*found, render("c", "adjoint_flows.c", own)])
+    return kernels, {"NAME": program.name, "n": program.dimension, "row": max(1, step.row), "parts": parts}
 
 
 def _along(program: Program) -> int:

@@ -7,7 +7,9 @@
 #if PHI_BLOCKS
 #include "blocks.c"
 #endif
-#if PHI_ADJOINT
+#if PHI_ADJOINT && PHI_EACH
+#include "adjoint_each.c"
+#elif PHI_ADJOINT
 #include "adjoint.c"
 #endif
 #if PHI_ENSEMBLE

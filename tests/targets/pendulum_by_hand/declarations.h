@@ -71,6 +71,7 @@
 #define PHI_ALONG 0
 #define PHI_PACKS (PHI_FAST && !PHI_IMPLICIT)
 #define PHI_FAR 0
+#define PHI_ABREAST (PHI_PACKS && PHI_SPLITTING && PHI_ADJOINT)
 #define PHI_SPARSE 0
 #define PHI_SWEPT 0
 #define PHI_CENTRED 0

@@ -1,6 +1,7 @@
 /* The runtime with the pendulum: what holds for each kind of step. */
 #include "runtime.c"
 
+#include <float.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -11,6 +12,12 @@
             exit(1); \
         } \
     } while (0)
+
+#if PHI_GAUGE
+#define PHI_NONE NULL, /* no gauge is given */
+#else
+#define PHI_NONE
+#endif
 
 static const double start[2] = { 1.0, 0.2 }, H = 0.05;
 
@@ -209,6 +216,44 @@ static void pullback_is_the_gradient(void)
 }
 
 #endif
+#if PHI_ADJOINT && PHI_EACH
+/* Members with parameters and steps of their own are pulled back as each is alone. Those that have no state, no step or no
+   end cost themselves only: what they were to get stays as it was. */
+static void gradients_of_members_are_their_own(void)
+{
+    enum { MEMBERS = 37, BAD = 3, NO_STEP = 20, LOST = 33, NUMBERS = 6 * MEMBERS };
+    static double x[2 * MEMBERS], h[MEMBERS], bars[NUMBERS], rows[NUMBERS], x0_bar[2 * MEMBERS];
+    phi_params params[MEMBERS], params_bar[MEMBERS];
+    double trail[RUN * PHI_TRAIL], own_rows[6], own_bar[2];
+    unsigned char status[MEMBERS];
+    for (int m = 0; m < MEMBERS; ++m) {
+        params[m].g = 1.5 + 0.01 * m;
+        params_bar[m].g = 7.0;
+        h[m] = m == NO_STEP ? (double)NAN : H * (1.0 + 0.01 * m);
+        for (int i = 0; i < 2; ++i) x[2 * m + i] = start[i] * (1.0 - 0.02 * m);
+        for (int i = 0; i < 2; ++i) x0_bar[2 * m + i] = 9.0;
+        for (int i = 0; i < 6; ++i) bars[6 * m + i] = m == LOST ? 0.0 : weight[i] + 0.1 * m;
+    }
+    x[2 * BAD] = (double)NAN;
+    x[2 * LOST + 1] = DBL_MAX / ((RUN - 0.25) * h[LOST]); /* infinite after the last step, unlike the derivatives */
+    EXPECT(phi_pullback_each(params, x, MEMBERS, PHI_NONE h, RUN, STRIDE, rows, bars, x0_bar, params_bar, trail, status) != PHI_OK);
+    for (int m = 0; m < MEMBERS; ++m) {
+        phi_params own = { 7.0 };
+        phi_solver s;
+        const int fails = m == BAD || m == NO_STEP || m == LOST;
+        EXPECT((status[m] != PHI_OK) == fails);
+        EXPECT(!fails || (x0_bar[2 * m] == 9.0 && x0_bar[2 * m + 1] == 9.0 && params_bar[m].g == 7.0));
+        if (fails) continue;
+        EXPECT(phi_init(&s, &params[m], &x[2 * m]) == PHI_OK);
+        EXPECT(phi_pullback(&s, h[m], RUN, STRIDE, own_rows, &bars[6 * m], own_bar, &own, trail) == PHI_OK);
+        for (int i = 0; i < 6; ++i) EXPECT(fabs(rows[6 * m + i] - own_rows[i]) < 1e-14);
+        EXPECT(apart(&x0_bar[2 * m], own_bar) < 1e-13 && fabs(params_bar[m].g - own.g) < 1e-13);
+    }
+    EXPECT(phi_pullback_each(params, x, 0, PHI_NONE h, RUN, 0, NULL, NULL, NULL, NULL, NULL, NULL) == PHI_OK);
+    EXPECT(phi_pullback_each(params, x, 1, PHI_NONE h, RUN, 0, NULL, bars, x0_bar, NULL, trail, NULL) == PHI_BAD_ARGUMENT);
+}
+
+#endif
 int main(void)
 {
     refuses_what_is_not_allowed();
@@ -225,6 +270,9 @@ int main(void)
 #endif
 #if PHI_ADJOINT
     pullback_is_the_gradient();
+#endif
+#if PHI_ADJOINT && PHI_EACH
+    gradients_of_members_are_their_own();
 #endif
     return 0;
 }

@@ -1,0 +1,60 @@
+#ifndef PHI_FILE_ADJOINT_EACH
+#define PHI_FILE_ADJOINT_EACH
+#if PHI_ABREAST
+#include "adjoint_packs.c"
+#else
+#include "adjoint_members.c"
+#endif
+
+#if PHI_TIMED
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *t0, const double *h,
+    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
+    double *trail, unsigned char *status)
+#elif PHI_GAUGE
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *gauge, const double *h,
+    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
+    double *trail, unsigned char *status)
+#else
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *h,
+    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
+    double *trail, unsigned char *status)
+#endif
+{
+    phi_status result = PHI_OK;
+    const int given = x0 != NULL && h != NULL && rows_bar != NULL && x0_bar != NULL && trail != NULL && stride > 0;
+    if (members > 0 && !given) return PHI_BAD_ARGUMENT;
+#if PHI_TIMED
+    if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
+#endif
+    const phi_pulled all = {
+        .params = params,
+        .x0 = x0,
+        .h = h,
+        .rows_bar = rows_bar,
+#if PHI_TIMED
+        .t0 = t0,
+#elif PHI_GAUGE
+        .gauge = gauge,
+#endif
+        .members = members,
+        .steps = steps,
+        .stride = stride,
+        .each = stride > 0 ? (steps + stride - 1) / stride * PHI_DIM : 0,
+        .rows = rows,
+        .x0_bar = x0_bar,
+        .trail = trail,
+        .params_bar = params_bar,
+        .status = status,
+    };
+#if PHI_ABREAST
+    for (size_t m = 0; m < members; m += PHI_BACK_GROUP) {
+        const phi_status member = phi_pull_group(&all, m);
+#else
+    for (size_t m = 0; m < members; ++m) {
+        const phi_status member = phi_pull_member(&all, m);
+#endif
+        if (result == PHI_OK) result = member;
+    }
+    return result;
+}
+#endif

@@ -1,0 +1,58 @@
+#ifndef PHI_FILE_ADJOINT_MEMBERS
+#define PHI_FILE_ADJOINT_MEMBERS
+#include "adjoint.c"
+#include "model.h"
+#include "solver.c"
+
+/* What phi_pullback_each was asked for; each is how many numbers the rows of a member have. */
+typedef struct {
+    const phi_params *params;
+    const double *x0, *h, *rows_bar;
+#if PHI_TIMED
+    const double *t0;
+#elif PHI_GAUGE
+    const double *gauge;
+#endif
+    size_t members, steps, stride, each;
+    double *rows, *x0_bar, *trail;
+    phi_params *params_bar;
+    unsigned char *status;
+} phi_pulled;
+
+/* Start a member where it begins. */
+static phi_status phi_pull_begin(const phi_pulled *all, size_t m, phi_solver *s)
+{
+    const phi_params *params = all->params != NULL ? all->params + m : NULL;
+    const double *x0 = all->x0 + m * PHI_DIM;
+#if PHI_GAUGE
+    return phi_init_gauge(s, params, x0, all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL);
+#elif PHI_TIMED
+    return phi_init_at(s, params, x0, all->t0[m]);
+#else
+    return phi_init(s, params, x0);
+#endif
+}
+
+/* Pull a member back by itself. */
+static phi_status phi_pull_member(const phi_pulled *all, size_t m)
+{
+    const double *rows_bar = all->rows_bar + m * all->each;
+    double *rows = all->rows != NULL ? all->rows + m * all->each : NULL, *bar = all->x0_bar + m * PHI_DIM;
+    phi_params *own_bar = all->params_bar != NULL ? all->params_bar + m : NULL;
+    phi_solver s;
+    phi_status status = phi_pull_begin(all, m, &s);
+#if PHI_MONITOR
+    double e_bar = 0.0;
+    phi_params unused = phi_default_params;
+    if (status == PHI_OK)
+        status = phi_pullback(&s, all->h[m], all->steps, all->stride, rows, rows_bar, bar, own_bar, &e_bar, all->trail);
+    if (status == PHI_OK && all->gauge == NULL)
+        phi_level_bar(&s.params, all->x0 + m * PHI_DIM, e_bar, bar, own_bar != NULL ? own_bar : &unused);
+#else
+    if (status == PHI_OK)
+        status = phi_pullback(&s, all->h[m], all->steps, all->stride, rows, rows_bar, bar, own_bar, all->trail);
+#endif
+    if (all->status != NULL) all->status[m] = (unsigned char)status;
+    return status;
+}
+#endif
