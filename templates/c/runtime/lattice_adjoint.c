@@ -73,6 +73,20 @@ static void phi_add_parameters(const phi_solver *s, const phi_transpose *g, cons
     phi_add_arrays(s, g->bar, params_bar);
 }
 
+#if PHI_NEAR
+/* Whether what has been found for parameters is finite: functions for small arguments may be called for these only. */
+static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, const double coef_bar[PHI_SUMS])
+{
+    int hold = phi_finite(coef_bar, PHI_SUMS);
+    for (size_t k = PHI_DIM; k < PHI_ARRAYS; ++k)
+        for (size_t r = 0; r < s->rows; ++r) hold &= phi_finite(g->bar[k] + (ptrdiff_t)r * s->width, (size_t)s->length);
+#if PHI_BOND_PARAMETERS
+    for (int k = PHI_ARRAYS; k < PHI_BARS; ++k) hold &= phi_finite(g->bar[k], (size_t)s->bonds[s->sites]);
+#endif
+    return hold;
+}
+
+#endif
 /* How many steps the next segment has of those that are left, more than the longest; without room for another state all but these. */
 static size_t phi_onward(const phi_transpose *g, size_t left)
 {
@@ -171,6 +185,12 @@ static phi_status phi_run_back(phi_solver *s, phi_transpose *g, size_t steps, si
     }
 #if !PHI_RENEWED
     phi_add_up(s, g, coef_bar);
+#endif
+#if PHI_NEAR
+    if (status == PHI_OK && !g->far && !phi_parameters_hold(s, g, coef_bar)) {
+        g->failed = 1;
+        status = PHI_NOT_FINITE;
+    }
 #endif
     return status;
 }
