@@ -160,8 +160,9 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     """
     swept = [sweep.kernel for part in step.parts for sweep in part]
     swept += step.equation.kernels if step.equation else ()
-    energies = [k.name for k in (step.partners.energy.kernels if step.partners else ())]
-    looped = [kernel for kernel in step.kernels if kernel is not step.prepare and kernel.name not in energies]
+    gathers = (step.partners.energy, step.partners.field) if step.partners else ()
+    seen = {kernel.name for gather in gathers for kernel in gather.kernels}
+    looped = [kernel for kernel in step.kernels if kernel is not step.prepare and kernel.name not in seen]
     if program.profile == "small":
         return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
     called = operations(swept) & _called_in_forms(step)

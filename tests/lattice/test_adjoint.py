@@ -44,15 +44,27 @@ poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + (1 + A*cos(w*t + phase))*(q[i+1] - q)**2/2 + A*q**4
 forces: {vector: {p: -damp*p}}
 """
+#: No site has neighbours; derivatives along parameters, and nothing else, call sin of large arguments.
+SWUNG = DRIVEN.replace("driven", "swung").replace(
+    "(1 + A*cos(w*t + phase))*(q[i+1] - q)**2/2", "cos(q)*cos(w*t + phase)"
+)
+LATTICES["swung"] = LATTICES["swung series"] = {"w": 1.2, "phase": 2.0 + np.arange(SITES) / 5}
 LATTICES["driven"] = LATTICES["driven composed"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
-OWN = {"driven": DRIVEN, "far_open": SPECS["far_open"], "spin_graph": SPECS["spin_graph"]}
+OWN = {"driven": DRIVEN, "swung": SWUNG, "far_open": SPECS["far_open"], "spin_graph": SPECS["spin_graph"]}
 
 
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
 #: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
 IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES}
-IN_C |= {"driven composed": SITES, "far_open series": (4, 3), "spin_graph series": SITES, "point_vortices": SITES}
+IN_C |= {
+    "swung": SITES,
+    "swung series": SITES,
+    "driven composed": SITES,
+    "far_open series": (4, 3),
+    "spin_graph series": SITES,
+    "point_vortices": SITES,
+}
 SLOW = ("volterra", "far_open series")
 
 HOW = {"series": {"scheme": "series", "order": 2}, "composed": {"scheme": "series", "order": 4}}

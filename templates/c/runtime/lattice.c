@@ -55,6 +55,7 @@ static size_t phi_share(size_t units, size_t *first)
     return *first + each + (own < more);
 }
 
+#if PHI_HANDS || !PHI_SERIES
 /* Until all threads are here. */
 static void phi_wait(void)
 {
@@ -65,6 +66,7 @@ static void phi_wait(void)
 #endif
 }
 
+#endif
 #endif
 #if !PHI_SERIES
 enum { PHI_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */

@@ -21,7 +21,7 @@ from phigen.symbolic.expression import symbols_of
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
-from phigen.targets.c.lattice.layout import Layout, givers, layout_of, starts_are_read
+from phigen.targets.c.lattice.layout import Layout, givers, hands, layout_of, starts_are_read
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
@@ -215,6 +215,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "sums": _sums(program, step),
         "keeps": "" if can_be_undone(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
+        "handing": any(hands(step)) or can_be_undone(program, step),
         "handed": max(1, *(part.handed for part in parts)) if parts else 1,
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),
         "numbers": max(1, sum(p.at == "all" for p in program.parameters)),

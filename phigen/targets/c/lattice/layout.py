@@ -193,7 +193,7 @@ def hands(step: Sweeps) -> list[bool]:
     found: list[bool] = []
     back = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
     if step.equation and step.adjoint:
-        return [True]
+        return [step.partners is not None or any(any(offset) for _, offset in step.sites.places.values())]
     for part in step.parts if step.adjoint else ():
         read = [(s, e) for sweep in part for s, e in back[sweep.kernel.name + BACK].along("site")]
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
