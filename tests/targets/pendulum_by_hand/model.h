@@ -16,6 +16,12 @@ const phi_params phi_default_params = { 1.5 };
 
 #if PHI_COMPOSED
 static const double phi_fractions[PHI_STAGES] = { 1.3512071919596578, -1.7024143839193153, 1.3512071919596578 };
+enum { PHI_KNOTS = 4 };
+static const double phi_travels[PHI_STAGES][PHI_KNOTS] = {
+    { 0.013254957346772282, -0.0850415532888567, 0.5686449886953024, 0.8543487992064395 },
+    { -0.0036100145818732327, 0.018050072909366176, -0.8764772940327699, -0.8403771482140381 },
+    { 0.03202172390176757, -0.14134185295384258, 1.099498972004134, 0.36102834900759884 },
+};
 #endif
 
 static int phi_allowed(const phi_params *params) { return isfinite(params->g) && params->g > 0.0; }
