@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 29ff75322c163f3ce83b542530efb2fbdac62e7e37aaf77d6715d9b5ffb290bf
+ * body-sha256: 5a7c953af725f8c9cb504710d9dc3eb23c212bb7a476e1695af5e3f554fa8b04
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -29,15 +29,12 @@ enum { ablowitz_ladik_RESERVED = 4 };       /* arrays over the sites in the memo
 enum { ablowitz_ladik_ROW = 4 };            /* coefficients of one flow */
 enum { ablowitz_ladik_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { ablowitz_ladik_FLOWS = 25 };         /* in a step */
-/* the row of the last flow of a step and the first of the next together */
-enum { ablowitz_ladik_JOINED = 25 };
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t ablowitz_ladik_least[ablowitz_ladik_AXES] = { 2 };
-static const size_t ablowitz_ladik_periods[ablowitz_ladik_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double ablowitz_ladik_times[ablowitz_ladik_ROWS_OF_FLOWS] = { 0.0792036964311957,
     0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077,
     -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456,
@@ -45,11 +42,9 @@ static const double ablowitz_ladik_times[ablowitz_ladik_ROWS_OF_FLOWS] = { 0.079
     -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774,
     0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char ablowitz_ladik_flow_parts[ablowitz_ladik_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1, 2,
-    3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1 };
-static const unsigned char ablowitz_ladik_flow_rows[ablowitz_ladik_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
-    10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24 };
+/* The parts of H that they are of. */
+static const unsigned char ablowitz_ladik_flow_parts[ablowitz_ladik_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2,
+    1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int ablowitz_ladik_allowed(const ablowitz_ladik_params *params, size_t sites)
@@ -210,25 +205,30 @@ static inline void ablowitz_ladik_sweep3(const double *coef, const ablowitz_ladi
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void ablowitz_ladik_sweep_piece(const ablowitz_ladik_solver *s, int part, const double *coef,
-    size_t unit)
+/* The flow of a part of H. */
+static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef)
 {
-    const ablowitz_ladik_row row = ablowitz_ladik_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        ablowitz_ladik_sweep1(coef, &row);
-        ablowitz_ladik_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    case 2: /* H_2 */
-        ablowitz_ladik_sweep2(coef, &row);
-        ablowitz_ladik_ends(s->x[0], s->length, row.from, row.to);
-        ablowitz_ladik_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    default: /* H_3 */
-        ablowitz_ladik_sweep3(coef, &row);
-        ablowitz_ladik_ends(s->x[0], s->length, row.from, row.to);
-        break;
+    const size_t units = ablowitz_ladik_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const ablowitz_ladik_row row = ablowitz_ladik_piece_of(s, unit);
+        switch (part) {
+        case 1:
+            ablowitz_ladik_sweep1(coef, &row);
+            ablowitz_ladik_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        case 2:
+            ablowitz_ladik_sweep2(coef, &row);
+            ablowitz_ladik_ends(s->x[0], s->length, row.from, row.to);
+            ablowitz_ladik_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        default:
+            ablowitz_ladik_sweep3(coef, &row);
+            ablowitz_ladik_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -266,8 +266,7 @@ enum { ablowitz_ladik_BUFFER = 256 }; /* densities that are added in one go */
 static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
-    if (sizes[0] < ablowitz_ladik_least[0] || sizes[0] % ablowitz_ladik_periods[0] != 0
-        || sizes[0] > most / 2) return 0;
+    if (sizes[0] < ablowitz_ladik_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = ablowitz_ladik_LEAD + ((sizes[0] + 7) / 8 * 8 + ablowitz_ladik_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -369,24 +368,12 @@ static void ablowitz_ladik_copy(double *const *to, double *const *from, const ab
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void ablowitz_ladik_sweep_part(const ablowitz_ladik_solver *s, int part, const double *coef)
-{
-    const size_t units = ablowitz_ladik_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) ablowitz_ladik_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void ablowitz_ladik_make_flow(const ablowitz_ladik_solver *s, size_t steps, int number)
 {
-    const int joined = number == ablowitz_ladik_FLOWS, row = joined ? ablowitz_ladik_JOINED
-        : ablowitz_ladik_flow_rows[number];
-    const double *coef = s->coef + row * ablowitz_ladik_ROW;
+    const double *coef = s->coef + number * ablowitz_ladik_ROW;
     (void)steps;
-    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[joined ? 0 : number], coef);
+    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -491,24 +478,18 @@ double ablowitz_ladik_hamiltonian(const ablowitz_ladik_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void ablowitz_ladik_fill(const ablowitz_ladik_solver *s, void kernel(const ablowitz_ladik_row *,
-    double *restrict), double *out)
-{
-    const ablowitz_ladik_row row = ablowitz_ladik_row_of(s);
-    kernel(&row, out);
-}
-
 void ablowitz_ladik_density(const ablowitz_ladik_solver *s, double *out)
 {
-    ablowitz_ladik_fill(s, ablowitz_ladik_energy_row, out);
+    const ablowitz_ladik_row row = ablowitz_ladik_row_of(s);
+    ablowitz_ladik_energy_row(&row, out);
 }
 
 void ablowitz_ladik_casimirs(const ablowitz_ladik_solver *s, double *out) { (void)s, (void)out; }
 
 void ablowitz_ladik_vector_field(const ablowitz_ladik_solver *s, double *out)
 {
-    ablowitz_ladik_fill(s, ablowitz_ladik_vector_field_row, out);
+    const ablowitz_ladik_row row = ablowitz_ladik_row_of(s);
+    ablowitz_ladik_vector_field_row(&row, out);
 }
 
 const char *ablowitz_ladik_status_string(ablowitz_ladik_status status)

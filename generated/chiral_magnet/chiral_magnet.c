@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2dad20816e7c13d4edd1bfc2da272bdbabad596b4e4cad62c5dd61982a9676c7
+ * body-sha256: 6e2c97f898acf5c19ac34ffa326d80e5dc896b0f76a3761cd560bfea0910bc07
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -24,29 +24,25 @@
 /* ---- The model ---- */
 const chiral_magnet_params chiral_magnet_default_params = { 1.0, 0.5, NULL, NULL, 0.1, 0.15 };
 
-enum { chiral_magnet_RESERVED = 9 }; /* arrays over the sites in the memory of a solver */
-enum { chiral_magnet_ROW = 5 }; /* coefficients of one flow */
+enum { chiral_magnet_RESERVED = 9 };      /* arrays over the sites in the memory of a solver */
+enum { chiral_magnet_ROW = 5 };           /* coefficients of one flow */
 enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
-enum { chiral_magnet_FLOWS = 5 }; /* in a step */
-enum { chiral_magnet_JOINED = 5 }; /* the row of the last flow of a step and the first of the next together */
+enum { chiral_magnet_FLOWS = 5 };         /* in a step */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t chiral_magnet_least[chiral_magnet_AXES] = { 1 };
-static const size_t chiral_magnet_periods[chiral_magnet_AXES] = { 1 };
 
 /* Whether a part of H is that of the sites of one colour. The flows are those of all parts, of each colour
    where so. */
 enum { chiral_magnet_PARTS = 5 };
 static const unsigned char chiral_magnet_by_colour[chiral_magnet_PARTS] = { 1, 0, 0, 0, 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double chiral_magnet_times[chiral_magnet_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0, 0.5, 0.5, 1.0 };
 
-/* The flows of one step: 0 the first, 1 those between, 2 the last, 3 those between, backwards; and the row of
-   each. */
-static const unsigned char chiral_magnet_flow_parts[chiral_magnet_FLOWS] = { 0, 1, 2, 3, 0 };
-static const unsigned char chiral_magnet_flow_rows[chiral_magnet_FLOWS] = { 0, 1, 2, 3, 4 };
+/* What these are: 0 the first flow, 1 those between, 2 the last, 3 those between, backwards. */
+static const unsigned char chiral_magnet_flow_parts[chiral_magnet_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 0 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int chiral_magnet_allowed(const chiral_magnet_params *params, size_t sites, size_t bonds)
@@ -127,15 +123,14 @@ static inline chiral_magnet_row chiral_magnet_piece_of(const chiral_magnet_solve
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define chiral_magnet_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double chiral_magnet_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double chiral_magnet_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + chiral_magnet_ROUNDER,
-        k = (shifted - chiral_magnet_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + chiral_magnet_ROUNDER,
+        k = shifted - chiral_magnet_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -154,16 +149,7 @@ static inline double chiral_magnet_turned_sin(double u, double offset)
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
 
-/* sin u for the loops over lanes. */
-static inline double chiral_magnet_sin_lane(double u) { return chiral_magnet_turned_sin(u, 0.0); }
-
-/* What all other sites b add to the forces of H_1 at a site a.
-   What all other sites b add to the forces of H_1 at a site a, where x, y, z stand for its y, z, x, the other
-      way, across bonds.
-   What all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its z, x, y, with
-      other parameters at bonds, the other way.
-   What all other sites b add to the forces of H_5 at a site a, where x, y, z stand for its y, z, x, with
-      other parameters at bonds, across bonds. */
+/* What all other sites b add to the forces of H_1, H_5 at a site a. */
 static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row)
 {
     const double c1 = coef[1];
@@ -181,14 +167,10 @@ static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magn
     }
 }
 
-/* The flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, y turned.
-   The flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, z turned, where x, y, z stand for its
-      z, x, y.
-   The flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned, where x, y, z stand for its y, z, x.
-   The flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned, where x, y, z stand for its z, x, y.
-   The flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): x, y turned.
-   The flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): y, z turned, where x, y, z stand for its
-      y, z, x. */
+/* The flow of H_1 = sum of D*(Dx*(y[a]*z[b])) - D*(Dx*(y[b]*z[a])): x, y turned; x, z turned.
+   The flow of H_2 = sum of -J*(x[a]*x[b]): y, z turned.
+   The flow of H_3 = sum of -J*(y[a]*y[b]): x, z turned.
+   The flow of H_5 = sum of D*(Dy*(x[b]*z[a])) - D*(Dy*(x[a]*z[b])): x, y turned; y, z turned. */
 static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magnet_row *row)
 {
     const double c0 = coef[0];
@@ -206,9 +188,7 @@ static inline void chiral_magnet_sweep_x_y(const double *coef, const chiral_magn
     }
 }
 
-/* What all other sites b add to the forces of H_2 at a site a.
-   What all other sites b add to the forces of H_3 at a site a, where x, y, z stand for its y, z, x.
-   What all other sites b add to the forces of H_4 at a site a, where x, y, z stand for its z, x, y. */
+/* What all other sites b add to the forces of H_2, H_3, H_4 at a site a. */
 static inline void chiral_magnet_gather2(const double *coef, const chiral_magnet_row *row)
 {
     const double c2 = coef[2];
@@ -243,60 +223,60 @@ static inline void chiral_magnet_sweep4(const double *coef, const chiral_magnet_
     }
 }
 
-/* A flow, for a piece of a row. */
-static void chiral_magnet_sweep_piece(const chiral_magnet_solver *s, int flow, const double *coef,
-    size_t unit)
+/* A flow. */
+static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int flow, const double *coef)
 {
     int part = 1, colour = flow;
     for (int own; colour >= (own = chiral_magnet_by_colour[part - 1] ? s->colour_count : 1); ++part)
         colour -= own;
+    const size_t units = chiral_magnet_units(s);
+    /* the fields in other orders, in which loops that are for one order serve others */
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1] };
     double *const Dy_Dx[] = { s->at_bonds[1], s->at_bonds[0] };
-    chiral_magnet_row row = chiral_magnet_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        row.chosen = colour;
-        chiral_magnet_gather1_0(coef, &row);
-        chiral_magnet_sweep_x_y(coef, &row);
-        row.side = -1.0;
-        row.across = 1;
-        row.x = y_z_x;
-        chiral_magnet_gather1_0(coef, &row);
-        row.x = z_x_y;
-        chiral_magnet_sweep_x_y(coef, &row);
-        break;
-    case 2: /* H_2 */
-        chiral_magnet_gather2(coef, &row);
-        row.x = y_z_x;
-        chiral_magnet_sweep_x_y(coef, &row);
-        break;
-    case 3: /* H_3 */
-        row.x = y_z_x;
-        chiral_magnet_gather2(coef, &row);
-        row.x = z_x_y;
-        chiral_magnet_sweep_x_y(coef, &row);
-        break;
-    case 4: /* H_4 */
-        row.x = z_x_y;
-        chiral_magnet_gather2(coef, &row);
-        row.x = s->x;
-        chiral_magnet_sweep4(coef, &row);
-        break;
-    default: /* H_5 */
-        row.chosen = colour;
-        row.at_bonds = Dy_Dx;
-        row.side = -1.0;
-        row.x = z_x_y;
-        chiral_magnet_gather1_0(coef, &row);
-        row.x = s->x;
-        chiral_magnet_sweep_x_y(coef, &row);
-        row.side = 1.0;
-        row.across = 1;
-        row.x = y_z_x;
-        chiral_magnet_gather1_0(coef, &row);
-        chiral_magnet_sweep_x_y(coef, &row);
-        break;
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        chiral_magnet_row row = chiral_magnet_piece_of(s, unit);
+        switch (part) {
+        case 1:
+            row.chosen = colour;
+            chiral_magnet_gather1_0(coef, &row);
+            chiral_magnet_sweep_x_y(coef, &row);
+            row.side = -1.0, row.across = 1, row.x = y_z_x;
+            chiral_magnet_gather1_0(coef, &row);
+            row.x = z_x_y;
+            chiral_magnet_sweep_x_y(coef, &row);
+            break;
+        case 2:
+            chiral_magnet_gather2(coef, &row);
+            row.x = y_z_x;
+            chiral_magnet_sweep_x_y(coef, &row);
+            break;
+        case 3:
+            row.x = y_z_x;
+            chiral_magnet_gather2(coef, &row);
+            row.x = z_x_y;
+            chiral_magnet_sweep_x_y(coef, &row);
+            break;
+        case 4:
+            row.x = z_x_y;
+            chiral_magnet_gather2(coef, &row);
+            row.x = s->x;
+            chiral_magnet_sweep4(coef, &row);
+            break;
+        default:
+            row.chosen = colour;
+            row.at_bonds = Dy_Dx, row.side = -1.0, row.x = z_x_y;
+            chiral_magnet_gather1_0(coef, &row);
+            row.x = s->x;
+            chiral_magnet_sweep_x_y(coef, &row);
+            row.side = 1.0, row.across = 1, row.x = y_z_x;
+            chiral_magnet_gather1_0(coef, &row);
+            chiral_magnet_sweep_x_y(coef, &row);
+            break;
+        }
     }
 }
 
@@ -396,17 +376,14 @@ static int chiral_magnet_few(size_t sites, size_t bonds)
 /* The bytes for them, after the rows. */
 static size_t chiral_magnet_graph_size(size_t sites, size_t bonds)
 {
-    size_t integers = 2 * sites + 1 + 4 * bonds, doubles = 0;
-    integers += 2 * sites;
-    doubles += chiral_magnet_BOND_ARRAYS * 2 * bonds;
-    return doubles * sizeof(double) + integers * sizeof(int);
+    const size_t integers = 4 * sites + 1 + 4 * bonds;
+    return chiral_magnet_BOND_ARRAYS * 2 * bonds * sizeof(double) + integers * sizeof(int);
 }
 
 /* Whether all bonds run between two different sites. */
 static int chiral_magnet_connected(const chiral_magnet_bonds *bonds, size_t sites)
 {
-    if (bonds == NULL || bonds->count == 0) return 1;
-    if (bonds->ends == NULL) return 0;
+    if (bonds == NULL || bonds->ends == NULL) return bonds == NULL || bonds->count == 0;
     for (size_t k = 0; k < bonds->count; ++k) {
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         if (a >= sites || b >= sites || a == b) return 0;
@@ -465,13 +442,6 @@ static void chiral_magnet_connect(chiral_magnet_solver *s, const chiral_magnet_b
     chiral_magnet_colour(s, s->colours + sites);
 }
 
-/* The values of a parameter at bonds, or one value for all. */
-static void chiral_magnet_put_at_bond(const chiral_magnet_solver *s, double *at, const double *values,
-    double value)
-{
-    for (int k = 0; k < s->bonds[s->sites]; ++k) at[k] = values != NULL ? values[s->number[k]] : value;
-}
-
 /* ---- The lattice ---- */
 enum { chiral_magnet_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
@@ -480,8 +450,7 @@ enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
 static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
-    if (sizes[0] < chiral_magnet_least[0] || sizes[0] % chiral_magnet_periods[0] != 0 || sizes[0] > most / 2)
-        return 0;
+    if (sizes[0] < chiral_magnet_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -511,10 +480,11 @@ static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const
 /* The parameters at bonds, in the order of the bonds of each site. */
 static void chiral_magnet_put_at_bonds(chiral_magnet_solver *s, const chiral_magnet_params *params)
 {
-    chiral_magnet_put_at_bond(s, s->at_bonds[0], params->Dx, 0.0);
-    s->params.Dx = NULL;
-    chiral_magnet_put_at_bond(s, s->at_bonds[1], params->Dy, 1.0);
-    s->params.Dy = NULL;
+    for (int k = 0; k < s->bonds[s->sites]; ++k) {
+        s->at_bonds[0][k] = params->Dx != NULL ? params->Dx[s->number[k]] : 0.0;
+        s->at_bonds[1][k] = params->Dy != NULL ? params->Dy[s->number[k]] : 1.0;
+    }
+s->params.Dx = s->params.Dy = NULL;
 }
 
 /* ---- The solver ---- */
@@ -595,35 +565,21 @@ static void chiral_magnet_copy(double *const *to, double *const *from, const chi
 }
 
 /* ---- The flows ---- */
-/* One part of H, of one colour. */
-static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int part, const double *coef)
-{
-    const size_t units = chiral_magnet_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) chiral_magnet_sweep_piece(s, part, coef, unit);
-}
-
 /* The first flow, those between it and the last, the last, or those between, backwards. */
 static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) chiral_magnet_sweep_colour(s, kind == 0 ? 0 : last, coef);
-    if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) chiral_magnet_sweep_colour(s, flow, coef);
-    if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) chiral_magnet_sweep_colour(s, flow, coef);
+    if (kind % 2 == 0) chiral_magnet_sweep_colour(s, kind == 0 ? 0 : last, coef);
+    for (int flow = 1; kind % 2 == 1 && flow < last; ++flow)
+        chiral_magnet_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void chiral_magnet_make_flow(const chiral_magnet_solver *s, size_t steps, int number)
 {
-    const int joined = number == chiral_magnet_FLOWS, row = joined ? chiral_magnet_JOINED
-        : chiral_magnet_flow_rows[number];
-    const double *coef = s->coef + row * chiral_magnet_ROW;
+    const double *coef = s->coef + number * chiral_magnet_ROW;
     (void)steps;
-    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[joined ? 0 : number], coef);
+    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -728,27 +684,22 @@ double chiral_magnet_hamiltonian(const chiral_magnet_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void chiral_magnet_fill(const chiral_magnet_solver *s, void kernel(const chiral_magnet_row *,
-    double *restrict), double *out)
-{
-    const chiral_magnet_row row = chiral_magnet_row_of(s);
-    kernel(&row, out);
-}
-
 void chiral_magnet_density(const chiral_magnet_solver *s, double *out)
 {
-    chiral_magnet_fill(s, chiral_magnet_energy_row, out);
+    const chiral_magnet_row row = chiral_magnet_row_of(s);
+    chiral_magnet_energy_row(&row, out);
 }
 
 void chiral_magnet_casimirs(const chiral_magnet_solver *s, double *out)
 {
-    chiral_magnet_fill(s, chiral_magnet_casimirs_row, out);
+    const chiral_magnet_row row = chiral_magnet_row_of(s);
+    chiral_magnet_casimirs_row(&row, out);
 }
 
 void chiral_magnet_vector_field(const chiral_magnet_solver *s, double *out)
 {
-    chiral_magnet_fill(s, chiral_magnet_vector_field_row, out);
+    const chiral_magnet_row row = chiral_magnet_row_of(s);
+    chiral_magnet_vector_field_row(&row, out);
 }
 
 const char *chiral_magnet_status_string(chiral_magnet_status status)

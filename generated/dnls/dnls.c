@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e4cd33e4ba0d5f952e4076c682a5f6eeb89137b171871b7505a51cb8a89513eb
+ * body-sha256: bee3f4f057d19ca3b9c32d72c71092009dd73ca97dc4e4119ae09dd38779d718
  */
 #include "dnls.h"
 #include <float.h>
@@ -29,14 +29,12 @@ enum { dnls_RESERVED = 4 };       /* arrays over the sites in the memory of a so
 enum { dnls_ROW = 2 };            /* coefficients of one flow */
 enum { dnls_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_FLOWS = 25 };         /* in a step */
-enum { dnls_JOINED = 25 };        /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t dnls_least[dnls_AXES] = { 2 };
-static const size_t dnls_periods[dnls_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double dnls_times[dnls_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -44,11 +42,9 @@ static const double dnls_times[dnls_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.079
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char dnls_flow_parts[dnls_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1,
-    2, 3, 2, 1, 2, 3, 2, 1 };
-static const unsigned char dnls_flow_rows[dnls_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14,
-    15, 16, 17, 18, 19, 20, 21, 22, 23, 24 };
+/* The parts of H that they are of. */
+static const unsigned char dnls_flow_parts[dnls_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2,
+    3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int dnls_allowed(const dnls_params *params, size_t sites)
@@ -124,15 +120,13 @@ static inline dnls_row dnls_piece_of(const dnls_solver *s, size_t unit)
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define dnls_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double dnls_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double dnls_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + dnls_ROUNDER,
-        k = (shifted - dnls_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + dnls_ROUNDER, k = shifted - dnls_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -150,9 +144,6 @@ static inline double dnls_turned_sin(double u, double offset)
     memcpy(&value, &bits, sizeof bits);
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
-
-/* sin u for the loops over lanes. */
-static inline double dnls_sin_lane(double u) { return dnls_turned_sin(u, 0.0); }
 
 /* The flow of H_1 = sum of -p*p[i+1]: q shifted. */
 static inline void dnls_sweep1(const double *coef, const dnls_row *row)
@@ -196,24 +187,30 @@ static inline void dnls_sweep3(const double *coef, const dnls_row *row)
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void dnls_sweep_piece(const dnls_solver *s, int part, const double *coef, size_t unit)
+/* The flow of a part of H. */
+static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef)
 {
-    const dnls_row row = dnls_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        dnls_sweep1(coef, &row);
-        dnls_ends(s->x[0], s->length, row.from, row.to);
-        break;
-    case 2: /* H_2 */
-        dnls_sweep2(coef, &row);
-        dnls_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    default: /* H_3 */
-        dnls_sweep3(coef, &row);
-        dnls_ends(s->x[0], s->length, row.from, row.to);
-        dnls_ends(s->x[1], s->length, row.from, row.to);
-        break;
+    const size_t units = dnls_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const dnls_row row = dnls_piece_of(s, unit);
+        switch (part) {
+        case 1:
+            dnls_sweep1(coef, &row);
+            dnls_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        case 2:
+            dnls_sweep2(coef, &row);
+            dnls_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        default:
+            dnls_sweep3(coef, &row);
+            dnls_ends(s->x[0], s->length, row.from, row.to);
+            dnls_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -253,7 +250,7 @@ enum { dnls_BUFFER = 256 }; /* densities that are added in one go */
 static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_RESERVED;
-    if (sizes[0] < dnls_least[0] || sizes[0] % dnls_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes[0] < dnls_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = dnls_LEAD + ((sizes[0] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -351,23 +348,12 @@ static void dnls_copy(double *const *to, double *const *from, const dnls_solver 
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void dnls_sweep_part(const dnls_solver *s, int part, const double *coef)
-{
-    const size_t units = dnls_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) dnls_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void dnls_make_flow(const dnls_solver *s, size_t steps, int number)
 {
-    const int joined = number == dnls_FLOWS, row = joined ? dnls_JOINED : dnls_flow_rows[number];
-    const double *coef = s->coef + row * dnls_ROW;
+    const double *coef = s->coef + number * dnls_ROW;
     (void)steps;
-    dnls_sweep_part(s, dnls_flow_parts[joined ? 0 : number], coef);
+    dnls_sweep_part(s, dnls_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -467,18 +453,19 @@ double dnls_hamiltonian(const dnls_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void dnls_fill(const dnls_solver *s, void kernel(const dnls_row *, double *restrict), double *out)
+void dnls_density(const dnls_solver *s, double *out)
 {
     const dnls_row row = dnls_row_of(s);
-    kernel(&row, out);
+    dnls_energy_row(&row, out);
 }
-
-void dnls_density(const dnls_solver *s, double *out) { dnls_fill(s, dnls_energy_row, out); }
 
 void dnls_casimirs(const dnls_solver *s, double *out) { (void)s, (void)out; }
 
-void dnls_vector_field(const dnls_solver *s, double *out) { dnls_fill(s, dnls_vector_field_row, out); }
+void dnls_vector_field(const dnls_solver *s, double *out)
+{
+    const dnls_row row = dnls_row_of(s);
+    dnls_vector_field_row(&row, out);
+}
 
 const char *dnls_status_string(dnls_status status)
 {

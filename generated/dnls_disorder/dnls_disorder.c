@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 376cb0464a8adc470b229027a55b6c474cc8114d5981def06b526d79be3ba28f
+ * body-sha256: 9bc63ac8ae818793cf0bbbff74f9efbf769d7bbe65e13b5dddb238915dc16f21
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -29,15 +29,12 @@ enum { dnls_disorder_RESERVED = 5 };       /* arrays over the sites in the memor
 enum { dnls_disorder_ROW = 2 };            /* coefficients of one flow */
 enum { dnls_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { dnls_disorder_FLOWS = 25 };         /* in a step */
-/* the row of the last flow of a step and the first of the next together */
-enum { dnls_disorder_JOINED = 25 };
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t dnls_disorder_least[dnls_disorder_AXES] = { 2 };
-static const size_t dnls_disorder_periods[dnls_disorder_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double dnls_disorder_times[dnls_disorder_ROWS_OF_FLOWS] = { 0.0792036964311957,
     0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077,
     -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456,
@@ -45,11 +42,9 @@ static const double dnls_disorder_times[dnls_disorder_ROWS_OF_FLOWS] = { 0.07920
     -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774,
     0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char dnls_disorder_flow_parts[dnls_disorder_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3,
-    2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1 };
-static const unsigned char dnls_disorder_flow_rows[dnls_disorder_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
-    11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24 };
+/* The parts of H that they are of. */
+static const unsigned char dnls_disorder_flow_parts[dnls_disorder_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2,
+    1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int dnls_disorder_allowed(const dnls_disorder_params *params, size_t sites)
@@ -128,15 +123,14 @@ static inline dnls_disorder_row dnls_disorder_piece_of(const dnls_disorder_solve
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define dnls_disorder_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double dnls_disorder_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double dnls_disorder_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + dnls_disorder_ROUNDER,
-        k = (shifted - dnls_disorder_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + dnls_disorder_ROUNDER,
+        k = shifted - dnls_disorder_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -154,9 +148,6 @@ static inline double dnls_disorder_turned_sin(double u, double offset)
     memcpy(&value, &bits, sizeof bits);
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
-
-/* sin u for the loops over lanes. */
-static inline double dnls_disorder_sin_lane(double u) { return dnls_disorder_turned_sin(u, 0.0); }
 
 /* The flow of H_1 = sum of -p*p[i+1]: q shifted. */
 static inline void dnls_disorder_sweep1(const double *coef, const dnls_disorder_row *row)
@@ -205,23 +196,22 @@ static inline void dnls_disorder_sweep3(const double *coef, const dnls_disorder_
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void dnls_disorder_sweep_piece(const dnls_disorder_solver *s, int part, const double *coef,
-    size_t unit)
+/* The flow of a part of H. */
+static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef)
 {
-    const dnls_disorder_row row = dnls_disorder_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        dnls_disorder_sweep1(coef, &row);
-        break;
-    case 2: /* H_2 */
-        dnls_disorder_sweep2(coef, &row);
-        break;
-    default: /* H_3 */
-        dnls_disorder_sweep3(coef, &row);
-        break;
+    const size_t units = dnls_disorder_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const dnls_disorder_row row = dnls_disorder_piece_of(s, unit);
+        switch (part) {
+        case 1: dnls_disorder_sweep1(coef, &row); break;
+        case 2: dnls_disorder_sweep2(coef, &row); break;
+        default: dnls_disorder_sweep3(coef, &row); break;
+        }
+        for (int k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_ends(s->x[k], s->length, row.from, row.to);
     }
-    for (int k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_ends(s->x[k], s->length, row.from, row.to);
 }
 
 /* The density of the Hamiltonian, at the sites of a row. */
@@ -264,8 +254,7 @@ enum { dnls_disorder_BUFFER = 256 }; /* densities that are added in one go */
 static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
-    if (sizes[0] < dnls_disorder_least[0] || sizes[0] % dnls_disorder_periods[0] != 0 || sizes[0] > most / 2)
-        return 0;
+    if (sizes[0] < dnls_disorder_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = dnls_disorder_LEAD + ((sizes[0] + 7) / 8 * 8 + dnls_disorder_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -305,7 +294,7 @@ static void dnls_disorder_put_parameter(const dnls_disorder_solver *s, double *r
 static void dnls_disorder_put_parameters(dnls_disorder_solver *s, const dnls_disorder_params *params)
 {
     dnls_disorder_put_parameter(s, s->x[2], params->e, 1.0);
-    s->params.e = NULL;
+s->params.e = NULL;
 }
 
 /* ---- The solver ---- */
@@ -383,24 +372,12 @@ static void dnls_disorder_copy(double *const *to, double *const *from, const dnl
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void dnls_disorder_sweep_part(const dnls_disorder_solver *s, int part, const double *coef)
-{
-    const size_t units = dnls_disorder_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) dnls_disorder_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void dnls_disorder_make_flow(const dnls_disorder_solver *s, size_t steps, int number)
 {
-    const int joined = number == dnls_disorder_FLOWS, row = joined ? dnls_disorder_JOINED
-        : dnls_disorder_flow_rows[number];
-    const double *coef = s->coef + row * dnls_disorder_ROW;
+    const double *coef = s->coef + number * dnls_disorder_ROW;
     (void)steps;
-    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[joined ? 0 : number], coef);
+    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -505,24 +482,18 @@ double dnls_disorder_hamiltonian(const dnls_disorder_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void dnls_disorder_fill(const dnls_disorder_solver *s, void kernel(const dnls_disorder_row *,
-    double *restrict), double *out)
-{
-    const dnls_disorder_row row = dnls_disorder_row_of(s);
-    kernel(&row, out);
-}
-
 void dnls_disorder_density(const dnls_disorder_solver *s, double *out)
 {
-    dnls_disorder_fill(s, dnls_disorder_energy_row, out);
+    const dnls_disorder_row row = dnls_disorder_row_of(s);
+    dnls_disorder_energy_row(&row, out);
 }
 
 void dnls_disorder_casimirs(const dnls_disorder_solver *s, double *out) { (void)s, (void)out; }
 
 void dnls_disorder_vector_field(const dnls_disorder_solver *s, double *out)
 {
-    dnls_disorder_fill(s, dnls_disorder_vector_field_row, out);
+    const dnls_disorder_row row = dnls_disorder_row_of(s);
+    dnls_disorder_vector_field_row(&row, out);
 }
 
 const char *dnls_disorder_status_string(dnls_disorder_status status)

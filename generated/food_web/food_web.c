@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: fa152888ffb093eb4cf6b303cba7aef6e588c9e1cf76c690c43d5f147ececc6d
+ * body-sha256: e5af7a89937e9d47046fdf9f13fdaad8261399979cadb95991b695bc8eab99c5
  */
 #include "food_web.h"
 #include <float.h>
@@ -24,23 +24,21 @@
 /* ---- The model ---- */
 const food_web_params food_web_default_params = { NULL, NULL };
 
-enum { food_web_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
-enum { food_web_ROW = 1 }; /* coefficients of one flow */
+enum { food_web_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
+enum { food_web_ROW = 1 };            /* coefficients of one flow */
 enum { food_web_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
-enum { food_web_FLOWS = 25 }; /* in a step */
-enum { food_web_JOINED = 25 }; /* the row of the last flow of a step and the first of the next together */
+enum { food_web_FLOWS = 25 };         /* in a step */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
-static const size_t food_web_periods[food_web_AXES] = { 1 };
 
 /* Whether a part of H is that of the sites of one colour. The flows are those of all parts, of each colour
    where so. */
 enum { food_web_PARTS = 1 };
 static const unsigned char food_web_by_colour[food_web_PARTS] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -48,12 +46,9 @@ static const double food_web_times[food_web_ROWS_OF_FLOWS] = { 0.079203696431195
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: 0 the first, 1 those between, 2 the last, 3 those between, backwards; and the row of
-   each. */
-static const unsigned char food_web_flow_parts[food_web_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 1,
-    2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0 };
-static const unsigned char food_web_flow_rows[food_web_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12,
-    13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24 };
+/* What these are: 0 the first flow, 1 those between, 2 the last, 3 those between, backwards. */
+static const unsigned char food_web_flow_parts[food_web_ROWS_OF_FLOWS] = { 0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3,
+    0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3, 0, 0 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int food_web_allowed(const food_web_params *params, size_t sites, size_t bonds)
@@ -191,15 +186,21 @@ static inline void food_web_sweep1(const double *coef, const food_web_row *row)
     }
 }
 
-/* A flow, for a piece of a row. */
-static void food_web_sweep_piece(const food_web_solver *s, int flow, const double *coef, size_t unit)
+/* A flow. */
+static void food_web_sweep_colour(const food_web_solver *s, int flow, const double *coef)
 {
     int part = 1, colour = flow;
     for (int own; colour >= (own = food_web_by_colour[part - 1] ? s->colour_count : 1); ++part) colour -= own;
-    food_web_row row = food_web_piece_of(s, unit);
-    row.chosen = colour;
-    food_web_gather1(coef, &row);
-    food_web_sweep1(coef, &row);
+    const size_t units = food_web_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        food_web_row row = food_web_piece_of(s, unit);
+        row.chosen = colour;
+        food_web_gather1(coef, &row);
+        food_web_sweep1(coef, &row);
+    }
 }
 
 /* What a site b adds to the forces at a site a. */
@@ -250,17 +251,14 @@ static int food_web_few(size_t sites, size_t bonds)
 /* The bytes for them, after the rows. */
 static size_t food_web_graph_size(size_t sites, size_t bonds)
 {
-    size_t integers = 2 * sites + 1 + 4 * bonds, doubles = 0;
-    integers += 2 * sites;
-    doubles += food_web_BOND_ARRAYS * 2 * bonds;
-    return doubles * sizeof(double) + integers * sizeof(int);
+    const size_t integers = 4 * sites + 1 + 4 * bonds;
+    return food_web_BOND_ARRAYS * 2 * bonds * sizeof(double) + integers * sizeof(int);
 }
 
 /* Whether all bonds run between two different sites. */
 static int food_web_connected(const food_web_bonds *bonds, size_t sites)
 {
-    if (bonds == NULL || bonds->count == 0) return 1;
-    if (bonds->ends == NULL) return 0;
+    if (bonds == NULL || bonds->ends == NULL) return bonds == NULL || bonds->count == 0;
     for (size_t k = 0; k < bonds->count; ++k) {
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         if (a >= sites || b >= sites || a == b) return 0;
@@ -319,12 +317,6 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
     food_web_colour(s, s->colours + sites);
 }
 
-/* The values of a parameter at bonds, or one value for all. */
-static void food_web_put_at_bond(const food_web_solver *s, double *at, const double *values, double value)
-{
-    for (int k = 0; k < s->bonds[s->sites]; ++k) at[k] = values != NULL ? values[s->number[k]] : value;
-}
-
 /* ---- The lattice ---- */
 enum { food_web_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
 enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
@@ -333,7 +325,7 @@ enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
-    if (sizes[0] < food_web_least[0] || sizes[0] % food_web_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -371,14 +363,16 @@ static void food_web_put_parameter(const food_web_solver *s, double *rows, const
 static void food_web_put_parameters(food_web_solver *s, const food_web_params *params)
 {
     food_web_put_parameter(s, s->x[1], params->k, 1.0);
-    s->params.k = NULL;
+s->params.k = NULL;
 }
 
 /* The parameters at bonds, in the order of the bonds of each site. */
 static void food_web_put_at_bonds(food_web_solver *s, const food_web_params *params)
 {
-    food_web_put_at_bond(s, s->at_bonds[0], params->A, 1.0);
-    s->params.A = NULL;
+    for (int k = 0; k < s->bonds[s->sites]; ++k) {
+        s->at_bonds[0][k] = params->A != NULL ? params->A[s->number[k]] : 1.0;
+    }
+s->params.A = NULL;
 }
 
 /* ---- The solver ---- */
@@ -459,34 +453,21 @@ static void food_web_copy(double *const *to, double *const *from, const food_web
 }
 
 /* ---- The flows ---- */
-/* One part of H, of one colour. */
-static void food_web_sweep_colour(const food_web_solver *s, int part, const double *coef)
-{
-    const size_t units = food_web_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) food_web_sweep_piece(s, part, coef, unit);
-}
-
 /* The first flow, those between it and the last, the last, or those between, backwards. */
 static void food_web_sweep_part(const food_web_solver *s, int kind, const double *coef)
 {
     const int last = s->flows - 1;
-    if (kind == 0 || kind == 2) food_web_sweep_colour(s, kind == 0 ? 0 : last, coef);
-    if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) food_web_sweep_colour(s, flow, coef);
-    if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) food_web_sweep_colour(s, flow, coef);
+    if (kind % 2 == 0) food_web_sweep_colour(s, kind == 0 ? 0 : last, coef);
+    for (int flow = 1; kind % 2 == 1 && flow < last; ++flow)
+        food_web_sweep_colour(s, kind == 1 ? flow : last - flow, coef);
 }
 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
 {
-    const int joined = number == food_web_FLOWS, row = joined ? food_web_JOINED : food_web_flow_rows[number];
-    const double *coef = s->coef + row * food_web_ROW;
+    const double *coef = s->coef + number * food_web_ROW;
     (void)steps;
-    food_web_sweep_part(s, food_web_flow_parts[joined ? 0 : number], coef);
+    food_web_sweep_part(s, food_web_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -586,21 +567,18 @@ double food_web_hamiltonian(const food_web_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void food_web_fill(const food_web_solver *s, void kernel(const food_web_row *, double *restrict),
-    double *out)
+void food_web_density(const food_web_solver *s, double *out)
 {
     const food_web_row row = food_web_row_of(s);
-    kernel(&row, out);
+    food_web_energy_row(&row, out);
 }
-
-void food_web_density(const food_web_solver *s, double *out) { food_web_fill(s, food_web_energy_row, out); }
 
 void food_web_casimirs(const food_web_solver *s, double *out) { (void)s, (void)out; }
 
 void food_web_vector_field(const food_web_solver *s, double *out)
 {
-    food_web_fill(s, food_web_vector_field_row, out);
+    const food_web_row row = food_web_row_of(s);
+    food_web_vector_field_row(&row, out);
 }
 
 const char *food_web_status_string(food_web_status status)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 94c7652458509a63919e1d2c7f77965e31eb633e64f01b2aee1be35aa97d7e31
+ * body-sha256: 417c045f18fa80d48b4e6eee7d792b29849fb9d3719ab0387d09ae4372038569
  */
 #include "fput.h"
 #include <float.h>
@@ -30,23 +30,20 @@ enum { fput_RESERVED = 4 }; /* arrays over the sites in the memory of a solver *
 enum { fput_ROW = 4 }; /* coefficients of one flow */
 enum { fput_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { fput_FLOWS = 13 }; /* in a step */
-enum { fput_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
 enum { fput_SPAN = 1 }; /* slices beside one that a flow reads: pieces of a row, or of the first axis */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t fput_least[fput_AXES] = { 2 };
-static const size_t fput_periods[fput_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double fput_times[fput_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.2452989571842711,
     0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083,
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
     0.08298440641740498, 0.16596881283480996 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char fput_flow_parts[fput_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1 };
-static const unsigned char fput_flow_rows[fput_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 };
+/* The parts of H that they are of. */
+static const unsigned char fput_flow_parts[fput_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 1 };
 
 /* Of each part of H the planes behind and ahead that are read, the fields that are read there, and those
    changed. */
@@ -162,7 +159,7 @@ static inline void fput_sweep2(const double *coef, const fput_row *row)
 static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, size_t first, size_t end)
 {
     switch (part) {
-    case 1: /* H_1 */
+    case 1:
         for (size_t unit = first; unit < end; ++unit) {
             const fput_row row = fput_piece_of(s, unit);
             if (row.from >= row.to) continue;
@@ -170,7 +167,7 @@ static void fput_sweep_rows(const fput_solver *s, int part, const double *coef, 
             fput_ends(s->x[1], s->length, row.from, row.to);
         }
         break;
-    default: /* H_2 */
+    default:
         for (size_t unit = first; unit < end; ++unit) {
             const fput_row row = fput_piece_of(s, unit);
             if (row.from >= row.to) continue;
@@ -254,7 +251,7 @@ enum { fput_BUFFER = 256 }; /* densities that are added in one go */
 static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / fput_RESERVED;
-    if (sizes[0] < fput_least[0] || sizes[0] % fput_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes[0] < fput_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = fput_LEAD + ((sizes[0] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -375,10 +372,9 @@ typedef struct {
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void fput_find_flow(const fput_solver *s, size_t steps, int number, fput_flow *flow)
 {
-    const int joined = number == fput_FLOWS, row = joined ? fput_JOINED : fput_flow_rows[number];
-    flow->part = fput_flow_parts[joined ? 0 : number];
+    flow->part = fput_flow_parts[number];
+    flow->coef = s->coef + number * fput_ROW;
     (void)steps;
-    flow->coef = s->coef + row * fput_ROW;
 }
 
 static void fput_make_flow(const fput_solver *s, size_t steps, int number)
@@ -568,18 +564,19 @@ double fput_hamiltonian(const fput_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void fput_fill(const fput_solver *s, void kernel(const fput_row *, double *restrict), double *out)
+void fput_density(const fput_solver *s, double *out)
 {
     const fput_row row = fput_row_of(s);
-    kernel(&row, out);
+    fput_energy_row(&row, out);
 }
-
-void fput_density(const fput_solver *s, double *out) { fput_fill(s, fput_energy_row, out); }
 
 void fput_casimirs(const fput_solver *s, double *out) { (void)s, (void)out; }
 
-void fput_vector_field(const fput_solver *s, double *out) { fput_fill(s, fput_vector_field_row, out); }
+void fput_vector_field(const fput_solver *s, double *out)
+{
+    const fput_row row = fput_row_of(s);
+    fput_vector_field_row(&row, out);
+}
 
 /* ---- Steps by hand ---- */
 size_t fput_stages(void) { return fput_FLOWS; }
@@ -587,7 +584,7 @@ size_t fput_stages(void) { return fput_FLOWS; }
 fput_status fput_describe(size_t number, fput_stage *about)
 {
     if (number > fput_FLOWS || about == NULL) return fput_BAD_ARGUMENT;
-    *about = fput_stages_of[fput_flow_parts[number == fput_FLOWS ? 0 : number] - 1];
+    *about = fput_stages_of[fput_flow_parts[number] - 1];
     return fput_OK;
 }
 
@@ -598,9 +595,8 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
     if (s == NULL || !s->prepared || number > fput_FLOWS || from > to || to > s->sizes[0])
         return fput_BAD_ARGUMENT;
     (void)far;
-    const int joined = number == fput_FLOWS, part = fput_flow_parts[joined ? 0 : number];
-    const int row = joined ? fput_JOINED : fput_flow_rows[number];
-    const double *coef = s->coef + row * fput_ROW;
+    const int part = fput_flow_parts[number];
+    const double *coef = s->coef + number * fput_ROW;
     const size_t units = fput_units(s);
     s->open = 0;
     s->from = (ptrdiff_t)from;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 0963fe372f6ed89f14ec3089fc7fb4058cbd9b022db8179d51f76c0e1bde5f1f
+ * body-sha256: f36bf30510fbfad804783c6cf6918d18266c4aaa4f517283c9a064b59be6d6f1
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -31,25 +31,22 @@ enum { heisenberg_LINES = 5 }; /* rows that kernels read: the row itself and tho
 enum { heisenberg_ROW = 3 }; /* coefficients of one flow */
 enum { heisenberg_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { heisenberg_FLOWS = 5 }; /* in a step */
-enum { heisenberg_JOINED = 5 }; /* the row of the last flow of a step and the first of the next together */
 enum { heisenberg_SPAN = 1 }; /* slices beside one that a flow reads: pieces of a row, or of the first axis */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, whether the ends are open. */
 static const size_t heisenberg_least[heisenberg_AXES] = { 2, 2, 2 };
-static const size_t heisenberg_periods[heisenberg_AXES] = { 1, 1, 1 };
 static const int heisenberg_open[heisenberg_AXES] = { 0, 0, 0 };
 
 /* The rows that kernels read, by their offsets along all axes but the last. */
 static const int heisenberg_lines[heisenberg_LINES][heisenberg_AXES] = { { 0, 0, 0 }, { -1, 0, 0 },
     { 0, -1, 0 }, { 0, 1, 0 }, { 1, 0, 0 } };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double heisenberg_times[heisenberg_ROWS_OF_FLOWS] = { 0.5, 0.5, 1.0, 0.5, 0.5, 1.0 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char heisenberg_flow_parts[heisenberg_FLOWS] = { 1, 2, 3, 2, 1 };
-static const unsigned char heisenberg_flow_rows[heisenberg_FLOWS] = { 0, 1, 2, 3, 4 };
+/* The parts of H that they are of. */
+static const unsigned char heisenberg_flow_parts[heisenberg_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 1 };
 
 /* Of each part of H the planes behind and ahead that are read, the fields that are read there, and those
    changed. */
@@ -139,15 +136,13 @@ static inline const heisenberg_row *heisenberg_between(heisenberg_row *row, ptrd
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define heisenberg_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double heisenberg_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double heisenberg_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + heisenberg_ROUNDER,
-        k = (shifted - heisenberg_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + heisenberg_ROUNDER, k = shifted - heisenberg_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -165,9 +160,6 @@ static inline double heisenberg_turned_sin(double u, double offset)
     memcpy(&value, &bits, sizeof bits);
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
-
-/* sin u for the loops over lanes. */
-static inline double heisenberg_sin_lane(double u) { return heisenberg_turned_sin(u, 0.0); }
 
 /* sin(t), in the loops over sites: a polynomial, no branches. No number beyond |t| = 0.5. */
 static inline double heisenberg_sin_near(double t)
@@ -400,15 +392,9 @@ static void heisenberg_sweep_rows(const heisenberg_solver *s, int part, const do
     size_t first, size_t end)
 {
     switch (part) {
-    case 1: /* H_1 */
-        (far ? heisenberg_rows1_far : heisenberg_rows1_near)(s, coef, first, end);
-        break;
-    case 2: /* H_2 */
-        (far ? heisenberg_rows2_far : heisenberg_rows2_near)(s, coef, first, end);
-        break;
-    default: /* H_3 */
-        (far ? heisenberg_rows3_far : heisenberg_rows3_near)(s, coef, first, end);
-        break;
+    case 1: (far ? heisenberg_rows1_far : heisenberg_rows1_near)(s, coef, first, end); break;
+    case 2: (far ? heisenberg_rows2_far : heisenberg_rows2_near)(s, coef, first, end); break;
+    default: (far ? heisenberg_rows3_far : heisenberg_rows3_near)(s, coef, first, end); break;
     }
 }
 
@@ -523,8 +509,7 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
     const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < heisenberg_AXES; ++a)
-        if (sizes[a] < heisenberg_least[a] || sizes[a] % heisenberg_periods[a] != 0 || sizes[a] > most / 2)
-            return 0;
+        if (sizes[a] < heisenberg_least[a] || sizes[a] > most / 2) return 0;
     for (int a = 0; a < heisenberg_AXES - 1; ++a) {
         if (rows > most / sizes[a]) return 0;
         rows *= sizes[a];
@@ -576,7 +561,7 @@ static void heisenberg_put_parameter(const heisenberg_solver *s, double *rows, c
 static void heisenberg_put_parameters(heisenberg_solver *s, const heisenberg_params *params)
 {
     heisenberg_put_parameter(s, s->x[3], params->B, 0.2);
-    s->params.B = NULL;
+s->params.B = NULL;
 }
 
 /* Where a row is, and those beside it. */
@@ -695,11 +680,9 @@ typedef struct {
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void heisenberg_find_flow(const heisenberg_solver *s, size_t steps, int number, heisenberg_flow *flow)
 {
-    const int joined = number == heisenberg_FLOWS, row = joined ? heisenberg_JOINED
-        : heisenberg_flow_rows[number];
-    flow->part = heisenberg_flow_parts[joined ? 0 : number];
+    flow->part = heisenberg_flow_parts[number];
+    flow->coef = s->coef + number * heisenberg_ROW;
     (void)steps;
-    flow->coef = s->coef + row * heisenberg_ROW;
 }
 
 static void heisenberg_make_flow(const heisenberg_solver *s, size_t steps, int number)
@@ -925,29 +908,28 @@ double heisenberg_hamiltonian(const heisenberg_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void heisenberg_fill(const heisenberg_solver *s, void kernel(const heisenberg_row *, double *restrict),
-    double *out)
+void heisenberg_density(const heisenberg_solver *s, double *out)
 {
     for (size_t r = 0; r < s->rows; ++r) {
         const heisenberg_row row = heisenberg_piece_of(s, r);
-        kernel(&row, out + r * (size_t)s->length);
+        heisenberg_energy_row(&row, out + r * (size_t)s->length);
     }
-}
-
-void heisenberg_density(const heisenberg_solver *s, double *out)
-{
-    heisenberg_fill(s, heisenberg_energy_row, out);
 }
 
 void heisenberg_casimirs(const heisenberg_solver *s, double *out)
 {
-    heisenberg_fill(s, heisenberg_casimirs_row, out);
+    for (size_t r = 0; r < s->rows; ++r) {
+        const heisenberg_row row = heisenberg_piece_of(s, r);
+        heisenberg_casimirs_row(&row, out + r * (size_t)s->length);
+    }
 }
 
 void heisenberg_vector_field(const heisenberg_solver *s, double *out)
 {
-    heisenberg_fill(s, heisenberg_vector_field_row, out);
+    for (size_t r = 0; r < s->rows; ++r) {
+        const heisenberg_row row = heisenberg_piece_of(s, r);
+        heisenberg_vector_field_row(&row, out + r * (size_t)s->length);
+    }
 }
 
 /* ---- Steps by hand ---- */
@@ -956,7 +938,7 @@ size_t heisenberg_stages(void) { return heisenberg_FLOWS; }
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about)
 {
     if (number > heisenberg_FLOWS || about == NULL) return heisenberg_BAD_ARGUMENT;
-    *about = heisenberg_stages_of[heisenberg_flow_parts[number == heisenberg_FLOWS ? 0 : number] - 1];
+    *about = heisenberg_stages_of[heisenberg_flow_parts[number] - 1];
     return heisenberg_OK;
 }
 
@@ -969,9 +951,8 @@ heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far,
 {
     if (s == NULL || !s->prepared || number > heisenberg_FLOWS || from > to || to > s->sizes[0])
         return heisenberg_BAD_ARGUMENT;
-    const int joined = number == heisenberg_FLOWS, part = heisenberg_flow_parts[joined ? 0 : number];
-    const int row = joined ? heisenberg_JOINED : heisenberg_flow_rows[number];
-    const double *coef = s->coef + row * heisenberg_ROW;
+    const int part = heisenberg_flow_parts[number];
+    const double *coef = s->coef + number * heisenberg_ROW;
     const size_t units = heisenberg_rows_of_plane(s);
     s->open = 0;
     heisenberg_sweep_rows(s, part, coef, far, from * units, to * units);

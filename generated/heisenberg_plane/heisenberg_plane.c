@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7154d94d850487edd807b6ec6285fa03ca0752145260a10e33ad03535e5d4bd2
+ * body-sha256: 65e23b4ceb68cf628e6c4eb67cbcd2b5083477b6e31aa229db2f6ab93f1b4e3e
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -30,13 +30,10 @@ enum { heisenberg_plane_LINES = 3 };          /* rows that kernels read: the row
 enum { heisenberg_plane_ROW = 2 };            /* coefficients of one flow */
 enum { heisenberg_plane_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
 enum { heisenberg_plane_FLOWS = 25 };         /* in a step */
-/* the row of the last flow of a step and the first of the next together */
-enum { heisenberg_plane_JOINED = 25 };
-enum { heisenberg_plane_WEIGHTS = 4 }; /* kinds of terms that open ends take away */
+enum { heisenberg_plane_WEIGHTS = 4 };        /* kinds of terms that open ends take away */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, whether the ends are open. */
 static const size_t heisenberg_plane_least[heisenberg_plane_AXES] = { 2, 2 };
-static const size_t heisenberg_plane_periods[heisenberg_plane_AXES] = { 1, 1 };
 static const int heisenberg_plane_open[heisenberg_plane_AXES] = { 1, 1 };
 
 /* The rows that kernels read, by their offsets along all axes but the last. */
@@ -48,8 +45,8 @@ static const int heisenberg_plane_lines[heisenberg_plane_LINES][heisenberg_plane
 static const int heisenberg_plane_weights[heisenberg_plane_WEIGHTS][heisenberg_plane_AXES][2] =
     { { { 0, 0 }, { 0, 1 } }, { { 0, 0 }, { -1, 0 } }, { { 0, 1 }, { 0, 0 } }, { { -1, 0 }, { 0, 0 } } };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double heisenberg_plane_times[heisenberg_plane_ROWS_OF_FLOWS] = { 0.0792036964311957,
     0.0792036964311957, 0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077,
     -0.143851773179818, -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456,
@@ -57,11 +54,9 @@ static const double heisenberg_plane_times[heisenberg_plane_ROWS_OF_FLOWS] = { 0
     -0.0420650803577195, -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774,
     0.1303114101821663, 0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char heisenberg_plane_flow_parts[heisenberg_plane_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1,
-    2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1 };
-static const unsigned char heisenberg_plane_flow_rows[heisenberg_plane_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8,
-    9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24 };
+/* The parts of H that they are of. */
+static const unsigned char heisenberg_plane_flow_parts[heisenberg_plane_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 2,
+    3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int heisenberg_plane_allowed(const heisenberg_plane_params *params, size_t sites)
@@ -158,15 +153,14 @@ static inline const heisenberg_plane_row *heisenberg_plane_between(heisenberg_pl
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define heisenberg_plane_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double heisenberg_plane_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double heisenberg_plane_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + heisenberg_plane_ROUNDER,
-        k = (shifted - heisenberg_plane_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + heisenberg_plane_ROUNDER,
+        k = shifted - heisenberg_plane_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -185,11 +179,8 @@ static inline double heisenberg_plane_turned_sin(double u, double offset)
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
 
-/* sin u for the loops over lanes. */
-static inline double heisenberg_plane_sin_lane(double u) { return heisenberg_plane_turned_sin(u, 0.0); }
-
-/* The flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned. The flow of H_2 = sum of
-   -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned, where x, y, z stand for its y, z, x. */
+/* The flow of H_1 = sum of -(J*(x*x[i+1]) + J*(x*x[j+1])): y, z turned.
+   The flow of H_2 = sum of -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned. */
 static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenberg_plane_row *row)
 {
     const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
@@ -237,29 +228,37 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void heisenberg_plane_sweep_piece(const heisenberg_plane_solver *s, int part, const double *coef,
-    size_t unit)
+/* The flow of a part of H. */
+static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef)
 {
+    const size_t units = heisenberg_plane_units(s);
+    /* the fields in other orders, in which loops that are for one order serve others */
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0] };
-    heisenberg_plane_row row = heisenberg_plane_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        heisenberg_plane_sweep_y_z(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
-        heisenberg_plane_ends(s->x[1] + row.at[0], s->length, 0, s->length);
-        heisenberg_plane_ends(s->x[2] + row.at[0], s->length, 0, s->length);
-        break;
-    case 2: /* H_2 */
-        row.x = y_z_x;
-        heisenberg_plane_sweep_y_z(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
-        heisenberg_plane_ends(s->x[0] + row.at[0], s->length, 0, s->length);
-        heisenberg_plane_ends(s->x[2] + row.at[0], s->length, 0, s->length);
-        break;
-    default: /* H_3 */
-        heisenberg_plane_sweep3(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
-        heisenberg_plane_ends(s->x[0] + row.at[0], s->length, 0, s->length);
-        heisenberg_plane_ends(s->x[1] + row.at[0], s->length, 0, s->length);
-        break;
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        heisenberg_plane_row row = heisenberg_plane_piece_of(s, unit);
+        switch (part) {
+        case 1:
+            heisenberg_plane_sweep_y_z(coef, heisenberg_plane_between(&row, 0,
+                (s->length + 7) & ~(ptrdiff_t)7));
+            heisenberg_plane_ends(s->x[1] + row.at[0], s->length, 0, s->length);
+            heisenberg_plane_ends(s->x[2] + row.at[0], s->length, 0, s->length);
+            break;
+        case 2:
+            row.x = y_z_x;
+            heisenberg_plane_sweep_y_z(coef, heisenberg_plane_between(&row, 0,
+                (s->length + 7) & ~(ptrdiff_t)7));
+            heisenberg_plane_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+            heisenberg_plane_ends(s->x[2] + row.at[0], s->length, 0, s->length);
+            break;
+        default:
+            heisenberg_plane_sweep3(coef, heisenberg_plane_between(&row, 0, (s->length + 7) & ~(ptrdiff_t)7));
+            heisenberg_plane_ends(s->x[0] + row.at[0], s->length, 0, s->length);
+            heisenberg_plane_ends(s->x[1] + row.at[0], s->length, 0, s->length);
+            break;
+        }
     }
 }
 
@@ -336,8 +335,7 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
     const size_t most = SIZE_MAX / 64 / heisenberg_plane_RESERVED;
     size_t rows = 1;
     for (int a = 0; a < heisenberg_plane_AXES; ++a)
-        if (sizes[a] < heisenberg_plane_least[a] || sizes[a] % heisenberg_plane_periods[a] != 0
-            || sizes[a] > most / 2) return 0;
+        if (sizes[a] < heisenberg_plane_least[a] || sizes[a] > most / 2) return 0;
     for (int a = 0; a < heisenberg_plane_AXES - 1; ++a) {
         if (rows > most / sizes[a]) return 0;
         rows *= sizes[a];
@@ -475,24 +473,12 @@ static void heisenberg_plane_copy(double *const *to, double *const *from, const 
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int part, const double *coef)
-{
-    const size_t units = heisenberg_plane_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) heisenberg_plane_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void heisenberg_plane_make_flow(const heisenberg_plane_solver *s, size_t steps, int number)
 {
-    const int joined = number == heisenberg_plane_FLOWS, row = joined ? heisenberg_plane_JOINED
-        : heisenberg_plane_flow_rows[number];
-    const double *coef = s->coef + row * heisenberg_plane_ROW;
+    const double *coef = s->coef + number * heisenberg_plane_ROW;
     (void)steps;
-    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[joined ? 0 : number], coef);
+    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -609,29 +595,28 @@ double heisenberg_plane_hamiltonian(const heisenberg_plane_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void heisenberg_plane_fill(const heisenberg_plane_solver *s, void kernel(const heisenberg_plane_row *,
-    double *restrict), double *out)
+void heisenberg_plane_density(const heisenberg_plane_solver *s, double *out)
 {
     for (size_t r = 0; r < s->rows; ++r) {
         const heisenberg_plane_row row = heisenberg_plane_piece_of(s, r);
-        kernel(&row, out + r * (size_t)s->length);
+        heisenberg_plane_energy_row(&row, out + r * (size_t)s->length);
     }
-}
-
-void heisenberg_plane_density(const heisenberg_plane_solver *s, double *out)
-{
-    heisenberg_plane_fill(s, heisenberg_plane_energy_row, out);
 }
 
 void heisenberg_plane_casimirs(const heisenberg_plane_solver *s, double *out)
 {
-    heisenberg_plane_fill(s, heisenberg_plane_casimirs_row, out);
+    for (size_t r = 0; r < s->rows; ++r) {
+        const heisenberg_plane_row row = heisenberg_plane_piece_of(s, r);
+        heisenberg_plane_casimirs_row(&row, out + r * (size_t)s->length);
+    }
 }
 
 void heisenberg_plane_vector_field(const heisenberg_plane_solver *s, double *out)
 {
-    heisenberg_plane_fill(s, heisenberg_plane_vector_field_row, out);
+    for (size_t r = 0; r < s->rows; ++r) {
+        const heisenberg_plane_row row = heisenberg_plane_piece_of(s, r);
+        heisenberg_plane_vector_field_row(&row, out + r * (size_t)s->length);
+    }
 }
 
 const char *heisenberg_plane_status_string(heisenberg_plane_status status)

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: df08a6461068fdfec1025949b3593c03add2eee45eef3fa6fb1e4310e2a0f92e
+ * body-sha256: fa432bd30169df8bcd2792219703a5406ce58c60d98bfffef113b71922cefcc7
  */
 #include "kdv.h"
 #include <float.h>
@@ -36,9 +36,8 @@ enum { kdv_MOST_SWEEPS = 200 }; /* that a stage may take */
 enum { kdv_REACH = 2 };         /* sites that y at a site depends on, to each side */
 enum { kdv_BAND = 2 };          /* diagonals beside that of the matrix of Newton's method */
 
-/* Along each axis: the smallest size, what sizes are multiples of, whether the ends are open. */
+/* Along each axis: the smallest size, whether the ends are open. */
 static const size_t kdv_least[kdv_AXES] = { 2 };
-static const size_t kdv_periods[kdv_AXES] = { 1 };
 static const int kdv_open[kdv_AXES] = { 0 };
 
 /* The stages of one step, as fractions of it, each with a row of coefficients. */
@@ -299,7 +298,7 @@ enum { kdv_BUFFER = 256 }; /* densities that are added in one go */
 static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / (kdv_RESERVED + 8 * kdv_BAND * kdv_DIM);
-    if (sizes[0] < kdv_least[0] || sizes[0] % kdv_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes[0] < kdv_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = kdv_LEAD + ((sizes[0] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -840,18 +839,23 @@ double kdv_hamiltonian(const kdv_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void kdv_fill(const kdv_solver *s, void kernel(const kdv_row *, double *restrict), double *out)
+void kdv_density(const kdv_solver *s, double *out)
 {
     const kdv_row row = kdv_row_of(s);
-    kernel(&row, out);
+    kdv_energy_row(&row, out);
 }
 
-void kdv_density(const kdv_solver *s, double *out) { kdv_fill(s, kdv_energy_row, out); }
+void kdv_casimirs(const kdv_solver *s, double *out)
+{
+    const kdv_row row = kdv_row_of(s);
+    kdv_casimirs_row(&row, out);
+}
 
-void kdv_casimirs(const kdv_solver *s, double *out) { kdv_fill(s, kdv_casimirs_row, out); }
-
-void kdv_vector_field(const kdv_solver *s, double *out) { kdv_fill(s, kdv_vector_field_row, out); }
+void kdv_vector_field(const kdv_solver *s, double *out)
+{
+    const kdv_row row = kdv_row_of(s);
+    kdv_vector_field_row(&row, out);
+}
 
 const char *kdv_status_string(kdv_status status)
 {

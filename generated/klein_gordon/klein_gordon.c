@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: ac27021553cc8a84f447120f74194da40ee22900bdb47b131884e46de4f7afd9
+ * body-sha256: 7ba6049501963101729435481d7494498ca3c3bdd0299d0e41422caed5753ccc
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -23,30 +23,26 @@
 /* ---- The model ---- */
 const klein_gordon_params klein_gordon_default_params = { 0.2 };
 
-enum { klein_gordon_HALO = 1 }; /* sites that are copied beside a row */
-enum { klein_gordon_LEAD = 8 }; /* doubles before the first site of a row */
-enum { klein_gordon_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
-enum { klein_gordon_ROW = 2 }; /* coefficients of one flow */
+enum { klein_gordon_HALO = 1 };           /* sites that are copied beside a row */
+enum { klein_gordon_LEAD = 8 };           /* doubles before the first site of a row */
+enum { klein_gordon_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
+enum { klein_gordon_ROW = 2 };            /* coefficients of one flow */
 enum { klein_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
-enum { klein_gordon_FLOWS = 13 }; /* in a step */
-enum { klein_gordon_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
+enum { klein_gordon_FLOWS = 13 };         /* in a step */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t klein_gordon_least[klein_gordon_AXES] = { 2 };
-static const size_t klein_gordon_periods[klein_gordon_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double klein_gordon_times[klein_gordon_ROWS_OF_FLOWS] = { 0.08298440641740498,
     0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103,
     0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803,
     0.2452989571842711, 0.08298440641740498, 0.16596881283480996 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char klein_gordon_flow_parts[klein_gordon_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2,
-    1 };
-static const unsigned char klein_gordon_flow_rows[klein_gordon_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
-    11, 12 };
+/* The parts of H that they are of. */
+static const unsigned char klein_gordon_flow_parts[klein_gordon_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1,
+    2, 1, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int klein_gordon_allowed(const klein_gordon_params *params, size_t sites)
@@ -146,19 +142,21 @@ static inline void klein_gordon_sweep2(const double *coef, const klein_gordon_ro
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void klein_gordon_sweep_piece(const klein_gordon_solver *s, int part, const double *coef, size_t unit)
+/* The flow of a part of H. */
+static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef)
 {
-    const klein_gordon_row row = klein_gordon_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        klein_gordon_sweep1(coef, &row);
-        klein_gordon_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    default: /* H_2 */
-        klein_gordon_sweep2(coef, &row);
-        klein_gordon_ends(s->x[0], s->length, row.from, row.to);
-        break;
+    const size_t units = klein_gordon_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const klein_gordon_row row = klein_gordon_piece_of(s, unit);
+        switch (part) {
+        case 1: klein_gordon_sweep1(coef, &row); klein_gordon_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        default: klein_gordon_sweep2(coef, &row); klein_gordon_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -202,8 +200,7 @@ enum { klein_gordon_BUFFER = 256 }; /* densities that are added in one go */
 static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
-    if (sizes[0] < klein_gordon_least[0] || sizes[0] % klein_gordon_periods[0] != 0 || sizes[0] > most / 2)
-        return 0;
+    if (sizes[0] < klein_gordon_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = klein_gordon_LEAD + ((sizes[0] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -303,24 +300,12 @@ static void klein_gordon_copy(double *const *to, double *const *from, const klei
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void klein_gordon_sweep_part(const klein_gordon_solver *s, int part, const double *coef)
-{
-    const size_t units = klein_gordon_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) klein_gordon_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void klein_gordon_make_flow(const klein_gordon_solver *s, size_t steps, int number)
 {
-    const int joined = number == klein_gordon_FLOWS, row = joined ? klein_gordon_JOINED
-        : klein_gordon_flow_rows[number];
-    const double *coef = s->coef + row * klein_gordon_ROW;
+    const double *coef = s->coef + number * klein_gordon_ROW;
     (void)steps;
-    klein_gordon_sweep_part(s, klein_gordon_flow_parts[joined ? 0 : number], coef);
+    klein_gordon_sweep_part(s, klein_gordon_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -425,24 +410,18 @@ double klein_gordon_hamiltonian(const klein_gordon_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void klein_gordon_fill(const klein_gordon_solver *s, void kernel(const klein_gordon_row *,
-    double *restrict), double *out)
-{
-    const klein_gordon_row row = klein_gordon_row_of(s);
-    kernel(&row, out);
-}
-
 void klein_gordon_density(const klein_gordon_solver *s, double *out)
 {
-    klein_gordon_fill(s, klein_gordon_energy_row, out);
+    const klein_gordon_row row = klein_gordon_row_of(s);
+    klein_gordon_energy_row(&row, out);
 }
 
 void klein_gordon_casimirs(const klein_gordon_solver *s, double *out) { (void)s, (void)out; }
 
 void klein_gordon_vector_field(const klein_gordon_solver *s, double *out)
 {
-    klein_gordon_fill(s, klein_gordon_vector_field_row, out);
+    const klein_gordon_row row = klein_gordon_row_of(s);
+    klein_gordon_vector_field_row(&row, out);
 }
 
 const char *klein_gordon_status_string(klein_gordon_status status)

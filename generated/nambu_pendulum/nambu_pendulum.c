@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: e56265c1a5d7d38c4e593b1395cc7c148e68742f9eae2094105ae613d413471f
+ * body-sha256: 0a098811ad6cc691eaade822b05e3ff4a55f401c85a7e0c1b5a7ce9a5cfe3f12
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -807,7 +807,7 @@ static inline double nambu_pendulum_turned_sin(double u, double offset)
         k = (shifted - nambu_pendulum_ROUNDER) - offset;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;

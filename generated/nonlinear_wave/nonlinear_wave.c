@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 127da345aadf4f2b89c7516eb884be67a6593be787b625f9c7b94cc9f2383baa
+ * body-sha256: 7afbd0afb07058f204099c27de7ca1b4e30dc0d16d1ec3154cf8a99e47aa9394
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -29,25 +29,20 @@ enum { nonlinear_wave_RESERVED = 4 };       /* arrays over the sites in the memo
 enum { nonlinear_wave_ROW = 4 };            /* coefficients of one flow */
 enum { nonlinear_wave_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { nonlinear_wave_FLOWS = 13 };         /* in a step */
-/* the row of the last flow of a step and the first of the next together */
-enum { nonlinear_wave_JOINED = 13 };
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t nonlinear_wave_least[nonlinear_wave_AXES] = { 2 };
-static const size_t nonlinear_wave_periods[nonlinear_wave_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double nonlinear_wave_times[nonlinear_wave_ROWS_OF_FLOWS] = { 0.08298440641740498,
     0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103,
     0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803,
     0.2452989571842711, 0.08298440641740498, 0.16596881283480996 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char nonlinear_wave_flow_parts[nonlinear_wave_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2,
-    1, 2, 1 };
-static const unsigned char nonlinear_wave_flow_rows[nonlinear_wave_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9,
-    10, 11, 12 };
+/* The parts of H that they are of. */
+static const unsigned char nonlinear_wave_flow_parts[nonlinear_wave_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2,
+    1, 2, 1, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int nonlinear_wave_allowed(const nonlinear_wave_params *params, size_t sites)
@@ -151,20 +146,21 @@ static inline void nonlinear_wave_sweep2(const double *coef, const nonlinear_wav
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void nonlinear_wave_sweep_piece(const nonlinear_wave_solver *s, int part, const double *coef,
-    size_t unit)
+/* The flow of a part of H. */
+static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef)
 {
-    const nonlinear_wave_row row = nonlinear_wave_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        nonlinear_wave_sweep1(coef, &row);
-        nonlinear_wave_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    default: /* H_2 */
-        nonlinear_wave_sweep2(coef, &row);
-        nonlinear_wave_ends(s->x[0], s->length, row.from, row.to);
-        break;
+    const size_t units = nonlinear_wave_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const nonlinear_wave_row row = nonlinear_wave_piece_of(s, unit);
+        switch (part) {
+        case 1: nonlinear_wave_sweep1(coef, &row); nonlinear_wave_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        default: nonlinear_wave_sweep2(coef, &row); nonlinear_wave_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -221,8 +217,7 @@ enum { nonlinear_wave_BUFFER = 256 }; /* densities that are added in one go */
 static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
-    if (sizes[0] < nonlinear_wave_least[0] || sizes[0] % nonlinear_wave_periods[0] != 0
-        || sizes[0] > most / 2) return 0;
+    if (sizes[0] < nonlinear_wave_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = nonlinear_wave_LEAD + ((sizes[0] + 7) / 8 * 8 + nonlinear_wave_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -324,24 +319,12 @@ static void nonlinear_wave_copy(double *const *to, double *const *from, const no
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void nonlinear_wave_sweep_part(const nonlinear_wave_solver *s, int part, const double *coef)
-{
-    const size_t units = nonlinear_wave_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) nonlinear_wave_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void nonlinear_wave_make_flow(const nonlinear_wave_solver *s, size_t steps, int number)
 {
-    const int joined = number == nonlinear_wave_FLOWS, row = joined ? nonlinear_wave_JOINED
-        : nonlinear_wave_flow_rows[number];
-    const double *coef = s->coef + row * nonlinear_wave_ROW;
+    const double *coef = s->coef + number * nonlinear_wave_ROW;
     (void)steps;
-    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[joined ? 0 : number], coef);
+    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -446,27 +429,22 @@ double nonlinear_wave_hamiltonian(const nonlinear_wave_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void nonlinear_wave_fill(const nonlinear_wave_solver *s, void kernel(const nonlinear_wave_row *,
-    double *restrict), double *out)
-{
-    const nonlinear_wave_row row = nonlinear_wave_row_of(s);
-    kernel(&row, out);
-}
-
 void nonlinear_wave_density(const nonlinear_wave_solver *s, double *out)
 {
-    nonlinear_wave_fill(s, nonlinear_wave_energy_row, out);
+    const nonlinear_wave_row row = nonlinear_wave_row_of(s);
+    nonlinear_wave_energy_row(&row, out);
 }
 
 void nonlinear_wave_casimirs(const nonlinear_wave_solver *s, double *out)
 {
-    nonlinear_wave_fill(s, nonlinear_wave_casimirs_row, out);
+    const nonlinear_wave_row row = nonlinear_wave_row_of(s);
+    nonlinear_wave_casimirs_row(&row, out);
 }
 
 void nonlinear_wave_vector_field(const nonlinear_wave_solver *s, double *out)
 {
-    nonlinear_wave_fill(s, nonlinear_wave_vector_field_row, out);
+    const nonlinear_wave_row row = nonlinear_wave_row_of(s);
+    nonlinear_wave_vector_field_row(&row, out);
 }
 
 const char *nonlinear_wave_status_string(nonlinear_wave_status status)

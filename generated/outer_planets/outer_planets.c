@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c5e9619189a1461b0b2b5ef2c362d35826765c094e80fa0597078f831d14df19
+ * body-sha256: 524bc60f3e22ea11163641b2ed4badb3cc44fb00d6f9bc183b0751617ecfafd3
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -27,25 +27,20 @@ enum { outer_planets_RESERVED = 16 };      /* arrays over the sites in the memor
 enum { outer_planets_ROW = 2 };            /* coefficients of one flow */
 enum { outer_planets_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { outer_planets_FLOWS = 13 };         /* in a step */
-/* the row of the last flow of a step and the first of the next together */
-enum { outer_planets_JOINED = 13 };
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t outer_planets_least[outer_planets_AXES] = { 1 };
-static const size_t outer_planets_periods[outer_planets_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double outer_planets_times[outer_planets_ROWS_OF_FLOWS] = { 0.08298440641740498,
     0.2452989571842711, 0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103,
     0.11952419401315083, -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803,
     0.2452989571842711, 0.08298440641740498, 0.16596881283480996 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char outer_planets_flow_parts[outer_planets_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1,
-    2, 1 };
-static const unsigned char outer_planets_flow_rows[outer_planets_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
-    11, 12 };
+/* The parts of H that they are of. */
+static const unsigned char outer_planets_flow_parts[outer_planets_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2,
+    1, 2, 1, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int outer_planets_allowed(const outer_planets_params *params, size_t sites)
@@ -173,19 +168,19 @@ static inline void outer_planets_sweep2(const double *coef, const outer_planets_
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void outer_planets_sweep_piece(const outer_planets_solver *s, int part, const double *coef,
-    size_t unit)
+/* The flow of a part of H. */
+static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef)
 {
-    const outer_planets_row row = outer_planets_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        outer_planets_gather1(coef, &row);
-        outer_planets_sweep1(coef, &row);
-        break;
-    default: /* H_2 */
-        outer_planets_sweep2(coef, &row);
-        break;
+    const size_t units = outer_planets_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 512)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const outer_planets_row row = outer_planets_piece_of(s, unit);
+        switch (part) {
+        case 1: outer_planets_gather1(coef, &row); outer_planets_sweep1(coef, &row); break;
+        default: outer_planets_sweep2(coef, &row); break;
+        }
     }
 }
 
@@ -277,8 +272,7 @@ enum { outer_planets_BUFFER = 256 }; /* densities that are added in one go */
 static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
-    if (sizes[0] < outer_planets_least[0] || sizes[0] % outer_planets_periods[0] != 0 || sizes[0] > most / 2)
-        return 0;
+    if (sizes[0] < outer_planets_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -317,7 +311,7 @@ static void outer_planets_put_parameter(const outer_planets_solver *s, double *r
 static void outer_planets_put_parameters(outer_planets_solver *s, const outer_planets_params *params)
 {
     outer_planets_put_parameter(s, s->x[6], params->m, 1.0);
-    s->params.m = NULL;
+s->params.m = NULL;
 }
 
 /* ---- The solver ---- */
@@ -395,24 +389,12 @@ static void outer_planets_copy(double *const *to, double *const *from, const out
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void outer_planets_sweep_part(const outer_planets_solver *s, int part, const double *coef)
-{
-    const size_t units = outer_planets_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 512)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) outer_planets_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void outer_planets_make_flow(const outer_planets_solver *s, size_t steps, int number)
 {
-    const int joined = number == outer_planets_FLOWS, row = joined ? outer_planets_JOINED
-        : outer_planets_flow_rows[number];
-    const double *coef = s->coef + row * outer_planets_ROW;
+    const double *coef = s->coef + number * outer_planets_ROW;
     (void)steps;
-    outer_planets_sweep_part(s, outer_planets_flow_parts[joined ? 0 : number], coef);
+    outer_planets_sweep_part(s, outer_planets_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -517,24 +499,18 @@ double outer_planets_hamiltonian(const outer_planets_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void outer_planets_fill(const outer_planets_solver *s, void kernel(const outer_planets_row *,
-    double *restrict), double *out)
-{
-    const outer_planets_row row = outer_planets_row_of(s);
-    kernel(&row, out);
-}
-
 void outer_planets_density(const outer_planets_solver *s, double *out)
 {
-    outer_planets_fill(s, outer_planets_energy_row, out);
+    const outer_planets_row row = outer_planets_row_of(s);
+    outer_planets_energy_row(&row, out);
 }
 
 void outer_planets_casimirs(const outer_planets_solver *s, double *out) { (void)s, (void)out; }
 
 void outer_planets_vector_field(const outer_planets_solver *s, double *out)
 {
-    outer_planets_fill(s, outer_planets_vector_field_row, out);
+    const outer_planets_row row = outer_planets_row_of(s);
+    outer_planets_vector_field_row(&row, out);
 }
 
 const char *outer_planets_status_string(outer_planets_status status)

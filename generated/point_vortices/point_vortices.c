@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 30b204d64239aecd973f1a2d30905e8ccd762a38f4a96c841449a39ab60645c5
+ * body-sha256: 730b8d4c83760df466edbd783ba1435c5fb3adafd5886e48aefc8593871d4a14
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -33,9 +33,8 @@ enum { point_vortices_SIDES = 2 };         /* y before and after a sweep */
 enum { point_vortices_IMPLICIT = 75 };     /* of these for y, its guesses and its variations */
 enum { point_vortices_MOST_SWEEPS = 200 }; /* that a stage may take */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t point_vortices_least[point_vortices_AXES] = { 1 };
-static const size_t point_vortices_periods[point_vortices_AXES] = { 1 };
 
 /* The stages of one step, as fractions of it, each with a row of coefficients. */
 static const double point_vortices_times[point_vortices_ROWS_OF_FLOWS] = { 0.4144907717943757,
@@ -304,8 +303,7 @@ enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
-    if (sizes[0] < point_vortices_least[0] || sizes[0] % point_vortices_periods[0] != 0
-        || sizes[0] > most / 2) return 0;
+    if (sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -349,7 +347,7 @@ static void point_vortices_put_parameter(const point_vortices_solver *s, double 
 static void point_vortices_put_parameters(point_vortices_solver *s, const point_vortices_params *params)
 {
     point_vortices_put_parameter(s, s->x[2], params->G, 1.0);
-    s->params.G = NULL;
+s->params.G = NULL;
 }
 
 /* ---- The solver ---- */
@@ -836,24 +834,18 @@ double point_vortices_hamiltonian(const point_vortices_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void point_vortices_fill(const point_vortices_solver *s, void kernel(const point_vortices_row *,
-    double *restrict), double *out)
-{
-    const point_vortices_row row = point_vortices_row_of(s);
-    kernel(&row, out);
-}
-
 void point_vortices_density(const point_vortices_solver *s, double *out)
 {
-    point_vortices_fill(s, point_vortices_energy_row, out);
+    const point_vortices_row row = point_vortices_row_of(s);
+    point_vortices_energy_row(&row, out);
 }
 
 void point_vortices_casimirs(const point_vortices_solver *s, double *out) { (void)s, (void)out; }
 
 void point_vortices_vector_field(const point_vortices_solver *s, double *out)
 {
-    point_vortices_fill(s, point_vortices_vector_field_row, out);
+    const point_vortices_row row = point_vortices_row_of(s);
+    point_vortices_vector_field_row(&row, out);
 }
 
 const char *point_vortices_status_string(point_vortices_status status)

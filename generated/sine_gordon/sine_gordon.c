@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 232a5805f00934acf9cc716704b457cbc388dd3c402e6e06bbd1bef3318c669f
+ * body-sha256: d26e366e7f06183075b1085798863f0cca5b30273e18532d60ec2cd5afabce95
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -23,30 +23,26 @@
 /* ---- The model ---- */
 const sine_gordon_params sine_gordon_default_params = { 0.25 };
 
-enum { sine_gordon_HALO = 1 }; /* sites that are copied beside a row */
-enum { sine_gordon_LEAD = 8 }; /* doubles before the first site of a row */
-enum { sine_gordon_RESERVED = 4 }; /* arrays over the sites in the memory of a solver */
-enum { sine_gordon_ROW = 3 }; /* coefficients of one flow */
+enum { sine_gordon_HALO = 1 };           /* sites that are copied beside a row */
+enum { sine_gordon_LEAD = 8 };           /* doubles before the first site of a row */
+enum { sine_gordon_RESERVED = 4 };       /* arrays over the sites in the memory of a solver */
+enum { sine_gordon_ROW = 3 };            /* coefficients of one flow */
 enum { sine_gordon_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
-enum { sine_gordon_FLOWS = 13 }; /* in a step */
-enum { sine_gordon_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
+enum { sine_gordon_FLOWS = 13 };         /* in a step */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t sine_gordon_least[sine_gordon_AXES] = { 2 };
-static const size_t sine_gordon_periods[sine_gordon_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double sine_gordon_times[sine_gordon_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.2452989571842711,
     0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083,
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
     0.08298440641740498, 0.16596881283480996 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char sine_gordon_flow_parts[sine_gordon_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2,
-    1 };
-static const unsigned char sine_gordon_flow_rows[sine_gordon_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11,
-    12 };
+/* The parts of H that they are of. */
+static const unsigned char sine_gordon_flow_parts[sine_gordon_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2,
+    1, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int sine_gordon_allowed(const sine_gordon_params *params, size_t sites)
@@ -124,15 +120,13 @@ static inline sine_gordon_row sine_gordon_piece_of(const sine_gordon_solver *s, 
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define sine_gordon_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double sine_gordon_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double sine_gordon_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + sine_gordon_ROUNDER,
-        k = (shifted - sine_gordon_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + sine_gordon_ROUNDER, k = shifted - sine_gordon_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -150,9 +144,6 @@ static inline double sine_gordon_turned_sin(double u, double offset)
     memcpy(&value, &bits, sizeof bits);
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
-
-/* sin u for the loops over lanes. */
-static inline double sine_gordon_sin_lane(double u) { return sine_gordon_turned_sin(u, 0.0); }
 
 /* The flow of H_1 = sum of 1/2*(d**(-2)*(q[i+1] - q)**2) - cos(q): p shifted. */
 static inline void sine_gordon_sweep1(const double *coef, const sine_gordon_row *row)
@@ -180,19 +171,20 @@ static inline void sine_gordon_sweep2(const double *coef, const sine_gordon_row 
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void sine_gordon_sweep_piece(const sine_gordon_solver *s, int part, const double *coef, size_t unit)
+/* The flow of a part of H. */
+static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef)
 {
-    const sine_gordon_row row = sine_gordon_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        sine_gordon_sweep1(coef, &row);
-        sine_gordon_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    default: /* H_2 */
-        sine_gordon_sweep2(coef, &row);
-        sine_gordon_ends(s->x[0], s->length, row.from, row.to);
-        break;
+    const size_t units = sine_gordon_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const sine_gordon_row row = sine_gordon_piece_of(s, unit);
+        switch (part) {
+        case 1: sine_gordon_sweep1(coef, &row); sine_gordon_ends(s->x[1], s->length, row.from, row.to); break;
+        default: sine_gordon_sweep2(coef, &row); sine_gordon_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -234,8 +226,7 @@ enum { sine_gordon_BUFFER = 256 }; /* densities that are added in one go */
 static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / sine_gordon_RESERVED;
-    if (sizes[0] < sine_gordon_least[0] || sizes[0] % sine_gordon_periods[0] != 0 || sizes[0] > most / 2)
-        return 0;
+    if (sizes[0] < sine_gordon_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = sine_gordon_LEAD + ((sizes[0] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -335,24 +326,12 @@ static void sine_gordon_copy(double *const *to, double *const *from, const sine_
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void sine_gordon_sweep_part(const sine_gordon_solver *s, int part, const double *coef)
-{
-    const size_t units = sine_gordon_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) sine_gordon_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void sine_gordon_make_flow(const sine_gordon_solver *s, size_t steps, int number)
 {
-    const int joined = number == sine_gordon_FLOWS, row = joined ? sine_gordon_JOINED
-        : sine_gordon_flow_rows[number];
-    const double *coef = s->coef + row * sine_gordon_ROW;
+    const double *coef = s->coef + number * sine_gordon_ROW;
     (void)steps;
-    sine_gordon_sweep_part(s, sine_gordon_flow_parts[joined ? 0 : number], coef);
+    sine_gordon_sweep_part(s, sine_gordon_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -457,24 +436,18 @@ double sine_gordon_hamiltonian(const sine_gordon_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void sine_gordon_fill(const sine_gordon_solver *s, void kernel(const sine_gordon_row *,
-    double *restrict), double *out)
-{
-    const sine_gordon_row row = sine_gordon_row_of(s);
-    kernel(&row, out);
-}
-
 void sine_gordon_density(const sine_gordon_solver *s, double *out)
 {
-    sine_gordon_fill(s, sine_gordon_energy_row, out);
+    const sine_gordon_row row = sine_gordon_row_of(s);
+    sine_gordon_energy_row(&row, out);
 }
 
 void sine_gordon_casimirs(const sine_gordon_solver *s, double *out) { (void)s, (void)out; }
 
 void sine_gordon_vector_field(const sine_gordon_solver *s, double *out)
 {
-    sine_gordon_fill(s, sine_gordon_vector_field_row, out);
+    const sine_gordon_row row = sine_gordon_row_of(s);
+    sine_gordon_vector_field_row(&row, out);
 }
 
 const char *sine_gordon_status_string(sine_gordon_status status)

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: 6247d16fbea2d37d1c21008ca7b2a3adb518fa5b20aaae344304cc5e3b63bb95
+ * body-sha256: dd3a5f617aba760c970c953be512f82e2c802d7b7fb08d2f691e89a82e001b13
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -34,33 +34,27 @@ enum { thermal_heisenberg_HALO = 1 };           /* sites that are copied beside 
 enum { thermal_heisenberg_LEAD = 8 };           /* doubles before the first site of a row */
 enum { thermal_heisenberg_RESERVED = 10 };      /* arrays over the sites in the memory of a solver */
 enum { thermal_heisenberg_ROW = 5 };            /* coefficients of one flow */
-enum { thermal_heisenberg_ROWS_OF_FLOWS = 12 }; /* rows of coefficients */
+enum { thermal_heisenberg_ROWS_OF_FLOWS = 15 }; /* rows of coefficients */
 enum { thermal_heisenberg_SOURCES = 3 };        /* of noise at a site: bath_x, bath_y, bath_z */
 enum { thermal_heisenberg_DRAWN = 4 };          /* the first of the arrays of increments */
 enum { thermal_heisenberg_PARTS = 2 };          /* increments of one source in a step, each of a part of it */
 enum { thermal_heisenberg_FLOWS = 15 };         /* in a step */
-/* the row of the last flow of a step and the first of the next together */
-enum { thermal_heisenberg_JOINED = 11 };
-enum { thermal_heisenberg_COLOUR_COUNT = 2 };  /* colours of sites */
-enum { thermal_heisenberg_COLOUR_STRIDE = 1 }; /* what a step along a row adds to the colour */
+enum { thermal_heisenberg_COLOUR_COUNT = 2 };   /* colours of sites */
+enum { thermal_heisenberg_COLOUR_STRIDE = 1 };  /* what a step along a row adds to the colour */
 
 /* where normal variates are cut off, so that no rare one makes a step impossible */
 #define thermal_heisenberg_BOUND 6.0
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t thermal_heisenberg_least[thermal_heisenberg_AXES] = { 2 };
-static const size_t thermal_heisenberg_periods[thermal_heisenberg_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients. */
 static const double thermal_heisenberg_times[thermal_heisenberg_ROWS_OF_FLOWS] = { 0.0, 0.0, 0.0, 0.5, 0.5,
-    1.0, 0.5, 0.5, 0.0, 0.0, 0.0, 0.0 };
+    0.5, 0.5, 1.0, 0.5, 0.5, 0.5, 0.5, 0.0, 0.0, 0.0 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char thermal_heisenberg_flow_parts[thermal_heisenberg_FLOWS] = { 1, 2, 3, 4, 5, 6, 7, 8,
-    7, 6, 5, 4, 3, 2, 1 };
-static const unsigned char thermal_heisenberg_flow_rows[thermal_heisenberg_FLOWS] = { 0, 1, 2, 3, 4, 4, 4, 5,
-    6, 6, 6, 7, 10, 9, 8 };
+/* The parts of H that they are of. */
+static const unsigned char thermal_heisenberg_flow_parts[thermal_heisenberg_ROWS_OF_FLOWS] = { 1, 2, 3, 4, 5,
+    6, 7, 8, 7, 6, 5, 4, 3, 2, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int thermal_heisenberg_allowed(const thermal_heisenberg_params *params, size_t sites)
@@ -155,15 +149,14 @@ static inline thermal_heisenberg_row thermal_heisenberg_piece_of(const thermal_h
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define thermal_heisenberg_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double thermal_heisenberg_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double thermal_heisenberg_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + thermal_heisenberg_ROUNDER,
-        k = (shifted - thermal_heisenberg_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + thermal_heisenberg_ROUNDER,
+        k = shifted - thermal_heisenberg_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -181,9 +174,6 @@ static inline double thermal_heisenberg_turned_sin(double u, double offset)
     memcpy(&value, &bits, sizeof bits);
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
-
-/* sin u for the loops over lanes. */
-static inline double thermal_heisenberg_sin_lane(double u) { return thermal_heisenberg_turned_sin(u, 0.0); }
 
 /* cos(sqrt(s)), cosh(sqrt(-s)) for negative s: a polynomial where s is small. */
 static inline double thermal_heisenberg_cosroot(double s)
@@ -217,8 +207,8 @@ static inline double thermal_heisenberg_sinroot(double s)
 }
 
 /* The flow of the noise bath_x: y, z turned.
-   The flow of the noise bath_y: x, z turned, where x, y, z stand for its y, z, x.
-   The flow of the noise bath_z: x, y turned, where x, y, z stand for its z, x, y. */
+   The flow of the noise bath_y: x, z turned.
+   The flow of the noise bath_z: x, y turned. */
 static inline void thermal_heisenberg_sweep_y_z(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c0 = coef[0];
@@ -273,8 +263,8 @@ static inline void thermal_heisenberg_sweep_x_y_z(const double *coef, const ther
 }
 
 /* The flow of H_2 = sum of -J*(z*z[i+1]): x, y turned.
-   The flow of H_3 = sum of -J*(x*x[i+1]): y, z turned, where x, y, z stand for its y, z, x.
-   The flow of H_4 = sum of -J*(y*y[i+1]): x, z turned, where x, y, z stand for its z, x, y. */
+   The flow of H_3 = sum of -J*(x*x[i+1]): y, z turned.
+   The flow of H_4 = sum of -J*(y*y[i+1]): x, z turned. */
 static inline void thermal_heisenberg_sweep_x_y(const double *coef, const thermal_heisenberg_row *row)
 {
     const double c4 = coef[4];
@@ -296,46 +286,31 @@ static inline void thermal_heisenberg_sweep_x_y(const double *coef, const therma
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void thermal_heisenberg_sweep_piece(const thermal_heisenberg_solver *s, int part, const double *coef,
-    size_t unit)
+/* The flow of a part of H. */
+static void thermal_heisenberg_sweep_part(const thermal_heisenberg_solver *s, int part, const double *coef)
 {
+    const size_t units = thermal_heisenberg_units(s);
+    /* the fields in other orders, in which loops that are for one order serve others */
     double *const y_z_x[] = { s->x[1], s->x[2], s->x[0], s->x[3], s->x[5], s->x[6], s->x[4] };
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3], s->x[6], s->x[4], s->x[5] };
-    thermal_heisenberg_row row = thermal_heisenberg_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        thermal_heisenberg_sweep_y_z(coef, &row);
-        break;
-    case 2: /* H_2 */
-        row.x = y_z_x;
-        thermal_heisenberg_sweep_y_z(coef, &row);
-        break;
-    case 3: /* H_3 */
-        row.x = z_x_y;
-        thermal_heisenberg_sweep_y_z(coef, &row);
-        break;
-    case 4: /* H_4 */
-        thermal_heisenberg_sweep_x_y_z(coef, &row);
-        break;
-    case 5: /* H_5 */
-        thermal_heisenberg_sweep_x_y(coef, &row);
-        break;
-    case 6: /* H_6 */
-        row.x = y_z_x;
-        thermal_heisenberg_sweep_x_y(coef, &row);
-        break;
-    case 7: /* H_7 */
-        row.x = z_x_y;
-        thermal_heisenberg_sweep_x_y(coef, &row);
-        break;
-    default: /* H_8 */
-        row.swept = 1;
-        thermal_heisenberg_sweep_x_y_z(coef, &row);
-        break;
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        thermal_heisenberg_row row = thermal_heisenberg_piece_of(s, unit);
+        switch (part) {
+        case 1: thermal_heisenberg_sweep_y_z(coef, &row); break;
+        case 2: row.x = y_z_x; thermal_heisenberg_sweep_y_z(coef, &row); break;
+        case 3: row.x = z_x_y; thermal_heisenberg_sweep_y_z(coef, &row); break;
+        case 4: thermal_heisenberg_sweep_x_y_z(coef, &row); break;
+        case 5: thermal_heisenberg_sweep_x_y(coef, &row); break;
+        case 6: row.x = y_z_x; thermal_heisenberg_sweep_x_y(coef, &row); break;
+        case 7: row.x = z_x_y; thermal_heisenberg_sweep_x_y(coef, &row); break;
+        default: row.swept = 1; thermal_heisenberg_sweep_x_y_z(coef, &row); break;
+        }
+        for (int k = 0; k < thermal_heisenberg_DIM; ++k)
+            thermal_heisenberg_ends(s->x[k], s->length, row.from, row.to);
     }
-    for (int k = 0; k < thermal_heisenberg_DIM; ++k)
-        thermal_heisenberg_ends(s->x[k], s->length, row.from, row.to);
 }
 
 /* The density of the Hamiltonian, at the sites of a row. */
@@ -422,32 +397,37 @@ static void thermal_heisenberg_two_normals(uint64_t seed, uint32_t c[4], double 
 }
 
 /* ---- Noise ---- */
-/* The increments of a part of a step after so many others, for a piece of a row: a function of seed, member,
-   step, part and site alone. A step of -h has them in the order in which it undoes one of h. */
-static void thermal_heisenberg_draw_piece(const thermal_heisenberg_solver *s, size_t steps, int part,
-    size_t unit)
+/* The increments of a part of a step after so many others, a function of seed, member, step, part and site
+   alone. A step of -h has them in the order in which it undoes one of h. */
+static void thermal_heisenberg_draw(const thermal_heisenberg_solver *s, size_t steps, int part)
 {
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? thermal_heisenberg_PARTS - 1 - part
         : part) * ((thermal_heisenberg_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)thermal_heisenberg_PARTS), s->h);
-    const thermal_heisenberg_row row = thermal_heisenberg_piece_of(s, unit);
-    for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
-        double *one = s->x[thermal_heisenberg_DRAWN + k];
-        double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
-        for (ptrdiff_t i = row.from; i < row.to; ++i) {
-            const uint64_t site = (uint64_t)i;
-            const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
-            uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
-                (uint32_t)site };
-            double pair[2];
-            thermal_heisenberg_two_normals(s->seed, counter, pair);
-            other[i] = size * pair[1];
-            one[i] = size * pair[0];
+    const size_t units = thermal_heisenberg_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const thermal_heisenberg_row row = thermal_heisenberg_piece_of(s, unit);
+        for (int k = 0; k < thermal_heisenberg_SOURCES; k += 2) {
+            double *one = s->x[thermal_heisenberg_DRAWN + k];
+            double *other = s->x[thermal_heisenberg_DRAWN + (k + 1 < thermal_heisenberg_SOURCES ? k + 1 : k)];
+            for (ptrdiff_t i = row.from; i < row.to; ++i) {
+                const uint64_t site = (uint64_t)i;
+                const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
+                uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member,
+                    (uint32_t)site };
+                double pair[2];
+                thermal_heisenberg_two_normals(s->seed, counter, pair);
+                other[i] = size * pair[1];
+                one[i] = size * pair[0];
+            }
         }
+        for (int k = 0; k < thermal_heisenberg_SOURCES; ++k)
+            thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, row.from, row.to);
     }
-    for (int k = 0; k < thermal_heisenberg_SOURCES; ++k)
-        thermal_heisenberg_ends(s->x[thermal_heisenberg_DRAWN + k], s->length, row.from, row.to);
 }
 
 thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver *s, uint64_t seed,
@@ -469,8 +449,7 @@ enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go 
 static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / thermal_heisenberg_RESERVED;
-    if (sizes[0] < thermal_heisenberg_least[0] || sizes[0] % thermal_heisenberg_periods[0] != 0
-        || sizes[0] > most / 2) return 0;
+    if (sizes[0] < thermal_heisenberg_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = thermal_heisenberg_LEAD + ((sizes[0] + 7) / 8 * 8 + thermal_heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -511,7 +490,7 @@ static void thermal_heisenberg_put_parameters(thermal_heisenberg_solver *s,
     const thermal_heisenberg_params *params)
 {
     thermal_heisenberg_put_parameter(s, s->x[3], params->T, 0.2);
-    s->params.T = NULL;
+s->params.T = NULL;
 }
 
 /* ---- The solver ---- */
@@ -608,32 +587,12 @@ static void thermal_heisenberg_copy(double *const *to, double *const *from,
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void thermal_heisenberg_sweep_part(const thermal_heisenberg_solver *s, int part, const double *coef)
-{
-    const size_t units = thermal_heisenberg_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many. */
 static void thermal_heisenberg_make_flow(const thermal_heisenberg_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + thermal_heisenberg_flow_rows[number] * thermal_heisenberg_ROW;
+    const double *coef = s->coef + number * thermal_heisenberg_ROW;
     (void)steps;
     thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[number], coef);
-}
-
-/* The increments of a part of a step after so many, at all sites. */
-static void thermal_heisenberg_draw(const thermal_heisenberg_solver *s, size_t steps, int part)
-{
-    const size_t units = thermal_heisenberg_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) thermal_heisenberg_draw_piece(s, steps, part, unit);
 }
 
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
@@ -731,27 +690,22 @@ double thermal_heisenberg_hamiltonian(const thermal_heisenberg_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void thermal_heisenberg_fill(const thermal_heisenberg_solver *s,
-    void kernel(const thermal_heisenberg_row *, double *restrict), double *out)
-{
-    const thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
-    kernel(&row, out);
-}
-
 void thermal_heisenberg_density(const thermal_heisenberg_solver *s, double *out)
 {
-    thermal_heisenberg_fill(s, thermal_heisenberg_energy_row, out);
+    const thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
+    thermal_heisenberg_energy_row(&row, out);
 }
 
 void thermal_heisenberg_casimirs(const thermal_heisenberg_solver *s, double *out)
 {
-    thermal_heisenberg_fill(s, thermal_heisenberg_casimirs_row, out);
+    const thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
+    thermal_heisenberg_casimirs_row(&row, out);
 }
 
 void thermal_heisenberg_vector_field(const thermal_heisenberg_solver *s, double *out)
 {
-    thermal_heisenberg_fill(s, thermal_heisenberg_vector_field_row, out);
+    const thermal_heisenberg_row row = thermal_heisenberg_row_of(s);
+    thermal_heisenberg_vector_field_row(&row, out);
 }
 
 const char *thermal_heisenberg_status_string(thermal_heisenberg_status status)

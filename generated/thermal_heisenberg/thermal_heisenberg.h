@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6f09ece1794ff022513d8f92ad7d429403b6214cada7f8f94253407f42e54181
+ * body-sha256: b3eb2f70aa542d2db2d581789d7ca604133d5b3c698728fd8fd6047177ba03cf
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -26,7 +26,7 @@ typedef struct {
 extern const thermal_heisenberg_params thermal_heisenberg_default_params;
 
 enum { thermal_heisenberg_ARRAYS = 7 }; /* arrays over the sites: fields, then parameters, then noise */
-enum { thermal_heisenberg_COEFFICIENTS = 60 }; /* numbers that depend on params and h only */
+enum { thermal_heisenberg_COEFFICIENTS = 75 }; /* numbers that depend on params and h only */
 
 typedef enum { thermal_heisenberg_OK = 0, thermal_heisenberg_NO_CONVERGENCE, thermal_heisenberg_SINGULAR,
     thermal_heisenberg_NOT_FINITE, thermal_heisenberg_BAD_ARGUMENT } thermal_heisenberg_status;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3b6ab8849ac8aed410eaa8a4bd43d91b0d6fd12a82241c7f46b77c21ffa8124f
+ * body-sha256: 62ccaa680fa64d1640f7bd0e7e17e434197022d6109d25fbccaaa44b8471b36e
  */
 #include "toda.h"
 #include <float.h>
@@ -29,22 +29,19 @@ enum { toda_RESERVED = 4 };       /* arrays over the sites in the memory of a so
 enum { toda_ROW = 2 };            /* coefficients of one flow */
 enum { toda_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
 enum { toda_FLOWS = 13 };         /* in a step */
-enum { toda_JOINED = 13 };        /* the row of the last flow of a step and the first of the next together */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t toda_least[toda_AXES] = { 2 };
-static const size_t toda_periods[toda_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double toda_times[toda_ROWS_OF_FLOWS] = { 0.08298440641740498, 0.2452989571842711,
     0.39630980149836803, 0.6048726657110799, -0.03905630492234843, -0.35017162289535103, 0.11952419401315083,
     -0.35017162289535103, -0.03905630492234843, 0.6048726657110799, 0.39630980149836803, 0.2452989571842711,
     0.08298440641740498, 0.16596881283480996 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char toda_flow_parts[toda_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1 };
-static const unsigned char toda_flow_rows[toda_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 };
+/* The parts of H that they are of. */
+static const unsigned char toda_flow_parts[toda_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int toda_allowed(const toda_params *params, size_t sites)
@@ -180,19 +177,19 @@ static inline void toda_sweep2(const double *coef, const toda_row *row)
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void toda_sweep_piece(const toda_solver *s, int part, const double *coef, size_t unit)
+/* The flow of a part of H. */
+static void toda_sweep_part(const toda_solver *s, int part, const double *coef)
 {
-    const toda_row row = toda_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        toda_sweep1(coef, &row);
-        toda_ends(s->x[1], s->length, row.from, row.to);
-        break;
-    default: /* H_2 */
-        toda_sweep2(coef, &row);
-        toda_ends(s->x[0], s->length, row.from, row.to);
-        break;
+    const size_t units = toda_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        const toda_row row = toda_piece_of(s, unit);
+        switch (part) {
+        case 1: toda_sweep1(coef, &row); toda_ends(s->x[1], s->length, row.from, row.to); break;
+        default: toda_sweep2(coef, &row); toda_ends(s->x[0], s->length, row.from, row.to); break;
+        }
     }
 }
 
@@ -241,7 +238,7 @@ enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
-    if (sizes[0] < toda_least[0] || sizes[0] % toda_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -339,23 +336,12 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void toda_sweep_part(const toda_solver *s, int part, const double *coef)
-{
-    const size_t units = toda_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) toda_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 {
-    const int joined = number == toda_FLOWS, row = joined ? toda_JOINED : toda_flow_rows[number];
-    const double *coef = s->coef + row * toda_ROW;
+    const double *coef = s->coef + number * toda_ROW;
     (void)steps;
-    toda_sweep_part(s, toda_flow_parts[joined ? 0 : number], coef);
+    toda_sweep_part(s, toda_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -455,18 +441,23 @@ double toda_hamiltonian(const toda_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void toda_fill(const toda_solver *s, void kernel(const toda_row *, double *restrict), double *out)
+void toda_density(const toda_solver *s, double *out)
 {
     const toda_row row = toda_row_of(s);
-    kernel(&row, out);
+    toda_energy_row(&row, out);
 }
 
-void toda_density(const toda_solver *s, double *out) { toda_fill(s, toda_energy_row, out); }
+void toda_casimirs(const toda_solver *s, double *out)
+{
+    const toda_row row = toda_row_of(s);
+    toda_casimirs_row(&row, out);
+}
 
-void toda_casimirs(const toda_solver *s, double *out) { toda_fill(s, toda_casimirs_row, out); }
-
-void toda_vector_field(const toda_solver *s, double *out) { toda_fill(s, toda_vector_field_row, out); }
+void toda_vector_field(const toda_solver *s, double *out)
+{
+    const toda_row row = toda_row_of(s);
+    toda_vector_field_row(&row, out);
+}
 
 const char *toda_status_string(toda_status status)
 {

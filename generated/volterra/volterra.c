@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: fc85c51087b2375a96e300ba32c0b6e6aad651d8fbd565deb29f4a9ec7de1f0e
+ * body-sha256: 079a1a0aeb6aa54a1d376768c619e1ce0f38393485189c707d0ceec008ee38dc
  */
 #include "volterra.h"
 #include <float.h>
@@ -23,30 +23,29 @@
 /* ---- The model ---- */
 const volterra_params volterra_default_params = { 0 };
 
-enum { volterra_HALO = 1 }; /* sites that are copied beside a row */
-enum { volterra_LEAD = 8 }; /* doubles before the first site of a row */
-enum { volterra_RESERVED = 2 }; /* arrays over the sites in the memory of a solver */
-enum { volterra_ROW = 1 }; /* coefficients of one flow */
+enum { volterra_HALO = 1 };           /* sites that are copied beside a row */
+enum { volterra_LEAD = 8 };           /* doubles before the first site of a row */
+enum { volterra_RESERVED = 2 };       /* arrays over the sites in the memory of a solver */
+enum { volterra_ROW = 1 };            /* coefficients of one flow */
 enum { volterra_ROWS_OF_FLOWS = 14 }; /* rows of coefficients */
-enum { volterra_FLOWS = 13 }; /* in a step */
-enum { volterra_JOINED = 13 }; /* the row of the last flow of a step and the first of the next together */
-enum { volterra_COLOUR_COUNT = 2 }; /* colours of sites */
-enum { volterra_COLOUR_STRIDE = 1 }; /* what a step along a row adds to the colour */
+enum { volterra_FLOWS = 13 };         /* in a step */
+enum { volterra_COLOUR_COUNT = 2 };   /* colours of sites */
+enum { volterra_COLOUR_STRIDE = 1 };  /* what a step along a row adds to the colour */
 
 /* Along each axis: the smallest size, what sizes are multiples of. */
 static const size_t volterra_least[volterra_AXES] = { 2 };
 static const size_t volterra_periods[volterra_AXES] = { 2 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double volterra_times[volterra_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.209515106613362,
     0.353172906049774, -0.143851773179818, -0.0420650803577195, 0.434336666566456, 0.2193769557534996,
     0.434336666566456, -0.0420650803577195, -0.143851773179818, 0.353172906049774, 0.209515106613362,
     0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char volterra_flow_parts[volterra_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1 };
-static const unsigned char volterra_flow_rows[volterra_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12 };
+/* The parts of H that they are of. */
+static const unsigned char volterra_flow_parts[volterra_ROWS_OF_FLOWS] = { 1, 2, 1, 2, 1, 2, 1, 2, 1, 2, 1, 2,
+    1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int volterra_allowed(const volterra_params *params, size_t sites)
@@ -179,20 +178,26 @@ static inline void volterra_sweep_a(const double *coef, const volterra_row *row)
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void volterra_sweep_piece(const volterra_solver *s, int part, const double *coef, size_t unit)
+/* The flow of a part of H. */
+static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef)
 {
-    volterra_row row = volterra_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        row.swept = 1;
-        volterra_sweep_a(coef, &row);
-        volterra_ends(s->x[0], s->length, row.from, row.to);
-        break;
-    default: /* H_2 */
-        volterra_sweep_a(coef, &row);
-        volterra_ends(s->x[0], s->length, row.from, row.to);
-        break;
+    const size_t units = volterra_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        volterra_row row = volterra_piece_of(s, unit);
+        switch (part) {
+        case 1:
+            row.swept = 1;
+            volterra_sweep_a(coef, &row);
+            volterra_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        default:
+            volterra_sweep_a(coef, &row);
+            volterra_ends(s->x[0], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -336,23 +341,12 @@ static void volterra_copy(double *const *to, double *const *from, const volterra
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void volterra_sweep_part(const volterra_solver *s, int part, const double *coef)
-{
-    const size_t units = volterra_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) volterra_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void volterra_make_flow(const volterra_solver *s, size_t steps, int number)
 {
-    const int joined = number == volterra_FLOWS, row = joined ? volterra_JOINED : volterra_flow_rows[number];
-    const double *coef = s->coef + row * volterra_ROW;
+    const double *coef = s->coef + number * volterra_ROW;
     (void)steps;
-    volterra_sweep_part(s, volterra_flow_parts[joined ? 0 : number], coef);
+    volterra_sweep_part(s, volterra_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -452,24 +446,22 @@ double volterra_hamiltonian(const volterra_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void volterra_fill(const volterra_solver *s, void kernel(const volterra_row *, double *restrict),
-    double *out)
+void volterra_density(const volterra_solver *s, double *out)
 {
     const volterra_row row = volterra_row_of(s);
-    kernel(&row, out);
+    volterra_energy_row(&row, out);
 }
-
-void volterra_density(const volterra_solver *s, double *out) { volterra_fill(s, volterra_energy_row, out); }
 
 void volterra_casimirs(const volterra_solver *s, double *out)
 {
-    volterra_fill(s, volterra_casimirs_row, out);
+    const volterra_row row = volterra_row_of(s);
+    volterra_casimirs_row(&row, out);
 }
 
 void volterra_vector_field(const volterra_solver *s, double *out)
 {
-    volterra_fill(s, volterra_vector_field_row, out);
+    const volterra_row row = volterra_row_of(s);
+    volterra_vector_field_row(&row, out);
 }
 
 const char *volterra_status_string(volterra_status status)

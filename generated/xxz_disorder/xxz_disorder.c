@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: efa256ee18b4f88d6e0453da78a1a115271ac432dde025d4dcb57a3428e1ae01
+ * body-sha256: 4502b844fd5bd6dae65b388227eb83450d663c12b28addb75bf6333f2a747d66
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -23,20 +23,18 @@
 /* ---- The model ---- */
 const xxz_disorder_params xxz_disorder_default_params = { 1.0, 1.3, NULL };
 
-enum { xxz_disorder_HALO = 1 }; /* sites that are copied beside a row */
-enum { xxz_disorder_LEAD = 8 }; /* doubles before the first site of a row */
-enum { xxz_disorder_RESERVED = 7 }; /* arrays over the sites in the memory of a solver */
-enum { xxz_disorder_ROW = 3 }; /* coefficients of one flow */
+enum { xxz_disorder_HALO = 1 };           /* sites that are copied beside a row */
+enum { xxz_disorder_LEAD = 8 };           /* doubles before the first site of a row */
+enum { xxz_disorder_RESERVED = 7 };       /* arrays over the sites in the memory of a solver */
+enum { xxz_disorder_ROW = 3 };            /* coefficients of one flow */
 enum { xxz_disorder_ROWS_OF_FLOWS = 26 }; /* rows of coefficients */
-enum { xxz_disorder_FLOWS = 25 }; /* in a step */
-enum { xxz_disorder_JOINED = 25 }; /* the row of the last flow of a step and the first of the next together */
+enum { xxz_disorder_FLOWS = 25 };         /* in a step */
 
-/* Along each axis: the smallest size, what sizes are multiples of. */
+/* Along each axis: the smallest size. */
 static const size_t xxz_disorder_least[xxz_disorder_AXES] = { 2 };
-static const size_t xxz_disorder_periods[xxz_disorder_AXES] = { 1 };
 
-/* The times of the flows of one step, as fractions of it, each with a row of coefficients; the last is that
-   of the last flow of a step and the first of the next together. */
+/* The times of the flows of one step, as fractions of it, each with a row of coefficients; at the end that of
+   the last flow and the first of the next step together. */
 static const double xxz_disorder_times[xxz_disorder_ROWS_OF_FLOWS] = { 0.0792036964311957, 0.0792036964311957,
     0.209515106613362, 0.1303114101821663, 0.353172906049774, 0.2228614958676077, -0.143851773179818,
     -0.3667132690474257, -0.0420650803577195, 0.3246481886897062, 0.434336666566456, 0.1096884778767498,
@@ -44,11 +42,9 @@ static const double xxz_disorder_times[xxz_disorder_ROWS_OF_FLOWS] = { 0.0792036
     -0.3667132690474257, -0.143851773179818, 0.2228614958676077, 0.353172906049774, 0.1303114101821663,
     0.209515106613362, 0.0792036964311957, 0.0792036964311957, 0.1584073928623914 };
 
-/* The flows of one step: the part of H of each, and its row of coefficients. */
-static const unsigned char xxz_disorder_flow_parts[xxz_disorder_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2,
-    1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1 };
-static const unsigned char xxz_disorder_flow_rows[xxz_disorder_FLOWS] = { 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10,
-    11, 12, 13, 14, 15, 16, 17, 18, 19, 20, 21, 22, 23, 24 };
+/* The parts of H that they are of. */
+static const unsigned char xxz_disorder_flow_parts[xxz_disorder_ROWS_OF_FLOWS] = { 1, 2, 3, 2, 1, 2, 3, 2, 1,
+    2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 2, 3, 2, 1, 1 };
 
 /* Whether all parameters are finite, and positive where they have to be. */
 static int xxz_disorder_allowed(const xxz_disorder_params *params, size_t sites)
@@ -127,15 +123,13 @@ static inline xxz_disorder_row xxz_disorder_piece_of(const xxz_disorder_solver *
 /* 1.5 2^52: a number added to it and taken off again is rounded to an integer */
 #define xxz_disorder_ROUNDER 6755399441055744.0
 
-/* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number
-   beyond |u| = 10^6. */
-static inline double xxz_disorder_turned_sin(double u, double offset)
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double xxz_disorder_sin_lane(double u)
 {
-    const double shifted = (u * 0.3183098861837907 + offset) + xxz_disorder_ROUNDER,
-        k = (shifted - xxz_disorder_ROUNDER) - offset;
+    const double shifted = u * 0.3183098861837907 + xxz_disorder_ROUNDER, k = shifted - xxz_disorder_ROUNDER;
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -154,11 +148,8 @@ static inline double xxz_disorder_turned_sin(double u, double offset)
     return value + (fabs(u) <= 1e6 ? 0.0 : (double)NAN);
 }
 
-/* sin u for the loops over lanes. */
-static inline double xxz_disorder_sin_lane(double u) { return xxz_disorder_turned_sin(u, 0.0); }
-
 /* The flow of H_1 = sum of J*(y*y[i+1]): x, z turned.
-   The flow of H_2 = sum of J*(x*x[i+1]): y, z turned, where x, y, z stand for its z, x, y. */
+   The flow of H_2 = sum of J*(x*x[i+1]): y, z turned. */
 static inline void xxz_disorder_sweep_x_z(const double *coef, const xxz_disorder_row *row)
 {
     const double c0 = coef[0];
@@ -196,28 +187,35 @@ static inline void xxz_disorder_sweep3(const double *coef, const xxz_disorder_ro
     }
 }
 
-/* The flow of a part of H, for a piece of a row. */
-static void xxz_disorder_sweep_piece(const xxz_disorder_solver *s, int part, const double *coef, size_t unit)
+/* The flow of a part of H. */
+static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef)
 {
+    const size_t units = xxz_disorder_units(s);
+    /* the fields in other orders, in which loops that are for one order serve others */
     double *const z_x_y[] = { s->x[2], s->x[0], s->x[1], s->x[3] };
-    xxz_disorder_row row = xxz_disorder_piece_of(s, unit);
-    switch (part) {
-    case 1: /* H_1 */
-        xxz_disorder_sweep_x_z(coef, &row);
-        xxz_disorder_ends(s->x[0], s->length, row.from, row.to);
-        xxz_disorder_ends(s->x[2], s->length, row.from, row.to);
-        break;
-    case 2: /* H_2 */
-        row.x = z_x_y;
-        xxz_disorder_sweep_x_z(coef, &row);
-        xxz_disorder_ends(s->x[1], s->length, row.from, row.to);
-        xxz_disorder_ends(s->x[2], s->length, row.from, row.to);
-        break;
-    default: /* H_3 */
-        xxz_disorder_sweep3(coef, &row);
-        xxz_disorder_ends(s->x[0], s->length, row.from, row.to);
-        xxz_disorder_ends(s->x[1], s->length, row.from, row.to);
-        break;
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
+#endif
+    for (size_t unit = 0; unit < units; ++unit) {
+        xxz_disorder_row row = xxz_disorder_piece_of(s, unit);
+        switch (part) {
+        case 1:
+            xxz_disorder_sweep_x_z(coef, &row);
+            xxz_disorder_ends(s->x[0], s->length, row.from, row.to);
+            xxz_disorder_ends(s->x[2], s->length, row.from, row.to);
+            break;
+        case 2:
+            row.x = z_x_y;
+            xxz_disorder_sweep_x_z(coef, &row);
+            xxz_disorder_ends(s->x[1], s->length, row.from, row.to);
+            xxz_disorder_ends(s->x[2], s->length, row.from, row.to);
+            break;
+        default:
+            xxz_disorder_sweep3(coef, &row);
+            xxz_disorder_ends(s->x[0], s->length, row.from, row.to);
+            xxz_disorder_ends(s->x[1], s->length, row.from, row.to);
+            break;
+        }
     }
 }
 
@@ -273,8 +271,7 @@ enum { xxz_disorder_BUFFER = 256 }; /* densities that are added in one go */
 static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
-    if (sizes[0] < xxz_disorder_least[0] || sizes[0] % xxz_disorder_periods[0] != 0 || sizes[0] > most / 2)
-        return 0;
+    if (sizes[0] < xxz_disorder_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = xxz_disorder_LEAD + ((sizes[0] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -314,7 +311,7 @@ static void xxz_disorder_put_parameter(const xxz_disorder_solver *s, double *row
 static void xxz_disorder_put_parameters(xxz_disorder_solver *s, const xxz_disorder_params *params)
 {
     xxz_disorder_put_parameter(s, s->x[3], params->B, 1.0);
-    s->params.B = NULL;
+s->params.B = NULL;
 }
 
 /* ---- The solver ---- */
@@ -390,24 +387,12 @@ static void xxz_disorder_copy(double *const *to, double *const *from, const xxz_
 }
 
 /* ---- The flows ---- */
-/* One part of H. */
-static void xxz_disorder_sweep_part(const xxz_disorder_solver *s, int part, const double *coef)
-{
-    const size_t units = xxz_disorder_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) xxz_disorder_sweep_piece(s, part, coef, unit);
-}
-
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void xxz_disorder_make_flow(const xxz_disorder_solver *s, size_t steps, int number)
 {
-    const int joined = number == xxz_disorder_FLOWS, row = joined ? xxz_disorder_JOINED
-        : xxz_disorder_flow_rows[number];
-    const double *coef = s->coef + row * xxz_disorder_ROW;
+    const double *coef = s->coef + number * xxz_disorder_ROW;
     (void)steps;
-    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[joined ? 0 : number], coef);
+    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[number], coef);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -512,27 +497,22 @@ double xxz_disorder_hamiltonian(const xxz_disorder_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void xxz_disorder_fill(const xxz_disorder_solver *s, void kernel(const xxz_disorder_row *,
-    double *restrict), double *out)
-{
-    const xxz_disorder_row row = xxz_disorder_row_of(s);
-    kernel(&row, out);
-}
-
 void xxz_disorder_density(const xxz_disorder_solver *s, double *out)
 {
-    xxz_disorder_fill(s, xxz_disorder_energy_row, out);
+    const xxz_disorder_row row = xxz_disorder_row_of(s);
+    xxz_disorder_energy_row(&row, out);
 }
 
 void xxz_disorder_casimirs(const xxz_disorder_solver *s, double *out)
 {
-    xxz_disorder_fill(s, xxz_disorder_casimirs_row, out);
+    const xxz_disorder_row row = xxz_disorder_row_of(s);
+    xxz_disorder_casimirs_row(&row, out);
 }
 
 void xxz_disorder_vector_field(const xxz_disorder_solver *s, double *out)
 {
-    xxz_disorder_fill(s, xxz_disorder_vector_field_row, out);
+    const xxz_disorder_row row = xxz_disorder_row_of(s);
+    xxz_disorder_vector_field_row(&row, out);
 }
 
 const char *xxz_disorder_status_string(xxz_disorder_status status)

@@ -13,21 +13,22 @@ static int phi_few(size_t sites, size_t bonds) { return sites > 0 && sites < INT
 /* The bytes for them, after the rows. */
 static size_t phi_graph_size(size_t sites, size_t bonds)
 {
-    size_t integers = 2 * sites + 1 + 4 * bonds, doubles = 0;
 #if PHI_BY_COLOUR
-    integers += 2 * sites;
+    const size_t integers = 4 * sites + 1 + 4 * bonds;
+#else
+    const size_t integers = 2 * sites + 1 + 4 * bonds;
 #endif
 #if PHI_BOND_PARAMETERS
-    doubles += PHI_BOND_ARRAYS * 2 * bonds;
+    return PHI_BOND_ARRAYS * 2 * bonds * sizeof(double) + integers * sizeof(int);
+#else
+    return integers * sizeof(int);
 #endif
-    return doubles * sizeof(double) + integers * sizeof(int);
 }
 
 /* Whether all bonds run between two different sites. */
 static int phi_connected(const phi_bonds *bonds, size_t sites)
 {
-    if (bonds == NULL || bonds->count == 0) return 1;
-    if (bonds->ends == NULL) return 0;
+    if (bonds == NULL || bonds->ends == NULL) return bonds == NULL || bonds->count == 0;
     for (size_t k = 0; k < bonds->count; ++k) {
         const size_t a = bonds->ends[2 * k], b = bonds->ends[2 * k + 1];
         if (a >= sites || b >= sites || a == b) return 0;
@@ -90,13 +91,5 @@ static void phi_connect(phi_solver *s, const phi_bonds *bonds, double *memory)
     phi_colour(s, s->colours + sites);
 #endif
 }
-
-#if PHI_BOND_PARAMETERS
-/* The values of a parameter at bonds, or one value for all. */
-static void phi_put_at_bond(const phi_solver *s, double *at, const double *values, double value)
-{
-    for (int k = 0; k < s->bonds[s->sites]; ++k) at[k] = values != NULL ? values[s->number[k]] : value;
-}
-#endif
 #endif
 #endif

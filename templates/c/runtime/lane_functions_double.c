@@ -87,15 +87,22 @@ static inline double phi_log_lane(double u)
 }
 
 #endif
-#if PHI_CALLS_SIN || PHI_CALLS_COS
+#if PHI_CALLS_SIN && !PHI_CALLS_COS
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 10^6. */
+static inline double phi_sin_lane(double u)
+{
+    const double shifted = u * 0.3183098861837907 + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
+#elif PHI_CALLS_COS
 /* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number beyond
    |u| = 10^6. */
 static inline double phi_turned_sin(double u, double offset)
 {
     const double shifted = (u * 0.3183098861837907 + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
+#endif
+#if PHI_CALLS_SIN || PHI_CALLS_COS
     const double near = (u - k * 3.141592651605606) - k * 1.9841871479187034e-09;
     const double r = near - k * 1.1442377452219664e-17, q = r * r, qq = q * q;
-    uint64_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint64_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     double value, sum = -3.868170170630684e-23, other = 1.9572941063391263e-20;
     sum = sum * qq + -8.22063524662433e-18;
     other = other * qq + 2.8114572543455206e-15;
@@ -115,7 +122,7 @@ static inline double phi_turned_sin(double u, double offset)
 }
 
 #endif
-#if PHI_CALLS_SIN
+#if PHI_CALLS_SIN && PHI_CALLS_COS
 /* sin u for the loops over lanes. */
 static inline double phi_sin_lane(double u) { return phi_turned_sin(u, 0.0); }
 

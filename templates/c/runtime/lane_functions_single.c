@@ -73,15 +73,22 @@ static inline float phi_log_lane(float u)
 }
 
 #endif
-#if PHI_CALLS_SIN || PHI_CALLS_COS
+#if PHI_CALLS_SIN && !PHI_CALLS_COS
+/* sin u for the loops over lanes: u = k pi + r with |r| <= pi/2, no branches. No number beyond |u| = 8192. */
+static inline float phi_sin_lane(float u)
+{
+    const float shifted = u * 0.31830987f + PHI_ROUNDER, k = shifted - PHI_ROUNDER;
+#elif PHI_CALLS_COS
 /* sin(u + offset pi) for offset 0 or 0.5: u = (k - offset) pi + r with |r| <= pi/2, no branches. No number beyond
    |u| = 8192. */
 static inline float phi_turned_sin(float u, float offset)
 {
     const float shifted = (u * 0.31830987f + offset) + PHI_ROUNDER, k = (shifted - PHI_ROUNDER) - offset;
+#endif
+#if PHI_CALLS_SIN || PHI_CALLS_COS
     const float near = (u - k * 3.140625f) - k * 9.67502594e-4f;
     const float r = (near - k * 1.50990672e-7f) - k * 5.1266883e-12f, q = r * r, qq = q * q;
-    uint32_t parity, bits; /* the last bit of shifted is the parity of k + offset */
+    uint32_t parity, bits; /* of shifted the last bit is the parity of what u was rounded to */
     float value, sum = -2.5052108e-8f, other = 1.6059044e-10f;
     sum = sum * qq + -1.9841270e-4f;
     other = other * qq + 2.7557319e-6f;
@@ -96,7 +103,7 @@ static inline float phi_turned_sin(float u, float offset)
 }
 
 #endif
-#if PHI_CALLS_SIN
+#if PHI_CALLS_SIN && PHI_CALLS_COS
 /* sin u for the loops over lanes. */
 static inline float phi_sin_lane(float u) { return phi_turned_sin(u, 0.0f); }
 

@@ -85,11 +85,19 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
     const size_t most = SIZE_MAX / 64 / PHI_RESERVED;
 #endif
 #if PHI_ONE_ROW
+#if PHI_PERIODIC_COLOURS
     if (sizes[0] < phi_least[0] || sizes[0] % phi_periods[0] != 0 || sizes[0] > most / 2) return 0;
+#else
+    if (sizes[0] < phi_least[0] || sizes[0] > most / 2) return 0;
+#endif
 #else
     size_t rows = 1;
     for (int a = 0; a < PHI_AXES; ++a)
+#if PHI_PERIODIC_COLOURS
         if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
+#else
+        if (sizes[a] < phi_least[a] || sizes[a] > most / 2) return 0;
+#endif
     for (int a = 0; a < PHI_AXES - 1; ++a) {
         if (rows > most / sizes[a]) return 0;
         rows *= sizes[a];
@@ -541,24 +549,33 @@ double phi_hamiltonian(const phi_solver *s)
     return sum + rest;
 }
 
-/* A kernel that fills arrays over the sites, for all rows. */
-static void phi_fill(const phi_solver *s, void kernel(const phi_row *, double *restrict), double *out)
+void phi_density(const phi_solver *s, double *out)
 {
     PHI_EACH_ROW {
         const phi_row row = PHI_WHOLE_ROW;
-        kernel(&row, PHI_VALUES_AT(out));
+        phi_energy_row(&row, PHI_VALUES_AT(out));
     }
 }
 
-void phi_density(const phi_solver *s, double *out) { phi_fill(s, phi_energy_row, out); }
-
 #if PHI_CASIMIRS
-void phi_casimirs(const phi_solver *s, double *out) { phi_fill(s, phi_casimirs_row, out); }
+void phi_casimirs(const phi_solver *s, double *out)
+{
+    PHI_EACH_ROW {
+        const phi_row row = PHI_WHOLE_ROW;
+        phi_casimirs_row(&row, PHI_VALUES_AT(out));
+    }
+}
 #else
 void phi_casimirs(const phi_solver *s, double *out) { (void)s, (void)out; }
 #endif
 
-void phi_vector_field(const phi_solver *s, double *out) { phi_fill(s, phi_vector_field_row, out); }
+void phi_vector_field(const phi_solver *s, double *out)
+{
+    PHI_EACH_ROW {
+        const phi_row row = PHI_WHOLE_ROW;
+        phi_vector_field_row(&row, PHI_VALUES_AT(out));
+    }
+}
 
 #if PHI_BY_HAND
 #include "lattice_by_hand.c"

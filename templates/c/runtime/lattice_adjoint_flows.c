@@ -13,7 +13,7 @@
 /* The sweep of that number in a flow; -1 if there are no more. */
 static int phi_sweep_of(const phi_solver *s, int flow, int number)
 {
-    const int part = phi_flow_parts[flow == PHI_FLOWS ? 0 : flow];
+    const int part = phi_flow_parts[flow];
 #if PHI_BY_COLOUR
 #if PHI_TIMED
     const int last = s->flows;
@@ -150,7 +150,7 @@ static void phi_find_back(const phi_solver *s, const phi_transpose *g, size_t st
 {
     phi_find_flow(s, step, number, flow);
     flow->go = 1;
-    flow->row = number == PHI_FLOWS ? PHI_JOINED : phi_flow_rows[number];
+    flow->row = number;
     flow->g = g;
     flow->bar = bar;
 }
@@ -235,7 +235,6 @@ static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t le
 static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number,
     double *kept, double **x, double *const *bar)
 {
-    const int row = number == PHI_FLOWS ? PHI_JOINED : phi_flow_rows[number];
     phi_flow flow;
     phi_find_flow(s, steps, number, &flow);
     int last = 0;
@@ -247,7 +246,7 @@ static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t
                 kept -= g->block;
                 x[f] = PHI_FIRST_SITE(kept);
             }
-        phi_sweep_back(s, g, sweep, flow.coef, row, x, bar);
+        phi_sweep_back(s, g, sweep, flow.coef, number, x, bar);
     }
     return kept;
 }

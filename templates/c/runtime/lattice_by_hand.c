@@ -11,7 +11,7 @@ size_t phi_stages(void) { return PHI_FLOWS; }
 phi_status phi_describe(size_t number, phi_stage *about)
 {
     if (number > PHI_FLOWS || about == NULL) return PHI_BAD_ARGUMENT;
-    *about = phi_stages_of[phi_flow_parts[number == PHI_FLOWS ? 0 : number] - 1];
+    *about = phi_stages_of[phi_flow_parts[number] - 1];
     return PHI_OK;
 }
 
@@ -28,13 +28,12 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #if !PHI_NEAR
     (void)far;
 #endif
-    const int joined = number == PHI_FLOWS, part = phi_flow_parts[joined ? 0 : number];
-    const int row = joined ? PHI_JOINED : phi_flow_rows[number];
+    const int part = phi_flow_parts[number];
 #if PHI_RENEWED
     double coef[PHI_ROW];
-    phi_renew(s, row, s->steps, coef);
+    phi_renew(s, (int)number, s->steps, coef);
 #else
-    const double *coef = s->coef + row * PHI_ROW;
+    const double *coef = s->coef + number * PHI_ROW;
 #endif
 #if PHI_ONE_ROW
     const size_t units = phi_units(s);
@@ -49,7 +48,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
     s->from = (ptrdiff_t)from;
     s->to = (ptrdiff_t)to;
 #if PHI_NOISE
-    for (size_t unit = 0; drawing && unit < units; ++unit) phi_draw_piece(s, s->steps, number > 0, unit);
+    if (drawing) phi_draw_pieces(s, s->steps, number > 0, 0, units);
 #endif
     phi_sweep_rows(s, part, coef PHI_AND_FAR(far), 0, units);
     s->from = 0;
@@ -59,7 +58,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #endif
 #else
 #if PHI_NOISE
-    for (size_t unit = from * units; drawing && unit < to * units; ++unit) phi_draw_piece(s, s->steps, number > 0, unit);
+    if (drawing) phi_draw_pieces(s, s->steps, number > 0, from * units, to * units);
 #endif
     phi_sweep_rows(s, part, coef PHI_AND_FAR(far), from * units, to * units);
 #endif

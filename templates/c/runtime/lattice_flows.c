@@ -6,6 +6,7 @@
 #include "sweeps.h"
 
 /* ---- The flows ---- */
+#if PHI_SHARED
 #if PHI_BY_COLOUR
 /* One part of H, of one colour. */
 static void phi_sweep_colour(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
@@ -14,7 +15,6 @@ static void phi_sweep_colour(const phi_solver *s, int part, const double *coef P
 static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI_AND_INT_FAR)
 #endif
 {
-#if PHI_SHARED
     size_t first, end = phi_share(phi_units(s), &first);
 #if PHI_TANGENT
     for (size_t k = 0; k < s->vectors; ++k) { /* of what a part moves only the site itself is read: no thread need wait */
@@ -25,19 +25,9 @@ static void phi_sweep_part(const phi_solver *s, int part, const double *coef PHI
 #endif
     phi_sweep_rows(s, part, coef PHI_AND_FAR(far), first, end);
     phi_wait();
-#else
-    const size_t units = phi_units(s);
-#ifdef _OPENMP
-#if PHI_PAIRS
-#pragma omp parallel for if (s->sites > 512)
-#else
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-#endif
-    for (size_t unit = 0; unit < units; ++unit) phi_sweep_piece(s, part, coef PHI_AND_FAR(far), unit);
-#endif
 }
 
+#endif
 #if PHI_BY_COLOUR
 /* The first flow, those between it and the last, the last, or those between, backwards. */
 static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI_AND_INT_FAR)
@@ -47,11 +37,9 @@ static void phi_sweep_part(const phi_solver *s, int kind, const double *coef PHI
 #else
     const int last = s->flows - 1;
 #endif
-    if (kind == 0 || kind == 2) phi_sweep_colour(s, kind == 0 ? 0 : last, coef PHI_AND_FAR(far));
-    if (kind == 1)
-        for (int flow = 1; flow < last; ++flow) phi_sweep_colour(s, flow, coef PHI_AND_FAR(far));
-    if (kind == 3)
-        for (int flow = last - 1; flow > 0; --flow) phi_sweep_colour(s, flow, coef PHI_AND_FAR(far));
+    if (kind % 2 == 0) phi_sweep_colour(s, kind == 0 ? 0 : last, coef PHI_AND_FAR(far));
+    for (int flow = 1; kind % 2 == 1 && flow < last; ++flow)
+        phi_sweep_colour(s, kind == 1 ? flow : last - flow, coef PHI_AND_FAR(far));
 }
 
 #endif
@@ -74,17 +62,16 @@ typedef struct {
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void phi_find_flow(const phi_solver *s, size_t steps, int number, phi_flow *flow)
 {
-    const int joined = number == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[number];
-    flow->part = phi_flow_parts[joined ? 0 : number];
+    flow->part = phi_flow_parts[number];
 #if PHI_UNDONE
     flow->go = 0;
 #endif
 #if PHI_RENEWED
-    phi_renew(s, row, steps, flow->own);
+    phi_renew(s, number, steps, flow->own);
     flow->coef = flow->own;
 #else
+    flow->coef = s->coef + number * PHI_ROW;
     (void)steps;
-    flow->coef = s->coef + row * PHI_ROW;
 #endif
 }
 
@@ -95,33 +82,22 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
     phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(s->far > 0));
 }
 
-#elif PHI_NOISE
+#else
+#if PHI_NOISE
 /* The flow of that number in a step after so many. */
+#else
+/* The flow of that number in a step after so many; after those of a step the last and the first together. */
+#endif
 static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 {
 #if PHI_RENEWED
     double coef[PHI_ROW];
-    phi_renew(s, phi_flow_rows[number], steps, coef);
+    phi_renew(s, number, steps, coef);
 #else
-    const double *coef = s->coef + phi_flow_rows[number] * PHI_ROW;
+    const double *coef = s->coef + number * PHI_ROW;
     (void)steps;
 #endif
     phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FAR(s->far > 0));
-}
-
-#else
-/* The flow of that number in a step after so many; after those of a step the last and the first together. */
-static void phi_make_flow(const phi_solver *s, size_t steps, int number)
-{
-    const int joined = number == PHI_FLOWS, row = joined ? PHI_JOINED : phi_flow_rows[number];
-#if PHI_RENEWED
-    double coef[PHI_ROW];
-    phi_renew(s, row, steps, coef);
-#else
-    const double *coef = s->coef + row * PHI_ROW;
-    (void)steps;
-#endif
-    phi_sweep_part(s, phi_flow_parts[joined ? 0 : number], coef PHI_AND_FAR(s->far > 0));
 }
 
 #endif
@@ -133,23 +109,17 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
 #include "lattice_waves.c"
 
 #endif
-#if PHI_NOISE
+#if PHI_NOISE && PHI_SHARED
 /* The increments of a part of a step after so many, at all sites. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
 {
-#if PHI_SHARED
     size_t first, end = phi_share(phi_units(s), &first);
-    for (; first < end; ++first) phi_draw_piece(s, steps, part, first);
+    phi_draw_pieces(s, steps, part, first, end);
     phi_wait();
-#else
-    const size_t units = phi_units(s);
-#ifdef _OPENMP
-#pragma omp parallel for if (s->sites > 4096)
-#endif
-    for (size_t unit = 0; unit < units; ++unit) phi_draw_piece(s, steps, part, unit);
-#endif
 }
 
+#endif
+#if PHI_NOISE
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
 #else
 /* Some steps, joined, without the last flow; no steps are that flow alone. */

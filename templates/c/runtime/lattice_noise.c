@@ -25,34 +25,48 @@ static uint64_t phi_site(const phi_solver *s, size_t row, ptrdiff_t i)
 }
 
 #endif
-/* The increments of a part of a step after so many others, for a piece of a row: a function of seed, member, step, part and site
-   alone. A step of -h has them in the order in which it undoes one of h. */
-static void phi_draw_piece(const phi_solver *s, size_t steps, int part, size_t unit)
+/* The increments of a part of a step after so many others, a function of seed, member, step, part and site alone. A step of -h
+   has them in the order in which it undoes one of h. */
+#if PHI_SHARED || PHI_SERIES
+static void phi_draw_pieces(const phi_solver *s, size_t steps, int part, size_t first, size_t end)
+#else
+static void phi_draw(const phi_solver *s, size_t steps, int part)
+#endif
 {
     const uint64_t step = s->first_step + steps;
     const uint32_t now = (uint32_t)(s->h < 0.0 ? PHI_PARTS - 1 - part : part) * ((PHI_SOURCES + 1) / 2);
     const double size = copysign(sqrt(fabs(s->h) / (double)PHI_PARTS), s->h);
-    const phi_row row = phi_piece_of(s, unit);
-    for (int k = 0; k < PHI_SOURCES; k += 2) {
-        double *one = PHI_HERE(s->x[PHI_DRAWN + k]);
-        double *other = PHI_HERE(s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)]);
-        for (ptrdiff_t i = row.from; i < row.to; ++i) {
-#if PHI_BY_HAND || !PHI_ONE_ROW
-            const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
+#if PHI_SHARED || PHI_SERIES
+    for (size_t unit = first; unit < end; ++unit) {
 #else
-            const uint64_t site = (uint64_t)i;
+    const size_t units = phi_units(s);
+#ifdef _OPENMP
+#pragma omp parallel for if (s->sites > 4096)
 #endif
-            const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
-            uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member, (uint32_t)site };
-            double pair[2];
-            phi_two_normals(s->seed, counter, pair);
-            other[i] = size * pair[1];
-            one[i] = size * pair[0];
+    for (size_t unit = 0; unit < units; ++unit) {
+#endif
+        const phi_row row = phi_piece_of(s, unit);
+        for (int k = 0; k < PHI_SOURCES; k += 2) {
+            double *one = PHI_HERE(s->x[PHI_DRAWN + k]);
+            double *other = PHI_HERE(s->x[PHI_DRAWN + (k + 1 < PHI_SOURCES ? k + 1 : k)]);
+            for (ptrdiff_t i = row.from; i < row.to; ++i) {
+#if PHI_BY_HAND || !PHI_ONE_ROW
+                const uint64_t site = phi_site(s, PHI_AXES > 1 ? unit : 0, i);
+#else
+                const uint64_t site = (uint64_t)i;
+#endif
+                const uint32_t beside = (uint32_t)(step >> 32) | (now + (uint32_t)k / 2) << 16;
+                uint32_t counter[4] = { (uint32_t)step, beside | (uint32_t)(site >> 32) << 24, s->member, (uint32_t)site };
+                double pair[2];
+                phi_two_normals(s->seed, counter, pair);
+                other[i] = size * pair[1];
+                one[i] = size * pair[0];
+            }
         }
-    }
 #if PHI_HALO
-    for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(PHI_HERE(s->x[PHI_DRAWN + k]), s->length, row.from, row.to);
+        for (int k = 0; k < PHI_SOURCES; ++k) phi_ends(PHI_HERE(s->x[PHI_DRAWN + k]), s->length, row.from, row.to);
 #endif
+    }
 }
 
 phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t step)

@@ -178,7 +178,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
 #endif
 #if PHI_NOISE
     PHI_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) phi_draw_piece(s, s->steps, 0, unit);
+    for (size_t unit = 0; unit < units; ++unit) phi_draw_pieces(s, s->steps, 0, unit, unit + 1);
 #endif
     PHI_EACH_STAGE {
 #if PHI_RENEWED

@@ -10,14 +10,16 @@ static double phi_force(double g, const phi_row *row, ptrdiff_t i)
     return -g * sin(q[i]) + (before[i] - q[i]) + (after[i] - q[i]) + right * (q[i + 1] - q[i]) + left * (q[i - 1] - q[i]);
 }
 
-static void phi_sweep_piece(const phi_solver *s, int part, const double *coef, size_t unit)
+static void phi_sweep_part(const phi_solver *s, int part, const double *coef)
 {
-    const phi_row row = phi_piece_of(s, unit);
-    double *q = s->x[0] + row.at[0], *p = s->x[1] + row.at[0];
-    for (ptrdiff_t i = row.from; i < row.to; ++i)
-        if (part == 1) q[i] += coef[0] * p[i];
-        else p[i] += coef[0] * phi_force(s->params.g, &row, i);
-    if (part == 1) phi_ends(q, s->length, row.from, row.to);
+    for (size_t unit = 0; unit < phi_units(s); ++unit) {
+        const phi_row row = phi_piece_of(s, unit);
+        double *q = s->x[0] + row.at[0], *p = s->x[1] + row.at[0];
+        for (ptrdiff_t i = row.from; i < row.to; ++i)
+            if (part == 1) q[i] += coef[0] * p[i];
+            else p[i] += coef[0] * phi_force(s->params.g, &row, i);
+        if (part == 1) phi_ends(q, s->length, row.from, row.to);
+    }
 }
 
 static void phi_energy_row(const phi_row *row, double *restrict out)

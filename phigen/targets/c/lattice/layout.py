@@ -135,6 +135,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "COLOURS": step.sites.colours > 1,
+        "PERIODIC_COLOURS": max(step.sites.periods, default=1) > 1,
         "SWEPT": program.profile == "small",
         "PAIRS": step.partners is not None and not layout.graph,
         "GATHER": step.partners is not None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -20,6 +21,9 @@ from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
 from phigen.targets.c.layout import comment
 from phigen.targets.code import Code, lower
 from phigen.targets.header import plain, sentence
+
+#: The name of a part of H.
+_PART = re.compile(r"\bH_\d+")
 
 #: The kernel of the derivatives of a sweep along the fields at the site itself.
 BLOCK = "own_slope"
@@ -53,11 +57,23 @@ class Loop:
 
     def text(self, program: Program, purposes: Iterable[str] = ()) -> str:
         """The function, below what it is for."""
-        sentences = dict.fromkeys(plain(sentence(one)) for one in purposes or (self.purpose,))
+        sentences = [plain(sentence(one)) for one in _together(purposes or (self.purpose,))]
         said = [line for one in sentences for line in comment(one, "   ")]
         said[0] = f"/* {said[0].strip()}"
         head = f"static inline void {program.name}_{self.name}({self.arguments})"
         return "\n".join([*said[:-1], f"{said[-1]} */", head, "{", self.body + "}\n"])
+
+
+def _together(purposes: Iterable[str]) -> Iterator[str]:
+    """What a loop is for, each said once: for which part of H what it does, or the same for which parts."""
+    found: dict[str, dict[str, None]] = {}
+    for purpose in purposes:
+        part, _, manner = purpose.rpartition(": ")
+        name = _PART.search(manner)
+        told = (f"{part}: {{}}", manner) if part or not name else (manner.replace(name[0], "{}"), name[0])
+        found.setdefault(told[0], {})[told[1]] = None
+    for text, own in found.items():
+        yield text.removeprefix(": ").replace("{}", ("; " if ": " in text else ", ").join(own))
 
 
 def has_ends(program: Program, kernels: Sequence[Kernel]) -> bool:

@@ -90,8 +90,21 @@ def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
 
 
 def rows_of(step: Sweeps) -> int:
-    """Rows of coefficients: of a splitting one more, for the last flow of a step and the first of the next together."""
-    return len(step.schedule.times) + (0 if step.equation else 1)
+    """Rows of coefficients: of each flow, and of the last and the first of the next step where these are joined."""
+    return len(step.schedule.times) if step.equation else len(_flows(step))
+
+
+def _flows(step: Sweeps) -> list[tuple[int, int]]:
+    """The flows of a step; and once more the first, for it and the last of the step before together: that is joined to
+    it unless there is noise, of which each flow has its own."""
+    flows = step.schedule.flows
+    return [*flows, *([] if step.sites.increments else flows[:1])]
+
+
+def _by_flow(step: Sweeps, values: Sequence[float], joined: float) -> list[float]:
+    """The values of the rows of the schedule for each flow, the last for those that are joined."""
+    found = [values[row] for _, row in _flows(step)]
+    return found if step.sites.increments else [*found[:-1], joined]
 
 
 def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
@@ -108,7 +121,7 @@ def model(program: Program, step: Sweeps) -> str:
     member, layout, schedule, sites = members(program), layout_of(program, step), step.schedule, step.sites
     flows, several = schedule.flows, len(sites.axes) > 1
     joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
-    multiples = [*schedule.multiples, *schedule.multiples[:1]]
+    multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
     has = switches(program, step, layout)
     reserved, of_stage = _reserved(program, layout, has)
     constants = [
@@ -137,10 +150,7 @@ def model(program: Program, step: Sweeps) -> str:
             constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]
             constants += [("BAND", layout.band, "diagonals beside that of the matrix of Newton's method")]
     else:
-        constants += [
-            ("FLOWS", len(flows), "in a step"),
-            ("JOINED", len(schedule.times), "the row of the last flow of a step and the first of the next together"),
-        ]
+        constants += [("FLOWS", len(flows), "in a step")]
     if has["WAVES"]:
         far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
         span = 1 if len(sites.axes) == 1 else max(1, *far)
@@ -161,25 +171,25 @@ def model(program: Program, step: Sweeps) -> str:
         "defaults": ", ".join("NULL" if p.at != "all" else repr(float(p.value)) for p in program.parameters) or "0",
         "constants": constants,
         "least": ", ".join(map(str, sites.least)),
-        "periods": ", ".join(map(str, sites.periods)),
+        "periods": ", ".join(map(str, sites.periods)) if has["PERIODIC_COLOURS"] else "",
         "several": several,
         "ends": several or has["BANDED"],
         "open": ", ".join(str(int(o)) for o in sites.open),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
         "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and several else "",
-        "times": ", ".join(map(repr, [*schedule.times, joined][: rows_of(step)])),
+        "times": ", ".join(map(repr, schedule.times if step.equation else _by_flow(step, schedule.times, joined))),
         "split": step.equation is None,
-        "multiples": ", ".join(map(repr, multiples)) if schedule.multiples else "",
+        "multiples": ", ".join(map(repr, multiples)),
         "moments": ", ".join(map(repr, _moments(step))) if step.refresh and not step.equation else "",
         "middles": ", ".join(map(repr, program.midpoints)),
         "fractions": len(program.fractions) > 1,
         "bound": repr(BOUND) if program.noise else "",
-        "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in flows),
+        "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in _flows(step)),
+        "joined": not program.noise,
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
         "part_count": len(step.by_colour),
         "graph": layout.graph,
-        "rows": ", ".join(str(row) for _, row in flows),
         "allowed": [*_allowed(asked, arrays)],
         "stages": ", ".join(_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts)))
         if has["BY_HAND"]
@@ -195,8 +205,8 @@ def model(program: Program, step: Sweeps) -> str:
 
 
 def _moments(step: Sweeps) -> list[float]:
-    """Where the time stands still, as a fraction of the step: for each row of coefficients, last for joined flows."""
-    return [*step.schedule.moments, 0.0]
+    """Where the time stands still, as a fraction of the step: for each row of coefficients."""
+    return _by_flow(step, step.schedule.moments, 0.0)
 
 
 def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:

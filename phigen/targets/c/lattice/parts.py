@@ -95,12 +95,13 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
     for code, same in alike.items():
         shared = same[0].loop.shared if len(same) > 1 and same[0].loop.shared not in names.values() else ""
         names[code] = shared or same[0].loop.name
-        purposes = [call.purpose(program.coordinates) for call in same]
-        yield replace(same[0].loop, name=names[code]).text(program, purposes)
+        yield replace(same[0].loop, name=names[code]).text(program, [call.loop.purpose for call in same])
     near = rows is not None and bool(rows.limited)
     unused, varied = ["far"] * (near and all(len(forms) == 1 for forms in made)), rows is None
-    alone = not switches(program, step, layout)["SHARED"]
+    has = switches(program, step, layout)
+    threads = 0 if varied or has["SHARED"] else 512 if has["PAIRS"] else 4096
     flow, what = ("flow", "A flow") if step.by_colour else ("part", "The flow of a part of H")
+    head = "tangent_rows" if varied else f"sweep_{'colour' if step.by_colour else 'part'}" if threads else "sweep_rows"
     cases: list[Case | str] = []
     for k, forms in enumerate(made):
         if varied or not _has_rows_of_its_own(program, layout):
@@ -119,11 +120,11 @@ def _parts(program: Program, layout: Layout, rows: Rows | None, parts: Sequence[
         layout,
         cases,
         title=f"How {what[0].lower()}{what[1:]} carries a tangent vector" if varied else what,
-        head="tangent_rows" if varied else "sweep_piece" if alone else "sweep_rows",
+        head=head,
         arguments=f"int {flow}, const double *coef{', double *const *v' * varied}{', int far' * near}",
         coloured=bool(step.by_colour),
         unused=["part"] * (len(cases) == 1 and not step.by_colour) + ([] if varied else unused),
-        alone=alone,
+        threads=threads,
     )
 
 
@@ -192,6 +193,10 @@ def _case(
     return Case(either(lines), setup, beside, orders, moved, where)
 
 
+#: The most statements of a case of a switch that are on its line.
+MOST_ON_A_LINE = 2
+
+
 @dataclass(frozen=True)
 class Case:
     """What is called for a piece of a row ``at``, after its ``setup``; whether there are sites beside open ends; the
@@ -221,13 +226,6 @@ class _Call:
     across: bool | None = None
     others: tuple[_Call, ...] = ()
 
-    def purpose(self, fields: Sequence[str]) -> str:
-        """What the loop is for."""
-        said = f", where {', '.join(fields)} stand for its {', '.join(self.order)}" if self.order else ""
-        said += ", with other parameters at bonds" * bool(self.bonds) + ", the other way" * (self.side == -1.0)
-        said += ", across bonds" * bool(self.across)
-        return self.loop.purpose + said
-
 
 def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str]) -> Iterator[str]:
     """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
@@ -237,21 +235,23 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
     side: float | None = 1.0
     across: bool | None = False
     for call in called:
+        told = list[str]()
         if call.bonds not in (bonds, None):
             bonds = call.bonds
-            yield f"row.at_bonds = {'_'.join(bonds) or 's->at_bonds'};"
+            told.append(f"row.at_bonds = {'_'.join(bonds) or 's->at_bonds'}")
         if call.side not in (side, None):
             side = call.side
-            yield f"row.side = {side!r};"
+            told.append(f"row.side = {side!r}")
         if call.across not in (across, None):
             across = call.across
-            yield f"row.across = {int(across)};"
+            told.append(f"row.across = {int(across)}")
         if call.colour not in (colour, None):
             colour = call.colour
-            yield f"row.swept = {colour};"
+            told.append(f"row.swept = {colour}")
         if call.order != order:
             order = call.order
-            yield f"row.x = {'_'.join(order) or 's->x'};"
+            told.append(f"row.x = {'_'.join(order) or 's->x'}")
+        yield from [f"{', '.join(told)};"] if told else []
         yield f"{program.name}_{names[call.loop.code]}(coef, {at(program, call.sites)});"
 
 
@@ -375,10 +375,11 @@ def over_rows(
     labels: Sequence[int] = (),
     *,
     alone: bool = False,
+    threads: int = 0,
     **more: object,
 ) -> str:
-    """A function that goes over pieces of rows, or ``alone`` over one; what it does is one of some ``cases``, or what
-    these call.
+    """A function that goes over pieces of rows, or ``alone`` over one, or over all, by several threads where there are
+    more sites than ``threads`` says, if it does; what it does is one of some ``cases``, or what these call.
 
     They have the numbers 1, 2, …, or those of ``labels``.
     """
@@ -390,10 +391,14 @@ def over_rows(
         "high": max([0, *(high for _, high in last)]),
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
         "alone": alone,
+        "threads": threads,
+        "several": not alone and not threads,
     }
-    body = [line for case in cases if not isinstance(case, str) for line in case.orders]
-    body = [*dict.fromkeys(body), *_over_pieces(program, layout, values, cases, labels or range(1, 1 + len(cases)))]
-    return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": body, **more})
+    orders = dict.fromkeys(line for case in cases if not isinstance(case, str) for line in case.orders)
+    body = ["/* the fields in other orders, in which loops that are for one order serve others */"] * bool(orders)
+    body += [*orders, *_over_pieces(program, layout, values, cases, labels or range(1, 1 + len(cases)))]
+    indented = [line if line.startswith("#") else f"    {line}" for line in body]
+    return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": indented, **more})
 
 
 def _over_pieces(
@@ -422,12 +427,17 @@ def _over_pieces(
 def _piece(values: Mapping[str, object], case: Case) -> list[str]:
     changed = any(re.search(r"\brow\.\w+ = |_between\(", line) for line in (*case.setup, *case.calls))
     lines = render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
-    each = "for (size_t unit = first; unit < end; ++unit) {"
-    return lines if values["alone"] else [each, *(f"    {line}" for line in lines), "}"]
+    threads = values["threads"]
+    first, end = ("0", "units") if threads else ("first", "end")
+    begin = ["#ifdef _OPENMP", f"#pragma omp parallel for if (s->sites > {threads})", "#endif"] if threads else []
+    begin.append(f"for (size_t unit = {first}; unit < {end}; ++unit) {{")
+    return lines if values["alone"] else [*begin, *(f"    {line}" for line in lines), "}"]
 
 
 def _cases(loops: Sequence[Sequence[str]], labels: Sequence[int]) -> Iterator[str]:
-    """The cases of a switch over parts of H, with their statements."""
-    for k, lines in zip(labels, loops, strict=True):
-        yield f"{'default' if k == labels[-1] else f'case {k}'}: /* H_{k} */"
-        yield from (f"    {line}" for line in (*lines, "break;"))
+    """The cases of a switch over parts of H, with their statements; each on a line, where all are short."""
+    heads = ["default:" if k == labels[-1] else f"case {k}:" for k in labels]
+    short = all(len(lines) <= MOST_ON_A_LINE and "for" not in lines[0] for lines in loops)
+    for head, lines in zip(heads, loops, strict=True):
+        yield " ".join([head, *lines, "break;"]) if short else head
+        yield from () if short else (f"    {line}" for line in (*lines, "break;"))
