@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: a67d877fb2d65de5302e9d2ade89cf5151fe90828efbc136dd993475e65ada60
+ * body-sha256: 1570ee41a8d762eba53d24939d16a28ee7e0346e953502e8910fc3166aed19df
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -341,6 +341,19 @@ export class Solver {
   integrate(h, count) {
     this.#setStep(h);
     return march(this, h, count);
+  }
+
+  /**
+   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   *
+   * @returns {Solver}
+   */
+  copy() {
+    const twin = new Solver({ ...this, x0: this.x });
+    const { t, steps, evaluations } = this;
+    Object.assign(twin, { t, steps, evaluations });
+    twin.carry.set(this.carry);
+    return twin;
   }
 
   /**

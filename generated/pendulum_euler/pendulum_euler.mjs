@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 4737fd73d8bb387d554f0d79d3fdfbac5ff796d271fd79cf1ed9ee0fc454ed03
+ * body-sha256: ab6972d9d86521c06ed31a8a0b25c09f954d72f212b3717a0f23b06bbaf534f5
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -232,6 +232,19 @@ export class Solver {
   integrate(h, count) {
     this.#setStep(h);
     return march(this, h, count);
+  }
+
+  /**
+   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   *
+   * @returns {Solver}
+   */
+  copy() {
+    const twin = new Solver({ ...this, x0: this.x });
+    const { t, steps, evaluations } = this;
+    Object.assign(twin, { t, steps, evaluations });
+    twin.carry.set(this.carry);
+    return twin;
   }
 
   /**

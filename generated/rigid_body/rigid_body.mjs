@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0b493cbab9fdf15b78e3f2339a4c5995f7424db2c5ee484cf1f365bd4ea75980
+ * body-sha256: 6e900c8682c5c8754691d3015892f2883f72994a29ac3d1d17f1bbe99d4a214d
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -619,6 +619,19 @@ export class Solver {
   integrate(h, count) {
     this.#setStep(h);
     return march(this, h, count);
+  }
+
+  /**
+   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   *
+   * @returns {Solver}
+   */
+  copy() {
+    const twin = new Solver({ ...this, x0: this.x });
+    const { t, steps, evaluations } = this;
+    Object.assign(twin, { t, steps, evaluations });
+    twin.carry.set(this.carry);
+    return twin;
   }
 
   /**

@@ -7,7 +7,7 @@
  *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 division
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sir_epidemic
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 31b6b801a813d05cf8f2748e94f159bb968f1c8b6be45dcce383e6bfc0494f6c
+ * body-sha256: 0da7480dacbfc3714aa6bf813e7ccb78b754fc237712064a1cf0d7faacc98818
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -320,6 +320,19 @@ export class Solver {
   integrate(h, count) {
     this.#setStep(h);
     return march(this, h, count);
+  }
+
+  /**
+   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   *
+   * @returns {Solver}
+   */
+  copy() {
+    const twin = new Solver({ ...this, x0: this.x });
+    const { t, steps, evaluations } = this;
+    Object.assign(twin, { t, steps, evaluations });
+    twin.carry.set(this.carry);
+    return twin;
   }
 
   /**

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 244daf1375c3b6f5339f1a5daaa7508e2fddcf2d2330d32ff31e0268eac9519b
+ * body-sha256: bfe9ed807f992a022ed3f3f86d492ba0d4ba277c10718feb1d937d9f8dac1923
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -447,6 +447,20 @@ export class Solver {
   integrate(h, count) {
     this.#setStep(h);
     return march(this, h, count);
+  }
+
+  /**
+   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   *
+   * @returns {Solver}
+   */
+  copy() {
+    const twin = new Solver({ ...this, x0: this.x });
+    const { t, steps, evaluations } = this;
+    Object.assign(twin, { t, steps, evaluations });
+    twin.carry.set(this.carry);
+    twin.dw.set(this.dw);
+    return twin;
   }
 
   /**

@@ -65,6 +65,38 @@ function moved(Solver, job, monitored) {
   return { x: [...solver.step(job.h).x], fresh: [...fresh.step(job.h).x], failure, steps: solver.steps };
 }
 
+/** Where the first coordinate passes through the value that it has after some steps and a half: the times, and the states. */
+function crossings(Solver, job) {
+  const solver = new Solver(job.options);
+  const level = solver.copy().integrate(job.h, 6).step(job.h / 2).x[0];
+  const found = [];
+  for (let k = 0; k < 12; k++) {
+    const before = solver.copy();
+    solver.step(job.h);
+    if (!((before.x[0] < level) !== (solver.x[0] < level))) continue;
+    let [low, high] = [0, 1];
+    for (let middle = 0.5; low < middle && middle < high; middle = (low + high) / 2) {
+      const same = (before.copy().step(middle * job.h).x[0] < level) === (before.x[0] < level);
+      [low, high] = same ? [middle, high] : [low, middle];
+    }
+    const there = before.copy().step(high * job.h);
+    found.push({ t: there.t, x: [...there.x], attitude: [...(there.attitude ?? [])], steps: there.steps });
+  }
+  return { level, found };
+}
+
+/** Whether a copy of a solver on its way goes on as that does, to rounding, and leaves it alone. */
+function copied(Solver, job) {
+  const solver = new Solver(job.options).integrate(job.h, 3);
+  const state = () => JSON.stringify([solver.x, solver.carry, solver.t, solver.steps, solver.attitude ?? 0]);
+  const before = state();
+  const twin = solver.copy().integrate(job.h, 2);
+  const alone = state() === before;
+  solver.integrate(job.h, 2);
+  const ends = [solver, twin].map((s) => [...s.x, s.t, s.steps, ...(s.attitude ?? [])]);
+  return { alone, ends };
+}
+
 async function answer(job) {
   const { Solver, StepError } = await import(job.module);
   const made = attempted(() => new Solver(job.options));
@@ -94,6 +126,8 @@ async function answer(job) {
     tangent: varied(Solver, job),
     many: many(Solver, job, start),
     each: each(Solver, job, start),
+    copied: attempted(() => copied(Solver, job)).value,
+    crossings: attempted(() => crossings(Solver, job)).value,
     moved: attempted(() => moved(Solver, job, "tCarry" in solver)).value,
   };
 }

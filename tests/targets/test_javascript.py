@@ -11,7 +11,21 @@ from shutil import copy
 import numpy as np
 import pytest
 from node import answers as answers_of
-from support import BODY, COMMAND, NAMES, QUICK, RATTLEBACK, compile_text, compiled, run, setting, solver, spec_of, tool
+from support import (
+    BODY,
+    COMMAND,
+    NAMES,
+    QUICK,
+    RATTLEBACK,
+    compile_text,
+    compiled,
+    run,
+    setting,
+    slow_but,
+    solver,
+    spec_of,
+    tool,
+)  # fmt: skip
 
 import phigen
 from phigen import resources, spec
@@ -157,6 +171,29 @@ def test_kicked_solvers_go_on_as_ones_that_start_there(case, answers):
     found = answers[case]["moved"]
     assert apart(found["x"], found["fresh"]) < 1e-13
     assert (found["failure"]["status"], found["steps"]) == ("BAD_ARGUMENT", 3)
+
+
+@pytest.mark.parametrize("case", [*NAMES, *VARIANTS, "duffing", "kepler_eccentric", "thruster_body"])
+def test_copies_go_on_by_themselves(case, answers):
+    found = answers[case]["copied"]
+    assert found["alone"]
+    assert apart(found["ends"][1], found["ends"][0]) < 1e-14
+
+
+@pytest.mark.parametrize("case", slow_but(QUICK, [*NAMES, *VARIANTS, "duffing", "kepler_eccentric", "thruster_body"]))
+def test_parts_of_steps_find_events_where_sections_do(case, answers):
+    """With time, a monitor, forces, attitude, and every kind of step."""
+    at, found = setting(compilation_of(case)), answers[case]["crossings"]
+
+    def g(x, *_):
+        return x[:, 0] - found["level"]
+
+    numpy = solver(compilation_of(case), "numpy")
+    expected = numpy.section(at.x, at.h, 12, g, direction="both", parameters=at.parameters)
+    assert len(found["found"]) == len(expected) > 0
+    for there, t, x in zip(found["found"], expected.t, expected.x, strict=True):
+        assert abs(there["t"] - t) < 1e-11 * abs(12 * at.h)
+        assert apart(there["x"], x) < 1e-13
 
 
 @pytest.mark.parametrize("case", [*NAMES, *VARIANTS])
@@ -384,7 +421,7 @@ def test_edits_are_noticed():
     assert is_edited(text.replace("const DIM = 3", "const DIM = 4"))
 
 
-@pytest.mark.parametrize(("example", "name"), [(0, "rigid_body"), (1, "toda")])
+@pytest.mark.parametrize(("example", "name"), [(0, "rigid_body"), (1, "rigid_body"), (2, "toda")])
 def test_an_example_of_the_documentation_prints_what_it_says(example, name, tmp_path):
     root = resources.bundled_specs().parent
     text = (root / "docs" / "javascript.md").read_text(encoding="utf-8")

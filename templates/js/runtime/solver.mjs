@@ -352,6 +352,34 @@ export class Solver {
     return march(this, h, count);
   }
 
+  /**
+   * A solver that stands where this one does, and goes on by itself; its guesses begin anew.
+   *
+   * @returns {Solver}
+   */
+  copy() {
+    const twin = new Solver({ ...this, x0: this.x });
+    const { t, steps, evaluations } = this;
+    Object.assign(twin, { t, steps, evaluations });
+    twin.carry.set(this.carry);
+    // #if MONITOR
+    twin.tCarry = this.tCarry;
+    // #endif
+    // #if NOISE
+    twin.dw.set(this.dw);
+    // #endif
+    // #if ATTITUDE
+    twin.firstElement = Float64Array.from(this.firstElement);
+    twin.turned = Float64Array.from(this.turned);
+    twin.turnedCarry = Float64Array.from(this.turnedCarry);
+    // #if RATE_OF_GAUGE
+    twin.turningRate = Float64Array.from(this.turningRate);
+    twin.attitudeFrom = this.attitudeFrom;
+    // #endif
+    // #endif
+    return twin;
+  }
+
   // #if KICKED
   /**
    * Between steps: stand at x, with time, parameters and any gauge as they are. Throws StepError for what
