@@ -10,6 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from phigen.lattice.adjoint import BACK
+from phigen.lattice.collecting import collecting
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep, Sweeps
@@ -30,6 +32,19 @@ def can_be_undone(program: Program, step: Sweeps) -> bool:
     parities = _of_coefficients(step)
     used = {s for part in step.parts for sweep in part for s in symbols_of(*sweep.kernel.roots)}
     return all(parities.get(s, EVEN) for s in used)
+
+
+def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
+    """The transposes of the sweeps of each part, which undo them and collect where they can."""
+    kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
+    undone = can_be_undone(program, step)
+    found = []
+    for part in step.parts if step.adjoint else ():
+        found.append([kernels[sweep.kernel.name + BACK] for sweep in part])
+        for k, sweep in enumerate(part if undone else ()):
+            back = found[-1][k]
+            found[-1][k] = undoing(program, step, sweep, collecting(program.coordinates, step, sweep, back) or back)
+    return found
 
 
 def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kernel:

@@ -302,6 +302,11 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
                 const double *restrict from = PHI_HERE(g->row_bar[f]);
                 double *restrict to = PHI_HERE(g->bar[f]);
                 for (ptrdiff_t i = row.from; i < row.to; ++i) to[i] += from[i];
+#if PHI_UNDONE
+#if PHI_HALO
+                phi_ends(to, s->length, row.from, row.to);
+#endif
+#endif
             }
         }
     }

@@ -8,6 +8,14 @@
 
 /* ---- The transpose of sweeps ---- */
 #if PHI_SHARES
+/* The sum of all lanes, which are changed. */
+static inline double phi_total(double lanes[8])
+{
+    for (int l = 0; l < 4; ++l) lanes[l] += lanes[l + 4];
+    return lanes[0] + lanes[2] + (lanes[1] + lanes[3]);
+}
+
+#if PHI_APART
 #if PHI_GATHER
 enum { PHI_ADDED = 2 * PHI_PIECE }; /* sites whose shares in a sum are kept apart before they are added */
 #else
@@ -22,10 +30,10 @@ static inline double phi_added(const double *values, ptrdiff_t count)
     for (ptrdiff_t i = 0; i < whole; i += 8)
         for (int l = 0; l < 8; ++l) lanes[l] += values[i + l];
     for (ptrdiff_t i = whole; i < count; ++i) rest += values[i];
-    for (int l = 0; l < 4; ++l) lanes[l] += lanes[l + 4];
-    return lanes[0] + lanes[2] + (lanes[1] + lanes[3]) + rest;
+    return phi_total(lanes) + rest;
 }
 
+#endif
 #endif
 #if !PHI_UNDONE
 /* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. */

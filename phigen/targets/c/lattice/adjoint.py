@@ -9,15 +9,17 @@ So it is with the kernels of the equation of a stage, see `adjoint_stages`.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phigen.lanes.lowering import Rows
 from phigen.lattice.adjoint import BACK
-from phigen.lattice.undoing import can_be_undone, undoing
+from phigen.lattice.collecting import AROUND
+from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Ends, Gather, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
+from phigen.symbolic.symbols import Symbol
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
@@ -95,18 +97,27 @@ def _has_ends(calls: Sequence[str]) -> bool:
 
 def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of all sweeps of each part."""
-    undone = can_be_undone(program, layout.step)
-    for number, part in enumerate(layout.step.parts, 1):
+    undone, back = can_be_undone(program, layout.step), transposes(program, layout.step)
+    around = {
+        layout.bar(program.coordinates[sweep.moved[int(s.key[0])]])
+        for part, own in zip(layout.step.parts, back, strict=True)
+        for sweep, kernel in zip(part, own, strict=True)
+        for s in kernel.inputs.get(AROUND, ())
+        if isinstance(s, Symbol)
+    }
+    for number, (part, own) in enumerate(zip(layout.step.parts, back, strict=True), 1):
         pulled = list[_Pulled]()
-        for sweep in part:
+        for sweep, kernel in zip(part, own, strict=True):
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
             seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
             ends = tuple((e, kernels[e.kernel.name + BACK]) for e in (sweep.gather.ends if sweep.gather else ()))
             before = tuple(_gathered(program, layout, sweep))
-            kernel = kernels[sweep.kernel.name + BACK]
-            kernel = undoing(program, layout.step, sweep, kernel) if undone else kernel
             pulled.append(_Pulled(kernel, seeds, sweep.gather, ends, before, sweep.moved if undone else ()))
-        yield _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
+        found = _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
+        written = {layout.bar(layout.step.sites.places[s][0]) for k in own for s, e in k.along("site") if not e.is_zero}
+        place = f"{layout.at(0, 'row.')}, s->length, {layout.swept()}"
+        copied = tuple(f"{program.name}_ends(row.bar[{k}]{place});" for k in sorted(around & written) if layout.halo)
+        yield replace(found, first=found.first + copied, second=found.second and found.second + copied)
 
 
 def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:

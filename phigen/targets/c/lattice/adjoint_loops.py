@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+from phigen.lattice.collecting import AROUND
 from phigen.lattice.undoing import UNDONE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
@@ -70,7 +71,10 @@ def first_loop(
 
     ``moved`` are the fields that it finds as they were before the sweep."""
     name, code = program.name, lower(kernel)
-    names = SiteNames(program, layout, kernel, code, {*moved}, calls, sums, {seeds.kind: seeds.pointers})
+    around = [f"row->bar[{k}]" for k in seeds.bars]
+    names = SiteNames(
+        program, layout, kernel, code, {*moved}, calls, sums, {seeds.kind: seeds.pointers, AROUND: around}
+    )
     head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
     used, given = {*seeds.bars}, dict[int, str]()
     places = {(h.base, h.offset): h.array for h in handed}
@@ -162,7 +166,7 @@ def _in_vectors(
     lines += ["    for (ptrdiff_t l = 0; l < 8; ++l) {", "        const ptrdiff_t i = j + l;"]
     lines += [*(f"        {line}" for line in added("l")), "    }", "}"]
     lines += ["for (ptrdiff_t i = whole; i < to; ++i) {", *(f"    {line}" for line in added("0")), "}"]
-    lines += [f"sums[{c}] += {name}_added(share{k}, 8);" for k, (c, _) in enumerate(shares)]
+    lines += [f"sums[{c}] += {name}_total(share{k});" for k, (c, _) in enumerate(shares)]
     return "\n".join([*head, *(f"    {line}" for line in lines)]) + "\n"
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from phigen.lattice.adjoint import BACK
-from phigen.lattice.undoing import can_be_undone
+from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
@@ -145,10 +145,11 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SIDED": program.profile == "small" and bool(step.parts),
         "ACROSS": program.profile == "small" and not step.adjoint and {"here", "there"} <= chosen_ends(step),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
-        "HANDS": any(hands(step)),
+        "HANDS": any(hands(program, step)),
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
         "UNDONE": can_be_undone(program, step),
+        "APART": program.profile == "small" or step.sites.colours > 1 or step.partners is not None,
         "GIVERS": step.adjoint is not None and givers(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
@@ -189,14 +190,13 @@ def waves(program: Program, step: Sweeps) -> bool:
     return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 
-def hands(step: Sweeps) -> list[bool]:
+def hands(program: Program, step: Sweeps) -> list[bool]:
     """Of each part of H whether its transpose gives anything to other sites."""
     found: list[bool] = []
-    back = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}
     if step.equation and step.adjoint:
         return [step.partners is not None or any(any(offset) for _, offset in step.sites.places.values())]
-    for part in step.parts if step.adjoint else ():
-        read = [(s, e) for sweep in part for s, e in back[sweep.kernel.name + BACK].along("site")]
+    for part, kernels in zip(step.parts, transposes(program, step), strict=False):
+        read = [(s, e) for kernel in kernels for s, e in kernel.along("site")]
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
         found.append(beside or any(sweep.gather for sweep in part))
     return found

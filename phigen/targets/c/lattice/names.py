@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
 
+from phigen.lattice.collecting import AROUND
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
@@ -73,6 +74,8 @@ class SiteNames:
                 pointer, number = self.scope[Symbol("start", str(s.key[0]))], program.coordinates.index(str(s.key[0]))
                 self._starts.append(("const double *restrict ", f"{pointer} = row->start[{number}]{layout.at(0)}"))
                 self.scope.bind(s, f"{pointer}[i]")
+            elif isinstance(s, Symbol) and s.kind == AROUND:
+                self._bind_around(s, seeds[AROUND][int(s.key[0])])
             elif isinstance(s, Symbol) and s.kind in seeds:
                 self._bind_seed(s, seeds[s.kind][int(s.key[0])], of_pair=s.kind == "sums_bar")
             elif isinstance(s, Symbol) and s.kind == INCREMENT:
@@ -107,6 +110,14 @@ class SiteNames:
             self._bind_at("a", f"{self.scope[s]} = {text}")
         else:
             self._loaded.append(f"{self.scope[s]} = {text}[i]")
+
+    def _bind_around(self, s: Symbol, array: str) -> None:
+        """A cotangent at a neighbour."""
+        offset = [int(o) for o in s.key[1:]]
+        line = self.layout.line(offset)
+        pointer = self.scope[Symbol("around", s.key[0], line)]
+        self._starts.append(("const double *restrict ", f"{pointer} = {array}{self.layout.at(line)}"))
+        self.scope.bind(s, beside(pointer, offset[-1]))
 
     def _bind_variation(self, s: Symbol, place: str) -> None:
         """The variation of a field at a site, a neighbour, or an end of a bond or a pair."""
