@@ -50,7 +50,22 @@ SWUNG = DRIVEN.replace("driven", "swung").replace(
 )
 LATTICES["swung"] = LATTICES["swung series"] = {"w": 1.2, "phase": 2.0 + np.arange(SITES) / 5}
 LATTICES["driven"] = LATTICES["driven composed"] = {"w": 1.2, "A": 0.35, "phase": 0.2 + np.arange(SITES) / 5}
-OWN = {"driven": DRIVEN, "swung": SWUNG, "far_open": SPECS["far_open"], "spin_graph": SPECS["spin_graph"]}
+#: Springs along two axes, whose ends collect what springs of others give them, beside what is no spring.
+MEMBRANE = """phigen: 1
+name: membrane
+lattice: {axes: [i, j], boundary: periodic}
+coordinates: [q, p]
+parameters: {a: 0.7, b: 1.3}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + a*(q[i+1] - q)**4/4 + b*(q[i+1, j+1] - q)**2/2 - cos(q[j+1] - 2*q)
+"""
+OWN = {
+    "membrane": MEMBRANE,
+    "driven": DRIVEN,
+    "swung": SWUNG,
+    "far_open": SPECS["far_open"],
+    "spin_graph": SPECS["spin_graph"],
+}
 
 
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
@@ -58,6 +73,7 @@ OWN = {"driven": DRIVEN, "swung": SWUNG, "far_open": SPECS["far_open"], "spin_gr
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
 IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES}
 IN_C |= {
+    "membrane fast": (5, 6),
     "swung": SITES,
     "swung series": SITES,
     "driven composed": SITES,

@@ -226,7 +226,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "sums": _sums(program, step),
         "keeps": "" if can_be_undone(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
-        "handing": any(hands(step)) or can_be_undone(program, step),
+        "handing": any(hands(program, step)) or can_be_undone(program, step),
         "handed": max(1, *(part.handed for part in parts)) if parts else 1,
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),
         "numbers": max(1, sum(p.at == "all" for p in program.parameters)),
