@@ -47,6 +47,11 @@ class Observables:
     casimirs: Kernel
     vector_field: Kernel
 
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All of them."""
+        return self.energy, self.casimirs, self.vector_field
+
 
 @dataclass(frozen=True)
 class FreeGauge:
@@ -217,10 +222,8 @@ class Program:
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
-        seen = self.observables
         modified = (self.modified.kernel,) if self.modified else ()
         timed = [k for k in (self.monitor.elapsed, self.monitor.rate, self.monitor.level) if k] if self.monitor else []
         turned = self.attitude.kernels if self.attitude else ()
         noisy = (self.noise.fields,) if self.noise and self.noise.fields else ()
-        observed = (seen.energy, seen.casimirs, seen.vector_field)
-        return (*self.step.kernels, *turned, *timed, *modified, *observed, *noisy, *self.choice)
+        return (*self.step.kernels, *turned, *timed, *modified, *self.observables.kernels, *noisy, *self.choice)

@@ -409,6 +409,28 @@ class Sweeps(_Scheduled):
         return behind, ahead, bits[0], bits[1]
 
     @property
+    def sweeps(self) -> tuple[Sweep, ...]:
+        """The sweeps of all parts, each before its derivative."""
+        return tuple(s for part in self.parts for sweep in part for s in (sweep, sweep.tangent) if s)
+
+    @property
+    def tangents(self) -> tuple[tuple[Sweep, ...], ...]:
+        """The derivatives of the sweeps of each part; nothing where they were not asked for."""
+        found = tuple(tuple(sweep.tangent for sweep in part if sweep.tangent) for part in self.parts)
+        return found if any(found) else ()
+
+    @property
+    def others(self) -> Partners:
+        """Bonds or pairs; nothing where there are none."""
+        return self.partners or Partners(Gather((), ()), Gather((), ()))
+
+    @property
+    def sums(self) -> int:
+        """The most sums over other sites that are held for each."""
+        swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
+        return max(len(g.names) for g in (*swept, self.others.energy, self.others.field, self.others.varied))
+
+    @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         swept = [sweep for part in self.parts for sweep in part]
@@ -416,7 +438,7 @@ class Sweeps(_Scheduled):
         swept_kernels = [sweep.kernel for sweep in swept]
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
-        gathers += [self.partners.energy, self.partners.field, self.partners.varied] if self.partners else []
+        gathers += [self.others.energy, self.others.field, self.others.varied]
         own = (*swept_kernels, *(k for g in gathers for k in g.kernels))
         return _present((self.prepare, self.refresh, *own, *self.transposed))
 

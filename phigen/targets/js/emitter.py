@@ -181,14 +181,14 @@ def _contents(program: Program) -> list[str]:
 
 def _kernels(program: Program) -> list[Kernel]:
     """The kernels that the runtime calls."""
-    step, seen = program.step, program.observables
+    step = program.step
     modified = [program.modified.kernel] if program.modified else []
     refresh = [step.refresh] if step.refresh else []
     timed = [k for k in (program.monitor.elapsed, program.monitor.rate) if k] if program.monitor else []
     noisy = [program.noise.fields] if program.noise and program.noise.fields else []
     turned = program.attitude
     turning = [k for k in (turned.exponential, turned.turn, turned.rate) if k] if turned else []
-    others = [*turning, *program.choice, *timed, *noisy, *modified, seen.energy, seen.casimirs, seen.vector_field]
+    others = [*turning, *program.choice, *timed, *noisy, *modified, *program.observables.kernels]
     if isinstance(step, Splitting):
         flows = turned.turns if turned else step.flows
         return [replace(step.prepare, name="prepare_row"), *refresh, *flows, *step.tangents, *others]

@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Ends, Gather, Partners, Sweep, Sweeps
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol, kind_of
+from phigen.scheme.steps import VARIED, Ends, Gather, Sweep, Sweeps
+from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol
+from phigen.targets import lattice
 from phigen.targets.code import lower
 from phigen.targets.features import switches
 from phigen.targets.header import facts
@@ -41,13 +42,7 @@ def modules(program: Program, step: Sweeps) -> list[str]:
 
 def features(program: Program, step: Sweeps) -> dict[str, bool]:
     """The switches of the runtime, those of lattices among them."""
-    return switches(program) | {
-        "COLOURS": step.sites.colours > 1,
-        "GATHER": step.partners is not None,
-        "GRAPH": _partners(step).graph,
-        "SPLIT": step.equation is None,
-        "BY_COLOUR": bool(step.by_colour),
-    }
+    return switches(program) | lattice.switches(step) | {"SPLIT": step.equation is None}
 
 
 def tables(program: Program, step: Sweeps) -> str:
@@ -65,90 +60,42 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
     return {
         "contents": [f" * {line}".rstrip() for line in _contents(program, step)],
         **facts(program, json.dumps, key),
-        "axes": json.dumps(step.sites.axes),
+        **lattice.tables(program, step, json.dumps),
         "kinds": json.dumps(step.casimir_kinds),
         "properties": properties(program.parameters),
-        "at_sites": json.dumps(step.sites.parameters),
-        "at_bonds": json.dumps(step.sites.at_bonds),
-        "graph": _partners(step).graph,
     }
 
 
 def _tables(program: Program, step: Sweeps) -> dict[str, object]:
     """What the runtime goes by."""
-    sites, schedule = step.sites, step.schedule
     return {
-        "open": json.dumps(sites.open),
-        "least": json.dumps(sites.least),
-        "periods": json.dumps(sites.periods),
+        **lattice.tables(program, step, json.dumps),
         "near": json.dumps(_near(step)),
-        "bounds": json.dumps([_pairs(w) for w in _bounds(step, program)]),
-        "colours": sites.colours if sites.colours > 1 else "",
-        "weights": json.dumps(sites.weights),
-        "gathered": _most_sums(step),
-        "coefficients": step.row,
-        "prepared": step.prepared if step.refresh else "",
-        "moments": _moments(program, step),
-        "times": json.dumps(schedule.times),
+        "bounds": json.dumps([lattice.bounds(w) for w in lattice.weights(program, step)]),
+        "sums": step.sums,
         "unit": "stages" if step.equation else "flows",
-        "multiples": json.dumps(schedule.multiples) if schedule.multiples else "",
-        "by_colour": json.dumps(step.by_colour) if step.by_colour else "",
-        "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in schedule.flows)}]",
-        "split": step.equation is None,
+        "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows)}]",
         "flows": f"[{', '.join(map(_listed, step.parts))}]",
-        "tangents": f"[{', '.join(map(_listed, _derivatives(step)))}]" if _derivatives(step) else "",
-        "most_sweeps": step.equation.most_sweeps if step.equation else 0,
+        "tangents": f"[{', '.join(map(_listed, step.tangents))}]" if step.tangents else "",
     }
-
-
-def _moments(program: Program, step: Sweeps) -> str:
-    """At which fraction of the step the time of each row stands still; nothing where there is no time."""
-    return json.dumps(program.midpoints if step.equation else step.schedule.moments) if program.time else ""
 
 
 def kernels(program: Program, step: Sweeps) -> Iterator[str]:
     """All kernels as loops over sites."""
     printed = _Printed(program, step)
-    for sweep in (sweep for part in step.parts for sweep in part):
-        if sweep.gather:
-            yield from (printed.gathering(ends, "coef") for ends in sweep.gather.ends)
+    for sweep in step.sweeps:
+        yield from (printed.gathering(ends, "coef") for ends in _ends(sweep.gather))
         yield printed.sweep(sweep)
-        if tangent := sweep.tangent:
-            yield from (printed.gathering(ends, "coef") for ends in _ends(tangent.gather))
-            yield printed.sweep(tangent)
-    if step.partners:
-        for gather in (step.partners.energy, step.partners.field, step.partners.varied):
-            yield from (printed.gathering(ends, "params") for ends in gather.ends)
+    for gather in (step.others.energy, step.others.field, step.others.varied):
+        yield from (printed.gathering(ends, "params") for ends in gather.ends)
     if step.equation:
         yield from (printed.of_equation(kernel) for kernel in step.equation.kernels)
-    seen = program.observables
-    yield from (printed.seen(kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field))
-
-
-def _partners(step: Sweeps) -> Partners:
-    """Bonds or pairs; nothing where there are none."""
-    return step.partners or Partners(Gather((), ()), Gather((), ()))
+    yield from (printed.seen(kernel) for kernel in program.observables.kernels)
 
 
 def _near(step: Sweeps) -> list[tuple[int, ...]]:
     """The offsets of all neighbours."""
     return sorted({offset for _, offset in step.sites.places.values() if any(offset)})
-
-
-def _bounds(step: Sweeps, program: Program) -> list[Symbol]:
-    """The weights that open ends ask for."""
-    every = (w for k in (*step.kernels, *_observed(program)) for w in k.inputs.get("present", ()))
-    return [w for w in dict.fromkeys(every) if isinstance(w, Symbol) and kind_of(w) == PRESENT]
-
-
-def _observed(program: Program) -> tuple[Kernel, ...]:
-    seen = program.observables
-    return seen.energy, seen.casimirs, seen.vector_field
-
-
-def _pairs(weight: Symbol) -> list[tuple[int, int]]:
-    bounds = [int(k) for k in weight.key]
-    return list(zip(bounds[::2], bounds[1::2], strict=True))
 
 
 def _contents(program: Program, step: Sweeps) -> list[str]:
@@ -157,7 +104,7 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
         "x0: [...]",
         *(["t0"] if program.time else []),
         f"sizes: [{sizes}]",
-        *(["bonds: [...]"] if _partners(step).graph else []),
+        *(["bonds: [...]"] if step.others.graph else []),
         "params: { ... }",
     ]
     how = "stages, each solved by sweeps over the sites" if step.equation else "flows of parts of H"
@@ -170,19 +117,6 @@ def _contents(program: Program, step: Sweeps) -> list[str]:
     ]
 
 
-def _derivatives(step: Sweeps) -> list[tuple[Sweep, ...]]:
-    """The derivatives of the sweeps of all parts; none where they were not asked for."""
-    found = [tuple(sweep.tangent for sweep in part if sweep.tangent) for part in step.parts]
-    return found if any(found) else []
-
-
-def _most_sums(step: Sweeps) -> int:
-    """The most sums over other sites that are held for each."""
-    swept = [sweep.gather for part in (*step.parts, *_derivatives(step)) for sweep in part if sweep.gather]
-    partners = _partners(step)
-    return max(len(g.names) for g in (*swept, partners.energy, partners.field, partners.varied))
-
-
 def _listed(part: Sequence[Sweep]) -> str:
     return f"[{', '.join(camel(sweep.kernel.name) for sweep in part)}]"
 
@@ -192,9 +126,9 @@ class _Printed:
 
     def __init__(self, program: Program, step: Sweeps) -> None:
         self.program, self.step = program, step
-        self.graph = _partners(step).graph
+        self.graph = step.others.graph
         self.names = {camel(kernel.name) for kernel in step.kernels}
-        self.near, self.weights = _near(step), _bounds(step, program)
+        self.near, self.weights = _near(step), lattice.weights(program, step)
 
     def sweep(self, sweep: Sweep) -> str:
         """A sweep: it changes x in place, since it reads elsewhere only what stands still; its derivative changes v."""
@@ -221,9 +155,9 @@ class _Printed:
 
     def of_equation(self, kernel: Kernel) -> str:
         """A kernel of the equation of a stage, at the y that is its x."""
-        starts, varied = kernel.name in ("relax", "slope", "side"), kernel.name in ("slope", "side", "follow")
+        starts, varied = kernel.name in ("relax", "slope", "side"), kernel.name in VARIED
         arguments = ["coef", *["start"] * starts, "x", *["v"] * varied]
-        gather = _partners(self.step).varied if varied else _partners(self.step).field
+        gather = self.step.others.varied if varied else self.step.others.field
         body = _Body(self, kernel, gather.names)
         body.lines += [f"{self._entry('out', s.index)} = {body.show(s.value)};" for s in body.code.stores]
         before = self._forces("sites.params", gather, ", v" * varied) if kernel.inputs["gathered"] else []
@@ -231,7 +165,7 @@ class _Printed:
 
     def seen(self, kernel: Kernel) -> str:
         """A kernel that fills arrays over the sites."""
-        partners = _partners(self.step)
+        partners = self.step.others
         body = _Body(self, kernel, partners.field.names)
         body.lines += [f"{self._entry('out', s.index)} = {body.show(s.value)};" for s in body.code.stores]
         before: list[str] = []
@@ -257,7 +191,7 @@ class _Printed:
         else:
             body.lines.insert(0, "if (j === i) continue;")
             loops = ["for (let i = 0; i < count; i++) {", "  for (let j = 0; j < count; j++) {"]
-        varied = ["v"] if "varied" in ends.kernel.inputs or ends in _partners(self.step).varied.ends else []
+        varied = ["v"] if "varied" in ends.kernel.inputs or ends in self.step.others.varied.ends else []
         return self._function(ends.kernel, [first, "x", *varied, "sites", *by_colour], [], body, loops)
 
     def _forces(self, params: str, gather: Gather, more: str = "") -> list[str]:

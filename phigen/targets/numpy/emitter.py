@@ -81,7 +81,6 @@ def _body(program: Program) -> str:
         return lattice.body(
             program, program.step, "\n\n".join(_function(program, kernel) for kernel in early if kernel)
         )
-    seen = program.observables
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "arrays.py", "parameters.py")]
     pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
     pieces += [
@@ -98,7 +97,7 @@ def _body(program: Program) -> str:
         coefficients = ["noise.py", "philox.py", "normals.py", "drawing.py", "renewed.py"]
     parts = (*coefficients, "single.py", "checked.py", "integrate.py")
     pieces += [render("numpy", part, _values(program)) for part in parts]
-    pieces += [_function(program, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
+    pieces += [_function(program, kernel) for kernel in program.observables.kernels]
     pieces += [_function(program, program.noise.fields)] if program.noise and program.noise.fields else []
     pieces += [render("numpy", "observables.py", _values(program))]
     if program.extras.tangent:

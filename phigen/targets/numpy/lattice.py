@@ -8,7 +8,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import VARIED, Gather, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
-from phigen.targets import special
+from phigen.targets import lattice, special
 from phigen.targets.code import Code, lower
 from phigen.targets.header import facts
 from phigen.targets.names import Scope
@@ -27,39 +27,19 @@ _SERIES = ("lattice_series", "lattice_guesses", "lattice_newton")
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
     """The text of the module; ``prepare`` are the functions that compute coefficients."""
-    sites, schedule = step.sites, step.schedule
     values = {
         **facts(program, listed, quoted),
-        "axes": listed(sites.axes),
-        "at_sites": listed(sites.parameters),
-        "open": listed(sites.open),
-        "least": listed(sites.least),
-        "periods": listed(sites.periods),
-        "parted": sites.colours > 1,
-        "colours": sites.colours,
-        "colour_weights": listed(sites.weights),
-        "times": listed(schedule.times),
-        "multiples": listed(schedule.multiples),
-        "schedule": repr(tuple(schedule.flows)),
-        "time": program.time,
-        "renewed": step.refresh is not None,
-        "row": step.row,
-        "prepared": step.prepared,
-        "moments": listed(program.midpoints if step.equation else schedule.moments),
-        "kicks": bool(schedule.multiples),
-        "at_bonds": listed(sites.at_bonds),
+        **lattice.tables(program, step, listed),
+        "schedule": repr(tuple(step.schedule.flows)),
         "by_colour": repr(step.by_colour),
-        "tangent": program.extras.tangent,
-        "split": step.equation is None,
-        "most_sweeps": step.equation.most_sweeps if step.equation else 0,
     }
     values["sized"] = bool(program.time or program.noise)
     arguments = {"t0": "0.0"} if program.time else {}
     arguments |= {"seed": "0", "member": "0", "step0": "0"} if program.noise else {}
     values["arguments"] = "".join(f", {name}={value}" for name, value in arguments.items())
     values["passed"] = "".join(f", {name}={name}" for name in arguments)
-    graph = step.partners is not None and step.partners.graph
-    values |= {"equation": step.equation is not None, "coloured": bool(step.by_colour)}
+    graph = step.others.graph
+    values["equation"] = step.equation is not None
     values["adjoint"] = step.adjoint is not None
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
     values["kept"] = "2 * len(SCHEDULE)" if step.equation else f"sum(len(PARTS[part]) for {flows})"
@@ -81,18 +61,15 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
     ]
     pieces += _gathers(program, step)
-    every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
-    pieces += colours.functions(step, (_sweep(program, step, sweep) for sweep in every))
+    pieces += colours.functions(step, (_sweep(program, step, sweep) for sweep in step.sweeps))
     if step.equation:
         pieces += [_at_middle(program, step, kernel) for kernel in step.equation.kernels]
     else:
         pieces.append(_table("PARTS", "The sweeps of each part of H.", step.parts))
         if program.extras.tangent:
-            tangents = [[sweep.tangent for sweep in part if sweep.tangent] for part in step.parts]
-            pieces.append(_table("TANGENTS", "Their derivatives.", tangents))
+            pieces.append(_table("TANGENTS", "Their derivatives.", step.tangents))
     pieces += lattice_adjoint.functions(program, step, _body) if step.adjoint else []
-    seen = program.observables
-    pieces += [_seen(program, step, kernel) for kernel in (seen.energy, seen.casimirs, seen.vector_field)]
+    pieces += [_seen(program, step, kernel) for kernel in program.observables.kernels]
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
 
 
@@ -163,8 +140,7 @@ def _gathers(program: Program, step: Sweeps) -> Iterator[str]:
     if step.partners:
         if not step.partners.graph:
             yield render("numpy", "pairs.py", {})
-        every = [s for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
-        for sweep in every:
+        for sweep in step.sweeps:
             if sweep.gather:
                 yield _gather(program, step, sweep.gather, _sums_of(sweep), "coef")
         partners = {"energies": step.partners.energy, "forces": step.partners.field, "slopes": step.partners.varied}
@@ -183,7 +159,7 @@ def _gather(program: Program, step: Sweeps, gather: Gather, name: str, first: st
         scope = Scope(PYTHON_RESERVED | _OWN | {"v", "sums", "gathered", "here", "there", "bond"})
         body = _body(program, step, ends.kernel, code, scope)
         show = LANGUAGE.printer(scope)
-        if step.partners and step.partners.graph:
+        if step.others.graph:
             body = [f"    here, there, bond = sites.bonds({ends.end!r}, {ends.chosen!r})", *body]
             added = [f"sites.summed({show(s.value)}, here)" for s in code.stores]
         else:
@@ -234,7 +210,7 @@ def _read(program: Program, step: Sweeps, name: str, array: str = "x") -> str:
     if name in step.sites.ends:
         base, end = step.sites.ends[name]
         text = f"{array}[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
-        if step.partners and step.partners.graph:
+        if step.others.graph:
             return f"{text}[{'here' if end == 'a' else 'there'}]"
         return f"{text}[:, None]" if end == "a" else text
     base, offset = step.sites.places[name]

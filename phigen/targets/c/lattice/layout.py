@@ -12,7 +12,8 @@ from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import VARIED, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
-from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
+from phigen.symbolic.symbols import Symbol
+from phigen.targets import lattice
 
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
 MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
@@ -31,7 +32,7 @@ class Layout:
     step: Sweeps
     lines: tuple[tuple[int, ...], ...]
     halo: int
-    weights: tuple[str, ...]
+    weights: tuple[Symbol, ...]
     arrays: tuple[str, ...]
     slopes: bool = True  # whether code has how sweeps follow variations, or takes differences of them
 
@@ -85,9 +86,8 @@ class Layout:
     @property
     def partners(self) -> Partners:
         """Bonds or pairs, with their variations where these are followed; nothing where there are none."""
-        nothing = Gather((), ())
-        found = self.step.partners or Partners(nothing, nothing)
-        return found if self.slopes else replace(found, varied=nothing)
+        found = self.step.others
+        return found if self.slopes else replace(found, varied=Gather((), ()))
 
     def gathered(self, kernel: Kernel) -> Gather:
         """What a kernel of the equation of a stage reads of bonds or pairs."""
@@ -105,26 +105,17 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     offsets = [offset for _, offset in sites.places.values()]
     offsets += [tuple(-o for o in offset) for offset in offsets] if step.adjoint else []
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
-    used = (w for kernel in _at_sites(program, step) for w in kernel.inputs["present"])
-    weights = dict.fromkeys(w for w in used if kind_of(w) == PRESENT)
     halo = max((abs(o[-1]) for o in offsets), default=0)
     arrays = (*program.coordinates, *sites.parameters, *sites.increments)
-    found = Layout(step, tuple(lines), halo, tuple(weights), arrays)
+    found = Layout(step, tuple(lines), halo, lattice.weights(program, step), arrays)
     banded = found.band > 0 and program.offers("recurrences")
     return replace(found, slopes=program.profile == "fast" or program.extras.tangent or banded or bool(step.adjoint))
-
-
-def _at_sites(program: Program, step: Sweeps) -> list[Kernel]:
-    seen = program.observables
-    own = [s.kernel for part in step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
-    own += step.equation.kernels if step.equation else ()
-    return [*own, seen.energy, seen.casimirs, seen.vector_field]
 
 
 def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
     """The switches of the runtime for lattices."""
     banded = layout.band > 0 and program.offers("recurrences")
-    return {
+    return lattice.switches(step) | {
         "CASIMIRS": bool(program.casimirs),
         "KICKED": program.offers("kicks") and program.profile == "fast",
         "OPEN": bool(layout.weights),
@@ -134,13 +125,9 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         or any(wide(layout, sweep) for part in step.parts for sweep in part),
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
-        "COLOURS": step.sites.colours > 1,
         "PERIODIC_COLOURS": max(step.sites.periods, default=1) > 1,
         "SWEPT": program.profile == "small",
         "PAIRS": step.partners is not None and not layout.graph,
-        "GATHER": step.partners is not None,
-        "GRAPH": layout.graph,
-        "BY_COLOUR": bool(step.by_colour),
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "SIDED": program.profile == "small" and bool(step.parts),
         "ACROSS": program.profile == "small" and not step.adjoint and {"here", "there"} <= chosen_ends(step),
@@ -220,10 +207,3 @@ def starts_are_read(step: Sweeps) -> bool:
     """Whether the transpose of a stage reads x at its start, beside y."""
     relax = next((k for k in step.adjoint.steps if k.name == "relax" + BACK), None) if step.adjoint else None
     return relax is not None and not {*relax.inputs.get("start", ())}.isdisjoint(symbols_of(*relax.roots))
-
-
-def bounds(weight: str) -> list[tuple[int, int]]:
-    """The least and the largest offset of a term along each axis."""
-    assert isinstance(weight, Symbol)
-    bounds = [int(k) for k in weight.key]
-    return list(zip(bounds[::2], bounds[1::2], strict=True))

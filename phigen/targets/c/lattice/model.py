@@ -13,11 +13,11 @@ from phigen.targets.c.lattice.layout import (
     MOST_DIFFERENCES,
     MOST_REMEMBERED,
     Layout,
-    bounds,
     layout_of,
     switches,
 )
 from phigen.targets.header import plain
+from phigen.targets.lattice import bounds
 from phigen.targets.rendering import render
 
 
@@ -66,9 +66,8 @@ def _differences(program: Program) -> int:
 
 def _gathered(layout: Layout) -> int:
     """Sums over bonds or pairs that are held for each site at once."""
-    every = [s for part in layout.step.parts for sweep in part for s in (sweep, sweep.tangent) if s]
-    own = layout.partners
-    return max(len(g.names) for g in (*(s.gather for s in every if s.gather), own.energy, own.field, own.varied))
+    own, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
+    return max(len(g.names) for g in (*swept, own.energy, own.field, own.varied))
 
 
 def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> tuple[int, int]:

@@ -10,8 +10,9 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets.c.kernels import members, printer
-from phigen.targets.c.lattice.layout import Layout, bounds
+from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.code import Code
+from phigen.targets.lattice import bounds
 from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 

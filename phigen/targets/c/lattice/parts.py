@@ -14,7 +14,7 @@ from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
 from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout, bounds, layout_of, switches, wide
+from phigen.targets.c.lattice.layout import Layout, layout_of, switches, wide
 from phigen.targets.c.lattice.loops import (
     BLOCK,
     Loop,
@@ -29,6 +29,7 @@ from phigen.targets.c.lattice.loops import (
 )
 from phigen.targets.c.lattice.partners import gathering, is_told_ends, partners
 from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
+from phigen.targets.lattice import bounds
 from phigen.targets.rendering import render
 
 
@@ -42,9 +43,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
     if step.parts:
         found += _parts(program, layout, rows, step.parts)
-        tangents = [[sweep.tangent for sweep in part if sweep.tangent] for part in step.parts]
-        found += _parts(program, layout, None, tangents) if program.extras.tangent else []
-    seen = program.observables
+        found += _parts(program, layout, None, step.tangents) if program.extras.tangent else []
     found += partners(program, layout)
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
         found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]), far=bool(rows.limited))
@@ -54,7 +53,7 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         )
     for kernel in (step.equation.slope, *step.equation.tangents) if step.equation and layout.slopes else ():
         found += _of_equation(program, layout, kernel, {"": in_loops(program)})
-    found += [seen_loop(program, layout, k) for k in (seen.energy, seen.casimirs, seen.vector_field) if k.roots]
+    found += [seen_loop(program, layout, k) for k in program.observables.kernels if k.roots]
     return "\n".join(found)
 
 

@@ -1,0 +1,62 @@
+"""What code of lattices is told in every language."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Sweeps
+from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
+
+
+def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], str]) -> dict[str, object]:
+    """What is stated of the sites and of the schedule, and what there is of it: ``listed`` writes a sequence."""
+    sites, schedule = step.sites, step.schedule
+    return {
+        "axes": listed(sites.axes),
+        "at_sites": listed(sites.parameters),
+        "at_bonds": listed(sites.at_bonds),
+        "open": listed(sites.open),
+        "least": listed(sites.least),
+        "periods": listed(sites.periods),
+        "parted": sites.colours > 1,
+        "colours": sites.colours,
+        "colour_weights": listed(sites.weights),
+        "row": step.row,
+        "renewed": step.refresh is not None,
+        "prepared": step.prepared,
+        "times": listed(schedule.times),
+        "time": program.time,
+        "moments": listed(program.midpoints if step.equation else schedule.moments),
+        "kicks": bool(schedule.multiples),
+        "multiples": listed(schedule.multiples),
+        "coloured": bool(step.by_colour),
+        "by_colour": listed(step.by_colour),
+        "split": step.equation is None,
+        "tangent": program.extras.tangent,
+        "most_sweeps": step.equation.most_sweeps if step.equation else 0,
+        "graph": step.others.graph,
+    }
+
+
+def switches(step: Sweeps) -> dict[str, bool]:
+    """The switches that all runtimes of lattices know."""
+    return {
+        "COLOURS": step.sites.colours > 1,
+        "GATHER": step.partners is not None,
+        "GRAPH": step.others.graph,
+        "BY_COLOUR": bool(step.by_colour),
+    }
+
+
+def weights(program: Program, step: Sweeps) -> tuple[Symbol, ...]:
+    """What is 1 for terms of H that reach beyond no open end, in the order in which kernels read it."""
+    own = (*(sweep.kernel for sweep in step.sweeps), *(step.equation.kernels if step.equation else ()))
+    read = (w for kernel in (*own, *program.observables.kernels) for w in kernel.inputs["present"])
+    return tuple(dict.fromkeys(w for w in read if isinstance(w, Symbol) and kind_of(w) == PRESENT))
+
+
+def bounds(weight: Symbol) -> list[tuple[int, int]]:
+    """The least and the largest offset of a term along each axis."""
+    ends = [int(k) for k in weight.key]
+    return list(zip(ends[::2], ends[1::2], strict=True))
