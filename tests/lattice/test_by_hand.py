@@ -73,6 +73,22 @@ def test_a_stage_reads_no_further_than_it_says(name: str) -> None:
         assert seen[0] == seen[1]
 
 
+@pytest.mark.parametrize("name", ["xxz", "cube"])
+def test_planes_that_are_put_are_where_sweeps_begin(name: str) -> None:
+    """Their copies beside rows too: the first sweep has the bits that it has from a start there."""
+    x = start(name, SIZES.get(name, (40,)))
+    found, swept = solver(name, 4, "c"), []
+    for begun in (x, 0.5 * x):
+        session = found.started(Beginning(begun, 0.03, found.values(disorder(name, x), {}, x.shape[1:])))
+        session.begin(0.03)
+        for field in range(len(x)):
+            session.put_planes(field, 0, x.shape[1], x[field])
+        for stage in (0, 1):
+            session.sweep(stage, 1, 0, x.shape[1])
+        swept.append(session.state().tobytes())
+    assert swept[0] == swept[1]
+
+
 def test_planes_and_stages_that_there_are_not_are_refused() -> None:
     x = start("sheet", (9, 5))
     found = solver("sheet", 4, "c")

@@ -354,13 +354,13 @@ def test_loops_say_which_rows_they_read() -> None:
 def test_each_sweep_says_what_it_moves_and_those_of_equal_code_are_one() -> None:
     text = emit(compiled("magnet").program, "c", "phigen")["magnet.c"]
     found = re.findall(
-        r"/\* (the flow of [^/]*) \*/\nstatic inline void magnet_(sweep\w+)\([^{]*\{(.*?)\n\}", text, re.S
+        r"/\* (The flow of [^/]*) \*/\nstatic inline void magnet_(sweep\w+)\([^{]*\{(.*?)\n\}", text, re.S
     )
     for said, name, body in found:
         moved = re.findall(r"^ *(\w)_row\[i\] =", body, re.M)
-        assert all(line.endswith(f"{', '.join(moved)} turned") for line in said.split("\n")), (name, said)
+        assert all(line.endswith(f"{', '.join(moved)} turned.") for line in said.split("\n")), (name, said)
     bodies = [body for *_, body in found]
-    assert len(bodies) == len(set(bodies)) < sum(said.count("the flow of") for said, *_ in found)
+    assert len(bodies) == len(set(bodies)) < sum(said.count("The flow of") for said, *_ in found)
 
 
 def test_parts_that_differ_in_the_order_of_fields_have_one_loop_in_short_code() -> None:
