@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 5a7c953af725f8c9cb504710d9dc3eb23c212bb7a476e1695af5e3f554fa8b04
+ * body-sha256: 98cf3a350e472f3e4d5550f8a3d1136f9d19c8cf3967bfc31448b44e7a7a558f
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -75,7 +75,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define ablowitz_ladik_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define ablowitz_ladik_EACH_SITE _Pragma("GCC ivdep")
@@ -259,7 +258,7 @@ static void ablowitz_ladik_vector_field_row(const ablowitz_ladik_row *row, doubl
 }
 
 /* ---- The lattice ---- */
-enum { ablowitz_ladik_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { ablowitz_ladik_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { ablowitz_ladik_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -507,10 +506,6 @@ const char *ablowitz_ladik_status_string(ablowitz_ladik_status status)
 size_t ablowitz_ladik_solver_size(void) { return sizeof(ablowitz_ladik_solver); }
 
 size_t ablowitz_ladik_solver_steps_done(const ablowitz_ladik_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6e2c97f898acf5c19ac34ffa326d80e5dc896b0f76a3761cd560bfea0910bc07
+ * body-sha256: ca439634ef9a948121c3d80a0046a2553b8265cb08209d4d613c76f531bef203
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -80,7 +80,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define chiral_magnet_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define chiral_magnet_EACH_SITE _Pragma("GCC ivdep")
@@ -443,7 +442,7 @@ static void chiral_magnet_connect(chiral_magnet_solver *s, const chiral_magnet_b
 }
 
 /* ---- The lattice ---- */
-enum { chiral_magnet_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { chiral_magnet_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -717,10 +716,6 @@ const char *chiral_magnet_status_string(chiral_magnet_status status)
 size_t chiral_magnet_solver_size(void) { return sizeof(chiral_magnet_solver); }
 
 size_t chiral_magnet_solver_steps_done(const chiral_magnet_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

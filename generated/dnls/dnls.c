@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: bee3f4f057d19ca3b9c32d72c71092009dd73ca97dc4e4119ae09dd38779d718
+ * body-sha256: 7bb0d09ccd921e20dd81afc5869e8c324f4b03151a901f4f30f2b0393d7319f8
  */
 #include "dnls.h"
 #include <float.h>
@@ -71,7 +71,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define dnls_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define dnls_EACH_SITE _Pragma("GCC ivdep")
@@ -243,7 +242,7 @@ static void dnls_vector_field_row(const dnls_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
-enum { dnls_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { dnls_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { dnls_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -482,10 +481,6 @@ const char *dnls_status_string(dnls_status status)
 size_t dnls_solver_size(void) { return sizeof(dnls_solver); }
 
 size_t dnls_solver_steps_done(const dnls_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9bc63ac8ae818793cf0bbbff74f9efbf769d7bbe65e13b5dddb238915dc16f21
+ * body-sha256: b0ae2657eb189ac25d1e788e7716f8c553f66534b34a4d352b437a41cb16a4a0
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -73,7 +73,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define dnls_disorder_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define dnls_disorder_EACH_SITE _Pragma("GCC ivdep")
@@ -247,7 +246,7 @@ static void dnls_disorder_vector_field_row(const dnls_disorder_row *row, double 
 }
 
 /* ---- The lattice ---- */
-enum { dnls_disorder_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { dnls_disorder_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { dnls_disorder_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -511,10 +510,6 @@ const char *dnls_disorder_status_string(dnls_disorder_status status)
 size_t dnls_disorder_solver_size(void) { return sizeof(dnls_disorder_solver); }
 
 size_t dnls_disorder_solver_steps_done(const dnls_disorder_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e5af7a89937e9d47046fdf9f13fdaad8261399979cadb95991b695bc8eab99c5
+ * body-sha256: 3f9f6d21b951960178a681dd516a4a066d42ff619d270695252b6fc68c41cb7d
  */
 #include "food_web.h"
 #include <float.h>
@@ -81,7 +81,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define food_web_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define food_web_EACH_SITE _Pragma("GCC ivdep")
@@ -318,7 +317,7 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 }
 
 /* ---- The lattice ---- */
-enum { food_web_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { food_web_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -596,10 +595,6 @@ const char *food_web_status_string(food_web_status status)
 size_t food_web_solver_size(void) { return sizeof(food_web_solver); }
 
 size_t food_web_solver_steps_done(const food_web_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 417c045f18fa80d48b4e6eee7d792b29849fb9d3719ab0387d09ae4372038569
+ * body-sha256: 6905a42b645740eb1072fcdd853634d6dbe1c93cf99fc91d71a903bf1b9ea8fe
  */
 #include "fput.h"
 #include <float.h>
@@ -76,7 +76,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define fput_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define fput_EACH_SITE _Pragma("GCC ivdep")
@@ -244,7 +243,7 @@ static void fput_wait(void)
 #endif
 }
 
-enum { fput_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { fput_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { fput_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -647,10 +646,6 @@ const char *fput_status_string(fput_status status)
 size_t fput_solver_size(void) { return sizeof(fput_solver); }
 
 size_t fput_solver_steps_done(const fput_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

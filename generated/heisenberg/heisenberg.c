@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: f36bf30510fbfad804783c6cf6918d18266c4aaa4f517283c9a064b59be6d6f1
+ * body-sha256: c9547e87a0756120ffd30f378fcc5ff90258928c37c0b93ddf71fb2f9f5d6dd2
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -80,7 +80,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define heisenberg_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define heisenberg_EACH_SITE _Pragma("GCC ivdep")
@@ -499,7 +498,7 @@ static void heisenberg_wait(void)
 #endif
 }
 
-enum { heisenberg_STRETCH = 32 };   /* steps before the state is looked at: what is not finite stays so */
+enum { heisenberg_STRETCH = 32 };   /* steps between looks at the state: what is not finite stays so */
 enum { heisenberg_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
 enum { heisenberg_BUFFER = 256 };   /* densities that are added in one go */
 
@@ -1007,10 +1006,6 @@ const char *heisenberg_status_string(heisenberg_status status)
 size_t heisenberg_solver_size(void) { return sizeof(heisenberg_solver); }
 
 size_t heisenberg_solver_steps_done(const heisenberg_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

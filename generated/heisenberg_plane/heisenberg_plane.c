@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 65e23b4ceb68cf628e6c4eb67cbcd2b5083477b6e31aa229db2f6ab93f1b4e3e
+ * body-sha256: 6f332c0a5cce51200eff80dfbb07f8c494dd51d7a42c585b575f5b5118c095d7
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -86,7 +86,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define heisenberg_plane_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define heisenberg_plane_EACH_SITE _Pragma("GCC ivdep")
@@ -326,7 +325,7 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_row *row, d
 }
 
 /* ---- The lattice ---- */
-enum { heisenberg_plane_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { heisenberg_plane_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { heisenberg_plane_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -634,10 +633,6 @@ const char *heisenberg_plane_status_string(heisenberg_plane_status status)
 size_t heisenberg_plane_solver_size(void) { return sizeof(heisenberg_plane_solver); }
 
 size_t heisenberg_plane_solver_steps_done(const heisenberg_plane_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: fa432bd30169df8bcd2792219703a5406ce58c60d98bfffef113b71922cefcc7
+ * body-sha256: 3dd65cf6538279f050968231683be0dd0165d26987a91448ac19be1f795dd50d
  */
 #include "kdv.h"
 #include <float.h>
@@ -78,7 +78,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define kdv_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define kdv_EACH_SITE _Pragma("GCC ivdep")
@@ -172,18 +171,6 @@ static inline void kdv_relax(const double *coef, const kdv_row *row)
     }
 }
 
-/* A sweep, for a piece of a row. */
-static void kdv_relax_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
-    size_t unit)
-{
-    kdv_row row = kdv_piece_of(s, unit);
-    row.x = y;
-    row.start = s->x;
-    row.out = to;
-    kdv_relax(coef, &row);
-    kdv_ends(to[0], s->length, row.from, row.to);
-}
-
 /* What a stage adds to x at a site, from y around it. */
 static inline void kdv_increment(const double *coef, const kdv_row *row)
 {
@@ -201,14 +188,16 @@ static inline void kdv_increment(const double *coef, const kdv_row *row)
     }
 }
 
-/* The end of a stage, for a piece of a row. */
-static void kdv_increment_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
+/* A sweep, or to x the end of a stage, for a piece of a row. */
+static void kdv_stage_piece(const kdv_solver *s, const double *coef, double *const *y, double *const *to,
     size_t unit)
 {
     kdv_row row = kdv_piece_of(s, unit);
     row.x = y;
+    row.start = s->x;
     row.out = to;
-    kdv_increment(coef, &row);
+    if (to == s->x) kdv_increment(coef, &row);
+    else kdv_relax(coef, &row);
     kdv_ends(to[0], s->length, row.from, row.to);
 }
 
@@ -460,7 +449,7 @@ static double kdv_relaxed(kdv_solver *s, const double *coef, int now)
     double change[kdv_DIM] = { 0.0 }, size[kdv_DIM] = { 0.0 }, largest = 0.0, moved = 0.0;
     kdv_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) kdv_relax_piece(s, coef, s->y[now], s->y[1 - now], unit);
+        if (coef != NULL) kdv_stage_piece(s, coef, s->y[now], s->y[1 - now], unit);
         kdv_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < kdv_DIM; ++k) kdv_raise(&largest, size[k]);
@@ -761,7 +750,7 @@ static kdv_status kdv_stages(kdv_solver *s)
     if (status != kdv_OK) return status;
     kdv_remember(s, s->x, now);
     kdv_EACH_PIECE
-    for (size_t unit = 0; unit < units; ++unit) kdv_increment_piece(s, coef, s->y[now], s->x, unit);
+    for (size_t unit = 0; unit < units; ++unit) kdv_stage_piece(s, coef, s->y[now], s->x, unit);
     return kdv_all_hold(s, s->x) ? kdv_OK : kdv_NOT_FINITE;
 }
 
@@ -791,14 +780,11 @@ kdv_status kdv_integrate(kdv_solver *s, double h, size_t steps)
 
 kdv_status kdv_step(kdv_solver *s, double h) { return kdv_integrate(s, h, 1); }
 
-/* The sites of fields, without what is beside their rows. */
-static void kdv_take(const kdv_solver *s, double *const *fields, double *x)
+void kdv_state(const kdv_solver *s, double *x)
 {
     for (size_t k = 0; k < kdv_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, s->x[k], (size_t)s->length * sizeof *x);
 }
-
-void kdv_state(const kdv_solver *s, double *x) { kdv_take(s, s->x, x); }
 
 /* To x and so many times what is there. */
 static kdv_status kdv_move(kdv_solver *s, const double *x, double kept)
@@ -872,10 +858,6 @@ const char *kdv_status_string(kdv_status status)
 size_t kdv_solver_size(void) { return sizeof(kdv_solver); }
 
 size_t kdv_solver_steps_done(const kdv_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

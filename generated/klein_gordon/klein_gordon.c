@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7ba6049501963101729435481d7494498ca3c3bdd0299d0e41422caed5753ccc
+ * body-sha256: e0c89aa4b3ea8220641e6618fcfb74d28b0a147f2e7b7a616f07aa0a2f0c547d
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -70,7 +70,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define klein_gordon_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define klein_gordon_EACH_SITE _Pragma("GCC ivdep")
@@ -193,7 +192,7 @@ static void klein_gordon_vector_field_row(const klein_gordon_row *row, double *r
 }
 
 /* ---- The lattice ---- */
-enum { klein_gordon_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { klein_gordon_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { klein_gordon_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -439,10 +438,6 @@ const char *klein_gordon_status_string(klein_gordon_status status)
 size_t klein_gordon_solver_size(void) { return sizeof(klein_gordon_solver); }
 
 size_t klein_gordon_solver_steps_done(const klein_gordon_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

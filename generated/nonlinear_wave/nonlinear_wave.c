@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7afbd0afb07058f204099c27de7ca1b4e30dc0d16d1ec3154cf8a99e47aa9394
+ * body-sha256: 0a781c657c1aa9d088d688c0a3481862c4368bf68cd5af586e01714970d079e2
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -72,7 +72,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define nonlinear_wave_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define nonlinear_wave_EACH_SITE _Pragma("GCC ivdep")
@@ -210,7 +209,7 @@ static void nonlinear_wave_vector_field_row(const nonlinear_wave_row *row, doubl
 }
 
 /* ---- The lattice ---- */
-enum { nonlinear_wave_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { nonlinear_wave_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { nonlinear_wave_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -462,10 +461,6 @@ const char *nonlinear_wave_status_string(nonlinear_wave_status status)
 size_t nonlinear_wave_solver_size(void) { return sizeof(nonlinear_wave_solver); }
 
 size_t nonlinear_wave_solver_steps_done(const nonlinear_wave_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 524bc60f3e22ea11163641b2ed4badb3cc44fb00d6f9bc183b0751617ecfafd3
+ * body-sha256: 6dde609fcdc8b1d5054f143da56d33adeb7d4219b4a2ccee36191c115626036c
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -69,7 +69,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define outer_planets_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define outer_planets_EACH_SITE _Pragma("GCC ivdep")
@@ -265,7 +264,7 @@ static void outer_planets_vector_field_row(const outer_planets_row *row, double 
 }
 
 /* ---- The lattice ---- */
-enum { outer_planets_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { outer_planets_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { outer_planets_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -528,10 +527,6 @@ const char *outer_planets_status_string(outer_planets_status status)
 size_t outer_planets_solver_size(void) { return sizeof(outer_planets_solver); }
 
 size_t outer_planets_solver_steps_done(const outer_planets_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

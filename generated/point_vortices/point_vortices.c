@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 730b8d4c83760df466edbd783ba1435c5fb3adafd5886e48aefc8593871d4a14
+ * body-sha256: 8af19a3e60f3146e01e069694a412c00152de5824d64ea1da422df27ddd79723
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -70,7 +70,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define point_vortices_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define point_vortices_EACH_SITE _Pragma("GCC ivdep")
@@ -197,18 +196,6 @@ static inline void point_vortices_relax(const double *coef, const point_vortices
     }
 }
 
-/* A sweep, for a piece of a row. */
-static void point_vortices_relax_piece(const point_vortices_solver *s, const double *coef, double *const *y,
-    double *const *to, size_t unit)
-{
-    point_vortices_row row = point_vortices_piece_of(s, unit);
-    row.x = y;
-    row.start = s->x;
-    row.out = to;
-    point_vortices_pair_forces(&row);
-    point_vortices_relax(coef, &row);
-}
-
 /* What a stage adds to x at a site, from y around it. */
 static inline void point_vortices_increment(const double *coef, const point_vortices_row *row)
 {
@@ -224,15 +211,17 @@ static inline void point_vortices_increment(const double *coef, const point_vort
     }
 }
 
-/* The end of a stage, for a piece of a row. */
-static void point_vortices_increment_piece(const point_vortices_solver *s, const double *coef,
-    double *const *y, double *const *to, size_t unit)
+/* A sweep, or to x the end of a stage, for a piece of a row. */
+static void point_vortices_stage_piece(const point_vortices_solver *s, const double *coef, double *const *y,
+    double *const *to, size_t unit)
 {
     point_vortices_row row = point_vortices_piece_of(s, unit);
     row.x = y;
+    row.start = s->x;
     row.out = to;
     point_vortices_pair_forces(&row);
-    point_vortices_increment(coef, &row);
+    if (to == s->x) point_vortices_increment(coef, &row);
+    else point_vortices_relax(coef, &row);
 }
 
 /* How y at a site follows y around it. */
@@ -490,7 +479,7 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
         moved = 0.0;
     point_vortices_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) point_vortices_relax_piece(s, coef, s->y[now], s->y[1 - now], unit);
+        if (coef != NULL) point_vortices_stage_piece(s, coef, s->y[now], s->y[1 - now], unit);
         point_vortices_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < point_vortices_DIM; ++k) point_vortices_raise(&largest, size[k]);
@@ -747,7 +736,7 @@ static point_vortices_status point_vortices_stages(point_vortices_solver *s)
         point_vortices_remember(s, s->x, stage, now);
         point_vortices_EACH_PIECE
         for (size_t unit = 0; unit < units; ++unit)
-            point_vortices_increment_piece(s, coef, s->y[now], s->x, unit);
+            point_vortices_stage_piece(s, coef, s->y[now], s->x, unit);
     }
     return point_vortices_all_hold(s, s->x) ? point_vortices_OK : point_vortices_NOT_FINITE;
 }
@@ -781,14 +770,11 @@ point_vortices_status point_vortices_step(point_vortices_solver *s, double h)
     return point_vortices_integrate(s, h, 1);
 }
 
-/* The sites of fields, without what is beside their rows. */
-static void point_vortices_take(const point_vortices_solver *s, double *const *fields, double *x)
+void point_vortices_state(const point_vortices_solver *s, double *x)
 {
     for (size_t k = 0; k < point_vortices_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
+        memcpy(x + k * s->sites, s->x[k], (size_t)s->length * sizeof *x);
 }
-
-void point_vortices_state(const point_vortices_solver *s, double *x) { point_vortices_take(s, s->x, x); }
 
 /* To x and so many times what is there. */
 static point_vortices_status point_vortices_move(point_vortices_solver *s, const double *x, double kept)
@@ -863,10 +849,6 @@ const char *point_vortices_status_string(point_vortices_status status)
 size_t point_vortices_solver_size(void) { return sizeof(point_vortices_solver); }
 
 size_t point_vortices_solver_steps_done(const point_vortices_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

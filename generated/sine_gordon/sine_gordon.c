@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: d26e366e7f06183075b1085798863f0cca5b30273e18532d60ec2cd5afabce95
+ * body-sha256: 6883867376cb8c238aaf2992bb8fb16c38d36df290a624365b4042344c65e8bd
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -71,7 +71,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define sine_gordon_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define sine_gordon_EACH_SITE _Pragma("GCC ivdep")
@@ -219,7 +218,7 @@ static void sine_gordon_vector_field_row(const sine_gordon_row *row, double *res
 }
 
 /* ---- The lattice ---- */
-enum { sine_gordon_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { sine_gordon_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { sine_gordon_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -465,10 +464,6 @@ const char *sine_gordon_status_string(sine_gordon_status status)
 size_t sine_gordon_solver_size(void) { return sizeof(sine_gordon_solver); }
 
 size_t sine_gordon_solver_steps_done(const sine_gordon_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: dd3a5f617aba760c970c953be512f82e2c802d7b7fb08d2f691e89a82e001b13
+ * body-sha256: fe08980a4487232f21250acf89e49ed551dfb8f7d526a452cec8d1bda65defd2
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -88,7 +88,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define thermal_heisenberg_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define thermal_heisenberg_EACH_SITE _Pragma("GCC ivdep")
@@ -441,8 +440,7 @@ thermal_heisenberg_status thermal_heisenberg_set_noise(thermal_heisenberg_solver
 }
 
 /* ---- The lattice ---- */
-/* steps before the state is looked at: what is not finite stays so */
-enum { thermal_heisenberg_STRETCH = 32 };
+enum { thermal_heisenberg_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -554,18 +552,12 @@ static thermal_heisenberg_status thermal_heisenberg_set_step(thermal_heisenberg_
     return thermal_heisenberg_OK;
 }
 
-/* The time after so many steps. */
-static double thermal_heisenberg_time_after(const thermal_heisenberg_solver *s, size_t steps)
-{
-    return s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
-}
-
 thermal_heisenberg_status thermal_heisenberg_passed(thermal_heisenberg_solver *s, double h, size_t steps)
 {
     const thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);
     if (status != thermal_heisenberg_OK || steps < s->steps_before_h) return thermal_heisenberg_BAD_ARGUMENT;
     s->steps = steps;
-    s->t = thermal_heisenberg_time_after(s, steps);
+    s->t = s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
     return thermal_heisenberg_OK;
 }
 
@@ -587,14 +579,6 @@ static void thermal_heisenberg_copy(double *const *to, double *const *from,
 }
 
 /* ---- The flows ---- */
-/* The flow of that number in a step after so many. */
-static void thermal_heisenberg_make_flow(const thermal_heisenberg_solver *s, size_t steps, int number)
-{
-    const double *coef = s->coef + number * thermal_heisenberg_ROW;
-    (void)steps;
-    thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[number], coef);
-}
-
 /* Some steps: the flows of the noise, those of H, and those of the noise backwards, with other increments. */
 static void thermal_heisenberg_steps(const thermal_heisenberg_solver *s, size_t steps)
 {
@@ -602,7 +586,8 @@ static void thermal_heisenberg_steps(const thermal_heisenberg_solver *s, size_t 
         for (int flow = 0; flow < thermal_heisenberg_FLOWS; ++flow) {
             if (flow == 0 || flow == thermal_heisenberg_FLOWS - thermal_heisenberg_SOURCES)
                 thermal_heisenberg_draw(s, step, flow > 0);
-            thermal_heisenberg_make_flow(s, step, flow);
+            thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[flow],
+                s->coef + flow * thermal_heisenberg_ROW);
         }
     }
 }
@@ -644,31 +629,10 @@ thermal_heisenberg_status thermal_heisenberg_step(thermal_heisenberg_solver *s, 
     return thermal_heisenberg_integrate(s, h, 1);
 }
 
-/* The sites of fields, without what is beside their rows. */
-static void thermal_heisenberg_take(const thermal_heisenberg_solver *s, double *const *fields, double *x)
-{
-    for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
-        memcpy(x + k * s->sites, fields[k], (size_t)s->length * sizeof *x);
-}
-
 void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x)
 {
-    thermal_heisenberg_take(s, s->x, x);
-}
-
-int thermal_heisenberg_saved(const thermal_heisenberg_solver *s, double *x, size_t *far)
-{
-    (void)x;
-    *far = s->far;
-    return s->open;
-}
-
-thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s, double h, const double *x,
-    size_t far)
-{
-    const thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);
-    s->far = far;
-    return x == NULL ? status : thermal_heisenberg_BAD_ARGUMENT;
+    for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
+        memcpy(x + k * s->sites, s->x[k], (size_t)s->length * sizeof *x);
 }
 
 /* ---- What is seen at sites ---- */
@@ -724,10 +688,6 @@ const char *thermal_heisenberg_status_string(thermal_heisenberg_status status)
 size_t thermal_heisenberg_solver_size(void) { return sizeof(thermal_heisenberg_solver); }
 
 size_t thermal_heisenberg_solver_steps_done(const thermal_heisenberg_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: b3eb2f70aa542d2db2d581789d7ca604133d5b3c698728fd8fd6047177ba03cf
+ * body-sha256: ce3ac4f16f250b2911b39a45c3f341b79d8fe3f3950624da1d18d7bcf9ba9874
  */
 #ifndef THERMAL_HEISENBERG_H
 #define THERMAL_HEISENBERG_H
@@ -84,13 +84,6 @@ thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver
 
 /* The state x[field][site]. */
 void thermal_heisenberg_state(const thermal_heisenberg_solver *s, double *x);
-
-/* To go on elsewhere with the same bits: if thermal_heisenberg_saved is 1, x is what the next step begins
-   with, for thermal_heisenberg_resume after thermal_heisenberg_init at the state. If it is 0,
-   thermal_heisenberg_resume has NULL for x. */
-int thermal_heisenberg_saved(const thermal_heisenberg_solver *s, double *x, size_t *far);
-thermal_heisenberg_status thermal_heisenberg_resume(thermal_heisenberg_solver *s, double h, const double *x,
-    size_t far);
 
 /* The Hamiltonian; its density at each site; the densities out[k][site] of the Casimirs; the right-hand side
    out[field][site]. */

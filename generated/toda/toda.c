@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 62ccaa680fa64d1640f7bd0e7e17e434197022d6109d25fbccaaa44b8471b36e
+ * body-sha256: a028ef711f0049e960301774ff636d8479d5e3630688cfa9f46de8013346672e
  */
 #include "toda.h"
 #include <float.h>
@@ -69,7 +69,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define toda_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define toda_EACH_SITE _Pragma("GCC ivdep")
@@ -231,7 +230,7 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
-enum { toda_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { toda_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -474,10 +473,6 @@ const char *toda_status_string(toda_status status)
 size_t toda_solver_size(void) { return sizeof(toda_solver); }
 
 size_t toda_solver_steps_done(const toda_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

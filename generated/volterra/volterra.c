@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 079a1a0aeb6aa54a1d376768c619e1ce0f38393485189c707d0ceec008ee38dc
+ * body-sha256: a441128d26b561d836547662668d4283b27297f30a2cf7f62030da458681f11d
  */
 #include "volterra.h"
 #include <float.h>
@@ -73,7 +73,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define volterra_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define volterra_EACH_SITE _Pragma("GCC ivdep")
@@ -235,7 +234,7 @@ static void volterra_vector_field_row(const volterra_row *row, double *restrict 
 }
 
 /* ---- The lattice ---- */
-enum { volterra_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { volterra_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { volterra_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -479,10 +478,6 @@ const char *volterra_status_string(volterra_status status)
 size_t volterra_solver_size(void) { return sizeof(volterra_solver); }
 
 size_t volterra_solver_steps_done(const volterra_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

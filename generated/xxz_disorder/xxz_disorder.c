@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4502b844fd5bd6dae65b388227eb83450d663c12b28addb75bf6333f2a747d66
+ * body-sha256: 7d82436661b3334f5986b02d836b448824d217855e159c7cb281ee99fc472ead
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -74,7 +74,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define xxz_disorder_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define xxz_disorder_EACH_SITE _Pragma("GCC ivdep")
@@ -264,7 +263,7 @@ static void xxz_disorder_vector_field_row(const xxz_disorder_row *row, double *r
 }
 
 /* ---- The lattice ---- */
-enum { xxz_disorder_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { xxz_disorder_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { xxz_disorder_BUFFER = 256 }; /* densities that are added in one go */
 
 /* The number of rows for such sizes, and their width; 0 if the sizes are not allowed. */
@@ -530,10 +529,6 @@ const char *xxz_disorder_status_string(xxz_disorder_status status)
 size_t xxz_disorder_solver_size(void) { return sizeof(xxz_disorder_solver); }
 
 size_t xxz_disorder_solver_steps_done(const xxz_disorder_solver *s) { return s->steps; }
-
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 
 #if defined(__cplusplus) || (defined(_MSC_VER) && !defined(__clang__))
 #undef restrict

@@ -69,7 +69,7 @@ static void phi_wait(void)
 #endif
 #endif
 #if !PHI_SERIES
-enum { PHI_STRETCH = 32 }; /* steps before the state is looked at: what is not finite stays so */
+enum { PHI_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 #if PHI_NEAR
 enum { PHI_FAR_STEPS = 64 }; /* steps by functions for large arguments, after one that needed them */
 #endif
@@ -381,18 +381,20 @@ static phi_status phi_set_step(phi_solver *s, double h)
 }
 #if PHI_TIMED || PHI_NOISE
 
+#if PHI_TIMED
 /* The time after so many steps. */
 static double phi_time_after(const phi_solver *s, size_t steps)
 {
     return s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
 }
 
+#endif
 phi_status phi_passed(phi_solver *s, double h, size_t steps)
 {
     const phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || steps < s->steps_before_h) return PHI_BAD_ARGUMENT;
     s->steps = steps;
-    s->t = phi_time_after(s, steps);
+    s->t = s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
 #if PHI_TIMED
     s->now = s->t;
 #endif
@@ -447,6 +449,7 @@ static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
 
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
+#if PHI_TANGENT || PHI_ADJOINT || !PHI_SERIES && !PHI_NOISE
 /* The sites of fields, without what is beside their rows. */
 static void phi_take(const phi_solver *s, double *const *fields, double *x)
 {
@@ -456,6 +459,14 @@ static void phi_take(const phi_solver *s, double *const *fields, double *x)
 }
 
 void phi_state(const phi_solver *s, double *x) { phi_take(s, s->x, x); }
+#else
+void phi_state(const phi_solver *s, double *x)
+{
+    for (size_t k = 0; k < PHI_DIM; ++k)
+        PHI_EACH_ROW
+            memcpy(PHI_VALUES_AT(x + k * s->sites), PHI_ROW_AT(s->x[k]), (size_t)s->length * sizeof *x);
+}
+#endif
 #if PHI_KICKED
 
 /* To x and so many times what is there. */
@@ -495,7 +506,7 @@ phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, ch
 #include "lattice_adjoint.c"
 #endif
 
-#if !PHI_SERIES
+#if !PHI_SERIES && !PHI_NOISE || !PHI_SERIES && PHI_NEAR
 int phi_saved(const phi_solver *s, double *x, size_t *far)
 {
 #if PHI_NOISE
@@ -586,7 +597,4 @@ size_t phi_solver_size(void) { return sizeof(phi_solver); }
 
 size_t phi_solver_steps_done(const phi_solver *s) { return s->steps; }
 
-#if defined(__clang__)
-#pragma clang diagnostic pop
-#endif
 #endif

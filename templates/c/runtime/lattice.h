@@ -224,7 +224,7 @@ void phi_state(const phi_solver *s, double *x);
 phi_status phi_set_state(phi_solver *s, const double *x);
 phi_status phi_kick(phi_solver *s, const double *change);
 #endif
-#if !PHI_SERIES
+#if !PHI_SERIES && !PHI_NOISE || !PHI_SERIES && PHI_NEAR
 
 #if PHI_COMPENSATED
 /* To go on elsewhere with the same bits: if phi_saved is 1, x is what the next step begins with, for phi_resume after

@@ -82,12 +82,8 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
     phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(s->far > 0));
 }
 
-#else
-#if PHI_NOISE
-/* The flow of that number in a step after so many. */
-#else
+#elif !PHI_NOISE || PHI_RENEWED
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
-#endif
 static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 {
 #if PHI_RENEWED
@@ -134,7 +130,11 @@ static void phi_steps(const phi_solver *s, size_t steps)
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
         for (int flow = 0; flow < PHI_FLOWS; ++flow) {
             if (flow == 0 || flow == PHI_FLOWS - PHI_SOURCES) phi_draw(s, step, flow > 0);
+#if PHI_RENEWED
             phi_make_flow(s, step, flow);
+#else
+            phi_sweep_part(s, phi_flow_parts[flow], s->coef + flow * PHI_ROW PHI_AND_FAR(s->far > 0));
+#endif
         }
     }
 #else

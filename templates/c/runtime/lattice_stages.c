@@ -72,7 +72,7 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
 #endif
     PHI_EACH_PIECE
     for (size_t unit = 0; unit < units; ++unit) {
-        if (coef != NULL) phi_relax_piece(s, coef PHI_AND_FAR(far), s->y[now], s->y[1 - now], unit);
+        if (coef != NULL) phi_stage_piece(s, coef PHI_AND_FAR(far), s->y[now], s->y[1 - now], unit);
         phi_measure(s, now, unit, change, size);
     }
     for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
@@ -217,7 +217,7 @@ static phi_status phi_stages(phi_solver *s PHI_AND_INT_FAR)
         phi_remember(s, s->x PHI_AND_STAGE, now);
 #endif
         PHI_EACH_PIECE
-        for (size_t unit = 0; unit < units; ++unit) phi_increment_piece(s, coef PHI_AND_FAR(far), s->y[now], s->x, unit);
+        for (size_t unit = 0; unit < units; ++unit) phi_stage_piece(s, coef PHI_AND_FAR(far), s->y[now], s->x, unit);
     }
     return phi_all_hold(s, s->x) ? PHI_OK : PHI_NOT_FINITE;
 }

@@ -57,7 +57,6 @@ typedef struct {
 /* Before a loop over sites: tells compilers that they are independent. */
 #if defined(__clang__)
 #define PHI_EACH_SITE _Pragma("clang loop vectorize(assume_safety)")
-#pragma clang diagnostic push
 #pragma clang diagnostic ignored "-Wpass-failed"
 #elif defined(__GNUC__)
 #define PHI_EACH_SITE _Pragma("GCC ivdep")

@@ -45,8 +45,10 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
         found += _parts(program, layout, rows, step.parts)
         found += _parts(program, layout, None, step.tangents) if program.extras.tangent else []
     found += partners(program, layout)
-    for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():
-        found += _of_equation(program, layout, kernel, call_forms(program, rows, [kernel]), far=bool(rows.limited))
+    if step.equation:
+        relax, end = step.equation.relax, step.equation.advance
+        forms = call_forms(program, rows, [relax, end])
+        found += _of_equation(program, layout, relax, forms, end=[end], far=bool(rows.limited))
     if step.equation and switches(program, step, layout)["SITE_BLOCKS"]:
         found += _of_equation(
             program, layout, site_block(program, layout, step.equation.relax), {"": in_loops(program)}
@@ -314,10 +316,15 @@ def either(lines: Mapping[str, Sequence[str]]) -> list[str]:
     """The calls of each form, for those arguments that it is for."""
     if len(lines) == 1:
         return [line for calls in lines.values() for line in calls]
-    if all(len(calls) == 1 for calls in lines.values()):
-        return [f"if (far) {lines['_far'][0]}", f"else {lines['_near'][0]}"]
-    indented = {form: [f"    {line}" for line in calls] for form, calls in lines.items()}
-    return ["if (far) {", *indented["_far"], "} else {", *indented["_near"], "}"]
+    return _either("far", lines["_far"], lines["_near"])
+
+
+def _either(condition: str, first: Sequence[str], other: Sequence[str]) -> list[str]:
+    """The first statements if a condition holds, else the others."""
+    if len(first) == len(other) == 1:
+        return [f"if ({condition}) {first[0]}", f"else {other[0]}"]
+    indented = [[f"    {line}" for line in lines] for lines in (first, other)]
+    return [f"if ({condition}) {{", *indented[0], "} else {", *indented[1], "}"]
 
 
 def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], case: Case) -> list[str]:
@@ -327,39 +334,48 @@ def _copied_ends(program: Program, layout: Layout, fields: Sequence[int | str], 
 
 
 def _of_equation(
-    program: Program, layout: Layout, kernel: Kernel, forms: Mapping[str, Mapping[str, str]], *, far: bool = False
+    program: Program,
+    layout: Layout,
+    kernel: Kernel,
+    forms: Mapping[str, Mapping[str, str]],
+    *,
+    end: Sequence[Kernel] = (),
+    far: bool = False,
 ) -> Iterator[str]:
-    """The loops of a kernel of the equation of a stage over rows and their sites, in each form; whether it is told of
-    arguments that are far."""
-    name, relaxing, moves = program.name, kernel.name == "relax", kernel.name == "increment"
+    """The loops of a kernel of the equation of a stage over rows and their sites, in each form, or of that of the
+    ``end`` of a stage where this moves x; whether they are told of arguments that are far."""
+    name, relaxing, adds = program.name, kernel.name == "relax", kernel.name == "follow"
     varied = kernel.name in VARIED
     gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
     gathered = [f"{name}_{own.kernel.name}(&row);" for own, _ in gathers]
     lines = {}
     for form, calls in forms.items():
-        loops = [
-            middle_loop(program, layout, one, form + more, calls, "+=" if moves or kernel.name == "follow" else "=")
-            for one, more in forms_of(program, kernel)
-        ]
-        yield from (loop.text(program) for loop in loops)
-        lines[form] = [f"{name}_{call.loop.name}(coef, {at(program, call.sites)});" for call in calls_over_sites(loops)]
+        both = list[list[str]]()
+        for made in (kernel, *end):
+            added = "+=" if adds or made in end else "="
+            loops = [
+                middle_loop(program, layout, one, form + more, calls, added) for one, more in forms_of(program, made)
+            ]
+            yield from (loop.text(program) for loop in loops)
+            called = calls_over_sites(loops)
+            both.append([f"{name}_{call.loop.name}(coef, {at(program, call.sites)});" for call in called])
+        lines[form] = _either("to == s->x", both[1], both[0]) if end else both[0]
     reads = ["row.start = s->x;"] * ("start" in kernel.inputs) + ["row.varied = v;"] * varied
     titles = {
-        "relax": "A sweep",
-        "increment": "The end of a stage",
+        "relax": "A sweep, or to x the end of a stage",
         "slope": "How a sweep follows y along v",
         BLOCK: "How a sweep follows y at the site itself",
         "side": "How a sweep follows x along v",
         "follow": "How the end of a stage follows y along v, added",
     }
-    moved = range(program.dimension) if relaxing or moves or kernel.name == "follow" else ()
+    moved = range(program.dimension) if relaxing or adds else ()
     setup = ["row.x = y;", *reads, "row.out = to;"]
     yield over_rows(
         program,
         layout,
-        [Case([*gathered, *either(lines)], setup, has_ends(program, [kernel]), (), moved, "to")],
+        [Case([*gathered, *either(lines)], setup, has_ends(program, [kernel, *end]), (), moved, "to")],
         title=titles[kernel.name],
-        head=f"{kernel.name}_piece",
+        head="stage_piece" if end else f"{kernel.name}_piece",
         arguments=f"const double *coef, {'int far, ' * far}double *const *y, {'double *const *v, ' * varied}"
         "double *const *to",
         unused=["far"] * (far and len(forms) == 1),
