@@ -1,4 +1,4 @@
-"""What the templates of φ and its derivatives, and of entire functions, are filled with, in C and in NumPy."""
+"""What the templates of φ and its derivatives, and of entire functions, are filled with, in all languages."""
 
 from __future__ import annotations
 
@@ -87,17 +87,3 @@ def entire_used(program: Program) -> list[str]:
     for f in (f for f in ENTIRE if f in ops):
         ops = ops | {e.op for e in topological(_closed_forms(f))}
     return [name for name in ENTIRE if name in ops]
-
-
-def entire_values(function: str, printer: Callable[[Scope], Printer]) -> Mapping[str, object]:
-    """The values of the template for one function of `ENTIRE` in NumPy."""
-    found = ENTIRE[function]
-    last, *others = [repr(float(c)) for c in reversed(found.terms())]
-    return {
-        "function": function,
-        "meaning": found.meaning,
-        "radius": repr(found.radius),
-        "last": last,
-        "others": others,
-        **far(function, printer, "np.where(s > 0.0, {0}, {1})"),
-    }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence, Set
+from dataclasses import dataclass
 from fractions import Fraction
 
 from phigen.lanes.functions import NEAR_FUNCTIONS
@@ -33,23 +34,36 @@ from phigen.targets.special import entire_used
 FLOW_FUNCTIONS = tuple(f for f in NEAR_FUNCTIONS if f not in ENTIRE)
 
 
-def _inverse_factorials(first: int, step: int, count: int, signs: int) -> list[Fraction]:
-    """±1/first!, ±1/(first + step)!, …: alternating if ``signs`` is −1."""
-    return [Fraction(signs**k, math.factorial(first + k * step)) for k in range(count)]
+@dataclass(frozen=True)
+class Small:
+    """A function by its series where the argument t is small: ±1/first!, ±1/(first + step)!, … with alternating signs.
+
+    Its variable z is t², or t where ``step`` is 1. ``far`` is the value elsewhere. ``flows`` have a radius, a number of
+    terms, and the value by their sum P; ``rows``, the loops over sites, the same with the fewest operations.
+    """
+
+    meaning: str
+    far: str
+    first: int
+    step: int
+    signs: tuple[int, int]
+    flows: tuple[float, int, str]
+    rows: tuple[Fraction, int, str]
+
+    def terms(self, count: int) -> list[Fraction]:
+        """Coefficients of the series, exactly."""
+        return [Fraction(self.signs[k % 2], math.factorial(self.first + k * self.step)) for k in range(count)]
 
 
-#: Meaning, radius, value outside, coefficients of P, and the value inside by P, t and z = t².
+_QUARTER, _HALF, _TWICE = Fraction(1, 4), Fraction(1, 2), "2.0 * sin(0.5 * t) * sin(0.5 * t)"
+
+#: The functions of `FLOW_FUNCTIONS`.
 _SMALL = {
-    "expm1": ("exp(t) - 1", 0.35, "expm1(t)", "t", _inverse_factorials(2, 1, 12, 1), "t + t * t * ({P})"),
-    "sin": ("sin(t)", 1.0, "sin(t)", "z", [-c for c in _inverse_factorials(3, 2, 8, -1)], "t + t * z * ({P})"),
-    "versin": (
-        "1 - cos(t)",
-        1.0,
-        "2.0 * sin(0.5 * t) * sin(0.5 * t)",
-        "z",
-        _inverse_factorials(2, 2, 9, -1),
-        "z * ({P})",
+    "expm1": Small(
+        "exp(t) - 1", "expm1(t)", 2, 1, (1, 1), (0.35, 12, "t + t * t * ({P})"), (_QUARTER, 9, "z + z * z * {P}")
     ),
+    "sin": Small("sin(t)", "sin(t)", 3, 2, (-1, 1), (1.0, 8, "t + t * z * ({P})"), (_HALF, 5, "{t} + {t} * z * {P}")),
+    "versin": Small("1 - cos(t)", _TWICE, 2, 2, (1, -1), (1.0, 9, "z * ({P})"), (_HALF, 6, "z * {P}")),
 }
 
 
@@ -72,15 +86,6 @@ def near(program: Program, names: Iterable[str]) -> list[str]:
     return [render("c", "small.c", _values(program, f) | {"near": True}) for f in names]
 
 
-#: The same for the loops over sites, where arguments are those of short steps: radius, number of coefficients, and the
-#: value by P in z, which is t or t².
-_ROWS = {
-    "expm1": (Fraction(1, 4), 9, "z + z * z * {P}"),
-    "sin": (Fraction(1, 2), 5, "{t} + {t} * z * {P}"),
-    "versin": (Fraction(1, 2), 6, "z * {P}"),
-}
-
-
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:
     """Versions for the loops over sites, of small arguments only: the fewest operations that keep all digits."""
     return [render("c", "row_near.c", _row_values(program, f)) for f in names]
@@ -92,14 +97,10 @@ def _row_values(program: Program, f: str) -> dict[str, object]:
         meaning, radius, squared, form = found.meaning, Fraction(found.radius), False, "{P}"
         coefficients = list(found.terms())
     else:
-        meaning, _, _, variable, _, _ = _SMALL[f]
-        (radius, count, form), t, squared = _ROWS[f], "t", variable == "z"
-        first, step, sign = {"expm1": (2, 1, 1), "sin": (3, 2, -1), "versin": (2, 2, -1)}[f]
-        series = _inverse_factorials(first, step, count + 8, sign)
-        overall = -1 if f == "sin" else 1
-        coefficients = [
-            overall * c for c in economised(series, radius**2 if squared else radius, count, symmetric=not squared)
-        ]
+        small, t = _SMALL[f], "t"
+        (radius, count, form), meaning, squared = small.rows, small.meaning, small.step == 2
+        reach = radius**2 if squared else radius
+        coefficients = economised(small.terms(count + 8), reach, count, symmetric=not squared)
     polynomial = _nested([float(c) for c in coefficients])
     text = f"return {form.format(P=polynomial, t=t)};"
     lines = textwrap.wrap(text, WIDTH - 12, subsequent_indent="    ", break_on_hyphens=False)
@@ -148,10 +149,11 @@ def _values(program: Program, f: str) -> dict[str, object]:
         outside = special.far(f, lambda scope: printer(scope, own), "s > 0.0 ? {0} : {1}")
         lines, value = estrin(found.terms(), t)
     else:
-        meaning, radius, far, variable, coefficients, form = _SMALL[f]
-        outside = {"far": far, "root": False}
-        lines, value = estrin(coefficients, variable)
-        t, lines = "t", [*(["const double z = t * t;"] if variable == "z" else []), *lines]
+        small, t = _SMALL[f], "t"
+        (radius, count, form), meaning, squared = small.flows, small.meaning, small.step == 2
+        outside = {"far": small.far, "root": False}
+        lines, value = estrin(small.terms(count), "z" if squared else "t")
+        lines = ["const double z = t * t;"] * squared + lines
     return {
         "NAME": program.name,
         "function": f,

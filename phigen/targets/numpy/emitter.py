@@ -27,10 +27,10 @@ from phigen.scheme.steps import (
 )
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
-from phigen.targets import special
 from phigen.targets.code import Code, bound, lower
 from phigen.targets.header import facts, header_lines, plain, sealed, sentence
 from phigen.targets.names import Scope
+from phigen.targets.numpy import functions
 from phigen.targets.numpy.language import LANGUAGE, listed, quoted
 from phigen.targets.path import TERMS, Syntax, statements, tangent_program
 from phigen.targets.printer import Printer
@@ -82,10 +82,7 @@ def _body(program: Program) -> str:
             program, program.step, "\n\n".join(_function(program, kernel) for kernel in early if kernel)
         )
     pieces = [render("numpy", part, _values(program)) for part in ("preamble.py", "arrays.py", "parameters.py")]
-    pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces += [
-        render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
-    ]
+    pieces += functions.called(program)
     pieces += _step(program)
     search = ("gauge_line.py", "gauge.py") if program.searches_gauge else ("gauge_formula.py",)
     templates = search if program.gauge else ("level.py",) if program.monitor else ("no_gauge.py",)

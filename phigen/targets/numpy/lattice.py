@@ -8,11 +8,11 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import VARIED, Gather, Sweep, Sweeps
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
-from phigen.targets import lattice, special
+from phigen.targets import lattice
 from phigen.targets.code import Code, lower
 from phigen.targets.header import facts
 from phigen.targets.names import Scope
-from phigen.targets.numpy import colours, lattice_adjoint
+from phigen.targets.numpy import colours, functions, lattice_adjoint
 from phigen.targets.numpy.language import LANGUAGE, listed, quoted
 from phigen.targets.rendering import render
 from phigen.targets.reserved import PYTHON_RESERVED
@@ -56,10 +56,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         kind = "series" if step.equation else "splitting"
         pieces += [render("numpy", f"lattice_adjoint{part}.py", values) for part in (f"_{kind}", "")]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
-    pieces += [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    pieces += [
-        render("numpy", "entire.py", special.entire_values(f, LANGUAGE.printer)) for f in special.entire_used(program)
-    ]
+    pieces += functions.called(program)
     pieces += _gathers(program, step)
     pieces += colours.functions(step, (_sweep(program, step, sweep) for sweep in step.sweeps))
     if step.equation:
