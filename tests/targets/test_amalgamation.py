@@ -10,18 +10,18 @@ from support import run, spec_of, tool, write
 from phigen import resources
 from phigen.compiler import compile_spec
 from phigen.spec.model import Extras
-from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.emitter import runtime_of
+from phigen.targets.c.macros import Macros
 
 RUNTIME = resources.templates() / "c/runtime"
 
 
-def amalgam(lines, *macros):
+def expanded(lines, *definitions):
     """The lines with these macros."""
-    made = Amalgam("body", {}, {})
-    for macro in macros:
-        made.define(f"#define PHI_{macro}")
-    return "\n".join(made.own(lines.split("\n")))
+    macros = Macros()
+    for definition in definitions:
+        macros.define(f"#define PHI_{definition}")
+    return "\n".join(macros.expanded(lines.split("\n")))
 
 
 def test_heads_that_are_nothing_leave_what_is_below_them():
@@ -38,31 +38,31 @@ def test_heads_that_are_nothing_leave_what_is_below_them():
         }
     done();"""
     left = """\
-    body_prepare(h);
-    body_fit(s);
+    phi_prepare(h);
+    phi_fit(s);
     x[0] = y[0];
     if (good) {
         again();
     }
     done();"""
-    assert amalgam(text, "EACH") == left
+    assert expanded(text, "EACH") == left
     assert (
-        amalgam("    PHI_EACH {", "EACH for (int k = 0; k < PHI_DIM; ++k)")
-        == "    for (int k = 0; k < body_DIM; ++k) {"
+        expanded("    PHI_EACH {", "EACH for (int k = 0; k < PHI_DIM; ++k)")
+        == "    for (int k = 0; k < PHI_DIM; ++k) {"
     )
 
 
 def test_macros_are_expanded_with_their_arguments():
-    assert amalgam("PHI_OF(s->past[k], (i + 1) % n)[j]", "OF(array, k) array[k]") == "s->past[k][(i + 1) % n][j]"
-    assert amalgam("f(PHI_OF(PHI_OF(a, 1), 2))", "OF(array, k) array") == "f(a)"
-    assert amalgam("f(s PHI_AND_K, g(t PHI_AND_K))", "AND_K , k") == "f(s, k, g(t, k))"
-    assert amalgam("f(s PHI_AND_K, t)", "AND_K") == "f(s, t)"
+    assert expanded("PHI_OF(s->past[k], (i + 1) % n)[j]", "OF(array, k) array[k]") == "s->past[k][(i + 1) % n][j]"
+    assert expanded("f(PHI_OF(PHI_OF(a, 1), 2))", "OF(array, k) array") == "f(a)"
+    assert expanded("f(s PHI_AND_K, g(t PHI_AND_K))", "AND_K , k") == "f(s, k, g(t, k))"
+    assert expanded("f(s PHI_AND_K, t)", "AND_K") == "f(s, t)"
 
 
 def test_macros_that_are_given_too_little_are_no_code():
     for line in ("PHI_OF", "PHI_OF(a)", "PHI_OF(a, b, c)", "PHI_OF(a,"):
         with pytest.raises(ValueError, match=r"macro|shorter|longer"):
-            amalgam(line, "OF(array, k) array[k]")
+            expanded(line, "OF(array, k) array[k]")
 
 
 @cache

@@ -1,0 +1,95 @@
+"""Macros of the runtime in C that its readers need and readers of the output do not: what they stand for is put there.
+
+They are as in C, but for what has no place in the output: a line is all that they and their arguments are on; where one
+stands for nothing before a statement or a block, as does a loop that is made once, what is below it is there by itself.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+_NAME = re.compile(r"\bPHI_\w+")
+_DEFINITION = re.compile(r"#define (\w+)(?:\(([^)]*)\))?(?: (.*))?$")
+
+
+@dataclass(frozen=True)
+class Macro:
+    """What ``text`` a name stands for; ``parameters`` are None where it is used without any."""
+
+    parameters: tuple[str, ...] | None
+    text: str
+
+    def of(self, arguments: Sequence[str]) -> str:
+        """The text for arguments; ValueError if they are too many or too few."""
+        given = dict(zip(self.parameters or (), arguments, strict=True))
+        return re.sub(r"\b\w+\b", lambda word: given.get(word[0], word[0]), self.text) if given else self.text
+
+
+@dataclass
+class Macros:
+    """Macros by their names."""
+
+    _known: dict[str, Macro] = field(default_factory=dict)
+
+    def define(self, line: str) -> None:
+        """Keep the macro, if the line defines one."""
+        if found := _DEFINITION.match(line):
+            self._known[found[1]] = Macro(tuple(found[2].split(", ")) if found[2] else None, found[3] or "")
+
+    def expanded(self, lines: Sequence[str]) -> list[str]:
+        """The lines with what macros stand for; ValueError where one lacks arguments."""
+        nothing = [name for name, macro in self._known.items() if macro == Macro(None, "")]
+        return [self._line(line) for line in _without_heads(lines, nothing)]
+
+    def _line(self, line: str) -> str:
+        """The line with what macros stand for. A comma, or nothing, has no blank before it."""
+        at = 0
+        while found := _NAME.search(line, at):
+            macro = self._known.get(found[0])
+            at = found.end()
+            if macro is None:
+                continue
+            arguments, after = ([], at) if macro.parameters is None else _arguments(line, at)
+            text, at = macro.of(arguments), found.start()
+            before = line[:at].rstrip(" ") if text[:1] in ("", ",") else line[:at]
+            line, at = before + text + line[after:], len(before)
+        return line
+
+
+def _arguments(line: str, at: int) -> tuple[list[str], int]:
+    """The arguments of a macro in parentheses, and where these end; ValueError where the line has no such."""
+    if line[at : at + 1] != "(":
+        raise ValueError(f"a macro without its arguments: {line.strip()}")
+    found, depth, begin = [], 0, at + 1
+    for k in range(at, len(line)):
+        depth += (line[k] in "([") - (line[k] in ")]")
+        if depth == 0 or (depth == 1 and line[k] == ","):
+            found.append(line[begin:k].strip())
+            begin = k + 1
+        if depth == 0:
+            return found, k + 1
+    raise ValueError(f"a macro whose arguments do not end on its line: {line.strip()}")
+
+
+def _without_heads(lines: Sequence[str], heads: Sequence[str]) -> list[str]:
+    """The lines without these heads of loops; what is below a head, in braces or not, is there by itself."""
+    over = re.compile(rf"^( *)(?:{'|'.join(heads)})(?: (.*))?$") if heads else re.compile("(?!)")
+    kept: list[str] = []
+    ends: list[tuple[str, str]] = []  # of each loop that was struck out: its indentation, and the line that ends it
+    for line in lines:
+        while ends and ends[-1][1] == "" and not line.startswith(ends[-1][0] + " "):
+            ends.pop()
+        if ends and line == ends[-1][1]:
+            ends.pop()
+            continue
+        shift = 4 * len(ends)
+        found = over.match(line)
+        if found is None:
+            kept.append(line[shift:] if line.startswith(" " * shift) else line)
+        elif found[2] in (None, "{"):
+            ends.append((found[1], f"{found[1]}}}" if found[2] else ""))
+        else:
+            kept.append(f"{found[1]}{found[2]}"[shift:])
+    return kept
