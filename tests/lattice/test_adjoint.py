@@ -59,10 +59,22 @@ parameters: {a: 0.7, b: 1.3}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: p**2/2 + a*(q[i+1] - q)**4/4 + b*(q[i+1, j+1] - q)**2/2 - cos(q[j+1] - 2*q)
 """
+#: Parameters that are called as what loops have for themselves.
+NAMED = """phigen: 1
+name: named
+lattice: {axes: [i], boundary: periodic}
+coordinates: [q, p]
+parameters:
+  {l: {value: 1, at: sites}, whole: {value: 1, at: sites}, share0: {value: 1.1, at: sites}, apart: 0.7, j: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: apart*p**2/2 + l*(q[i+1] - q)**2/2 + share0*whole*q**4 + j*cos(q)
+"""
+LATTICES["named fast"] = {"l": 0.3 + np.arange(SITES) / 5, "whole": 1.2, "j": 0.4}
 OWN = {
-    "membrane": MEMBRANE,
     "driven": DRIVEN,
     "swung": SWUNG,
+    "named": NAMED,
+    "membrane": MEMBRANE,
     "far_open": SPECS["far_open"],
     "spin_graph": SPECS["spin_graph"],
 }
@@ -74,6 +86,7 @@ IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITE
 IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES}
 IN_C |= {
     "membrane fast": (5, 6),
+    "named fast": SITES,
     "swung": SITES,
     "swung series": SITES,
     "driven composed": SITES,

@@ -17,7 +17,7 @@ from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "row", "to", "out", "apart", "i", "j", "k", "side"})
+_OWN = frozenset({"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole"})
 
 
 #: The loop over the sites of a piece of a row.
@@ -47,9 +47,9 @@ class SiteNames:
     ) -> None:
         self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
-        self.scope = Scope(
-            C_RESERVED | _OWN | called | {*(f"{word}{k}" for word in ("change", "add", "sum") for k in range(3))}
-        )
+        shares = {f"share{k}" for k in range(layout.step.row + len(program.parameters))}
+        numbered = {f"{word}{k}" for word in ("change", "add", "sum") for k in range(3)} | shares
+        self.scope = Scope(C_RESERVED | _OWN | called | numbered)
         self.show = printer(self.scope, calls)
         self._here = here
         self._pointers: dict[tuple[str, int], str] = {}
