@@ -198,7 +198,10 @@ def _newton(program: Program, step: Newton) -> Blocks | None:
     found += _elapsed(program)
     found += _turns(program)
     ops = operations([step.linearise, *(k.kernel for k in _turns(program))])
-    return Blocks(tuple(found), with_formulas(ops), not library_calls(ops), _group(program), step.factors)
+    back = step.adjoint.steps if step.adjoint else ()
+    found += map(LaneKernel, back)
+    called = with_formulas(ops | operations(back))
+    return Blocks(tuple(found), called, not library_calls(ops), _group(program), step.factors)
 
 
 def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:

@@ -41,7 +41,7 @@ SHORT = "profile: small\n"
 #: Every kind of step, with times, forces and monitors; those that are as fast as can be do blocks of steps.
 KINDS = {
     "newton": (TOP + "order: 4\ngauge: none\n", Newton),
-    "newton, composed": (TOP + "order: 6\ncomposition: kahan-li\ngauge: none\n" + SHORT, Newton),
+    "newton, composed": (SWING + "order: 6\ncomposition: kahan-li\n", Newton),
     "newton, gauge": (TOP + "casimirs: {C: x1**2 + x2**2 + x3**2}\n", Newton),
     "newton, time": (DRIVEN + "order: 4\n", Newton),
     "newton, force": (TOP + "order: 2\nforces: {covector: {x1: -x2*I1/9}, vector: {x3: -x3*I2/9}}\n" + SHORT, Newton),
@@ -61,6 +61,7 @@ KINDS = {
 }
 pytestmark = pytest.mark.few(
     "newton",
+    "newton, composed",
     "newton, gauge",
     "newton, force",
     "explicit, time",

@@ -38,7 +38,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     traces = lanes if isinstance(lanes, Traces) else None
     packs = lanes if isinstance(lanes, Packs) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
-    yield Feature("TRACED", lambda p: blocks or traces, ("PATH", "ADJOINT"))
+    yield Feature("TRACED", lambda p: (blocks or traces) and isinstance(p.step, Implicit), ("ADJOINT",))
     yield Feature("NARROW", lambda p: traces and traces.narrow, ("TRACED",))
     yield Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")

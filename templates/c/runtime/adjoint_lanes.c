@@ -4,23 +4,30 @@
 #include <string.h>
 
 #include "adjoint_stage.c"
+#if PHI_PATH
 #include "expansion_lanes.c"
+#endif
 #include "model.h"
 #include "model_lanes.h"
 #include "solver.c"
 
-/* ---- The transpose of steps along paths, in lanes ---- */
+/* ---- The transpose of steps in lanes ---- */
 /* What stages are linearised around is known before anything is pulled back. So the derivatives of several are computed at
    once, and a cotangent takes a small matrix through each. */
+#if PHI_PATH
 #define PHI_BACK_SETTLED 1e-15  /* accuracy of middles */
 #define PHI_BACK_ACCURACY 1e-17 /* of the derivatives of paths */
+#endif
 
 /* Stages that are gone back through at once. A cotangent after of the end of one becomes after + change, where change is
-   gain after; wrong is infinite where the expansions do not suffice. */
+   gain after; wrong is infinite where lanes do not suffice. */
 typedef struct {
-    phi_lanes coef[PHI_COEFFICIENTS], y[PHI_DIM], start[PHI_DIM], gain[PHI_DIM * PHI_DIM];
+    phi_lanes coef[PHI_COEFFICIENTS], y[PHI_DIM], gain[PHI_DIM * PHI_DIM];
     phi_lanes after[PHI_DIM], change[PHI_DIM], wrong;
+#if PHI_PATH
+    phi_lanes start[PHI_DIM];
     phi_expansion e;
+#endif
 #if PHI_RENEWED
     double t[PHI_LANES];
 #endif
@@ -62,6 +69,50 @@ static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_
     }
 }
 
+#if PHI_NEWTON
+/* Linearise the stages: gain is (D J^-1) transposed, where J is the Jacobian of alpha(y) and D that of the increment. */
+static void phi_linearise_back(phi_traced *g)
+{
+    phi_lanes displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], transposed[PHI_DIM * PHI_DIM];
+#if PHI_CENTRED
+    phi_linearise_lanes(g->coef, g->y, displacement, increment, jacobian);
+#else
+    phi_lanes slope[PHI_DIM * PHI_DIM];
+#if PHI_SPARSE
+    memset(jacobian, 0, sizeof jacobian); /* zeros are not stored */
+    memset(slope, 0, sizeof slope);
+#endif
+    phi_linearise_lanes(g->coef, g->y, displacement, increment, jacobian, slope);
+#endif
+    memset(g->wrong, 0, sizeof g->wrong);
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < PHI_DIM; ++j) {
+            const int to = i * PHI_DIM + j, from = j * PHI_DIM + i;
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                transposed[to][lane] = jacobian[from][lane];
+#if PHI_CENTRED
+                g->gain[to][lane] = 2.0 * ((i == j ? 1.0 : 0.0) - jacobian[from][lane]); /* y is the mean of the ends */
+#else
+                g->gain[to][lane] = slope[from][lane];
+#endif
+            }
+        }
+    phi_solve_lanes(transposed, g->gain, PHI_DIM, g->wrong);
+}
+
+/* The cotangents of coefficients, from those of ends and of residuals. */
+static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFICIENTS])
+{
+    phi_lanes minus[PHI_DIM];
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) minus[i][lane] = -g->change[i][lane];
+    }
+    phi_linearise_adjoint_lanes(g->coef, g->y, minus, g->after, slopes);
+}
+
+#else
 #if PHI_ALONG
 /* The derivatives of the paths along the coefficients that pi depends on, by as many orders as those along p. */
 static void phi_vary_coefficients(phi_expansion *e)
@@ -205,6 +256,7 @@ static void phi_slopes_back(phi_traced *g, phi_lanes slopes[restrict PHI_COEFFIC
 #endif
 }
 
+#endif
 /* Load a stage of the step that at is before, into a lane. */
 static void phi_load(phi_traced *g, int lane, const phi_solver *at PHI_AND_INT_STAGE, const double y[PHI_DIM])
 {
@@ -232,7 +284,9 @@ static phi_status phi_through(phi_traced *g, int lane, phi_cotangent *bar, doubl
     if (good) {
         for (int i = 0; i < PHI_DIM; ++i) {
             bar->x[i] += change[i];
+#if PHI_PATH
             bar->end[i] = g->start[i][lane];
+#endif
         }
     } else {
         double coef[PHI_COEFFICIENTS], y[PHI_DIM];

@@ -36,6 +36,21 @@ static void phi_linearise_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes disp
     }
 }
 
+#if PHI_ADJOINT
+static void phi_linearise_adjoint_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes displacement_bar[2],
+    phi_lanes increment_bar[2], phi_lanes coef_bar[2])
+{
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const double c[2] = { coef[0][lane], coef[1][lane] }, point[2] = { y[0][lane], y[1][lane] };
+        const double d[2] = { displacement_bar[0][lane], displacement_bar[1][lane] };
+        const double e[2] = { increment_bar[0][lane], increment_bar[1][lane] };
+        double found[2];
+        phi_linearise_adjoint(c, point, d, e, found);
+        for (int i = 0; i < 2; ++i) coef_bar[i][lane] = found[i];
+    }
+}
+
+#endif
 static void phi_evaluate_lanes(phi_lanes coef[], phi_lanes y[2], phi_lanes displacement[2], phi_lanes increment[2])
 {
     phi_lanes jacobian[4], slope[4];
