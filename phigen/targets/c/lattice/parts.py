@@ -139,13 +139,19 @@ def _alike(made: Sequence[dict[str, list[_Call]]]) -> dict[str, list[_Call]]:
     alike: dict[str, list[_Call]] = {}
     for forms in made:
         for called in forms.values():
-            for k, call in enumerate(called):
+            for k, call in sorted(enumerate(called), key=_place):
                 choices = [call, *call.others]
                 called[k] = next((c for c in choices if c.loop.code in alike), call)
                 known = alike.setdefault(called[k].loop.code, [])
                 if all(c.loop.name != call.loop.name for c in known):
                     known.append(called[k])
     return alike
+
+
+def _place(numbered: tuple[int, _Call]) -> tuple[str, bool]:
+    """Where a loop is printed: that beside open ends behind the one that it is the same as."""
+    name = numbered[1].loop.name
+    return name.removesuffix("_end"), name.endswith("_end")
 
 
 def _forms_of_part(
