@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 6905a42b645740eb1072fcdd853634d6dbe1c93cf99fc91d71a903bf1b9ea8fe
+ * body-sha256: 69c529297b07f5571eda4dc817647ab06ef291b048a2e2b73bd6684a7f5f8db9
  */
 #include "fput.h"
 #include <float.h>
@@ -393,10 +393,10 @@ enum { fput_DEEPEST = 16, fput_CACHE = 1 << 21 }; /* flows at once; bytes that t
 /* The slices of the lattice, the pieces of its row. */
 static size_t fput_slices(const fput_solver *s) { return fput_units(s); }
 
-/* How many flows over so many arrays are made at once. */
-static size_t fput_depth(const fput_solver *s, size_t arrays)
+/* How many flows are made at once. */
+static size_t fput_depth(const fput_solver *s)
 {
-    const size_t slices = fput_slices(s), bytes = (size_t)s->width * arrays * sizeof(double);
+    const size_t slices = fput_slices(s), bytes = (size_t)s->width * fput_ARRAYS * sizeof(double);
     const size_t held = fput_CACHE / (bytes / slices) / fput_SPAN,
         room = slices / fput_THREADS / (2 * fput_SPAN);
     const size_t depth = held < room ? held : room;
@@ -428,7 +428,7 @@ static void fput_make_wave(const fput_solver *s, const fput_flow *flows, size_t 
 /* The flows of some steps, joined, without the last. */
 static void fput_make_waves(const fput_solver *s, size_t steps)
 {
-    const size_t each = fput_FLOWS - 1, depth = fput_depth(s, fput_ARRAYS);
+    const size_t each = fput_FLOWS - 1, depth = fput_depth(s);
     fput_flow flows[fput_DEEPEST];
     for (size_t done = 0; done < steps * each;) {
         size_t count = 0;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: c9547e87a0756120ffd30f378fcc5ff90258928c37c0b93ddf71fb2f9f5d6dd2
+ * body-sha256: 6100e5fa19262d2f231a101e864417a159335b5e363b66ed5dcfcc27aa59cceb
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -701,10 +701,11 @@ enum { heisenberg_DEEPEST = 16, heisenberg_CACHE = 1 << 21 }; /* flows at once; 
 /* The slices of the lattice, each all rows of one place along the first axis. */
 static size_t heisenberg_slices(const heisenberg_solver *s) { return s->sizes[0]; }
 
-/* How many flows over so many arrays are made at once. */
-static size_t heisenberg_depth(const heisenberg_solver *s, size_t arrays)
+/* How many flows are made at once. */
+static size_t heisenberg_depth(const heisenberg_solver *s)
 {
-    const size_t slices = heisenberg_slices(s), bytes = s->rows * (size_t)s->width * arrays * sizeof(double);
+    const size_t slices = heisenberg_slices(s), bytes = s->rows * (size_t)s->width * heisenberg_ARRAYS
+        * sizeof(double);
     const size_t held = heisenberg_CACHE / (bytes / slices) / heisenberg_SPAN,
         room = slices / heisenberg_THREADS / (2 * heisenberg_SPAN);
     const size_t depth = held < room ? held : room;
@@ -742,7 +743,7 @@ static void heisenberg_make_wave(const heisenberg_solver *s, const heisenberg_fl
 /* The flows of some steps, joined, without the last. */
 static void heisenberg_make_waves(const heisenberg_solver *s, size_t steps)
 {
-    const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s, heisenberg_ARRAYS);
+    const size_t each = heisenberg_FLOWS - 1, depth = heisenberg_depth(s);
     heisenberg_flow flows[heisenberg_DEEPEST];
     for (size_t done = 0; done < steps * each;) {
         size_t count = 0;

@@ -318,7 +318,7 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
 
 
 #: Sizes that several threads work at; of the last, too large for caches, they go back through several flows at once.
-LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 70_000}
+LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 140_000}
 
 
 @pytest.mark.parametrize("name", LARGE)

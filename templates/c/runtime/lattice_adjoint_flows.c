@@ -159,7 +159,7 @@ static void phi_find_back(const phi_solver *s, const phi_transpose *g, size_t st
 static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t before, size_t steps)
 {
 #if PHI_WAVES
-    const size_t depth = phi_depth(s, PHI_ARRAYS + PHI_BARS + PHI_HANDED);
+    const size_t depth = phi_depth(s);
 #else
     const size_t depth = 1;
 #endif

@@ -20,10 +20,10 @@ static size_t phi_slices(const phi_solver *s) { return phi_units(s); }
 static size_t phi_slices(const phi_solver *s) { return s->sizes[0]; }
 #endif
 
-/* How many flows over so many arrays are made at once. */
-static size_t phi_depth(const phi_solver *s, size_t arrays)
+/* How many flows are made at once. */
+static size_t phi_depth(const phi_solver *s)
 {
-    const size_t slices = phi_slices(s), bytes = PHI_DOUBLES * arrays * sizeof(double);
+    const size_t slices = phi_slices(s), bytes = PHI_DOUBLES * PHI_ARRAYS * sizeof(double);
     const size_t held = PHI_CACHE / (bytes / slices) / PHI_SPAN, room = slices / PHI_THREADS / (2 * PHI_SPAN);
     const size_t depth = held < room ? held : room;
 #if PHI_TANGENT
@@ -67,7 +67,7 @@ static void phi_make_wave(const phi_solver *s, const phi_flow *flows, size_t cou
 /* The flows of some steps, joined, without the last. */
 static void phi_make_waves(const phi_solver *s, size_t steps)
 {
-    const size_t each = PHI_FLOWS - 1, depth = phi_depth(s, PHI_ARRAYS);
+    const size_t each = PHI_FLOWS - 1, depth = phi_depth(s);
     phi_flow flows[PHI_DEEPEST];
     for (size_t done = 0; done < steps * each;) {
         size_t count = 0;
