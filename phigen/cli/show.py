@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -115,12 +117,21 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     if system.invariants:
         section("Invariants", assignments(_named(system.invariants, most)))
     if compilation.splitting:
-        section(f"Splitting: {flows.method(compilation)}", assignments(flows.formulas(compilation, most)))
+        lines = assignments(flows.formulas(compilation, most))
+        section(f"Splitting: {flows.method(compilation)}", [*lines, *_unfamiliar(lines)])
     else:
         _print_series(compilation, most)
     if corrected:
         section("Modified Hamiltonian", assignments(corrected))
     section("Generated code", _code(compilation))
+
+
+def _unfamiliar(lines: Sequence[str]) -> list[str]:
+    """What functions in these lines are that go by no name of their own in books."""
+    from phigen.symbolic.readable import UNFAMILIAR
+
+    met = [said for name, said in UNFAMILIAR.items() if any(re.search(rf"\b{name}\(", line) for line in lines)]
+    return [f"where {', '.join(met)}"] if met else []
 
 
 def _noise(system: System, most: int | None) -> list[tuple[str, str]]:
@@ -177,14 +188,15 @@ def _named(formulas: Any, most: int | None) -> list[tuple[str, str]]:
 
 def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
-    from phigen.symbolic.readable import readable
+    from phigen.notation.parts import texts
 
     realisation, names = compilation.chart, compilation.system.coordinates
     more = " + …" if realisation.path else ""
-    result = [(f"α_{c}", t + more) for c, t in zip(names, readable(realisation.alpha, most), strict=True)]
-    if realisation.symmetric:
-        return [*result, ("β(x, p)", "α(x, −p)")]
-    return result + [(f"β_{c}", t + more) for c, t in zip(names, readable(realisation.beta, most), strict=True)]
+    maps = {f"α_{c}": e for c, e in zip(names, realisation.alpha, strict=True)}
+    if not realisation.symmetric:
+        maps |= {f"β_{c}": e for c, e in zip(names, realisation.beta, strict=True)}
+    result = [(name, text + more * (name in maps)) for name, text in texts(maps, most)]
+    return [*result, ("β(x, p)", "α(x, −p)")] if realisation.symmetric else result
 
 
 def _modified(compilation: Compilation, count: int, most: int | None) -> list[tuple[str, str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.compilation import Compilation
+from phigen.notation import parts
 from phigen.scheme.steps import Splitting, Step
 from phigen.splitting.flow import Flow
 from phigen.symbolic.expression import Expression, symbol
@@ -36,14 +37,17 @@ def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expre
 
 
 def formulas(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
-    """The parts of H, and where the flow of each takes the coordinates, as pairs of a name and a text."""
+    """The parts of H, and where the flow of each takes the coordinates, as pairs of a name and a text.
+
+    Where that is long, what occurs in it more than once has a name, σ with a number, and comes after it.
+    """
     listed: list[tuple[str, str]] = []
     for k, flow in enumerate(flows_of(compilation), 1):
         moved = images(flow, compilation.system.coordinates)
         named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
-        named += [f"Φ_{k}: {c}" for c in moved]
-        formulas = [*(e for _, e in definitions(flow, compilation.system.coordinates)), *moved.values()]
-        listed += zip(named, readable(formulas, most), strict=True)
+        own = [e for _, e in definitions(flow, compilation.system.coordinates)]
+        listed += zip(named, readable(own, most), strict=True)
+        listed += [(f"Φ_{k}: {name}", text) for name, text in parts.texts(moved, most)]
     return listed
 
 

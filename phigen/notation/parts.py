@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
-from phigen.symbolic.readable import Formula, expanded
-from phigen.symbolic.symbols import PART, Symbol
+from phigen.symbolic.readable import LONGEST, Formula, expanded
+from phigen.symbolic.readable import readable as as_text
+from phigen.symbolic.symbols import PART, Symbol, plain
 
 #: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
 SMALL, WORTH = 3, 4
@@ -17,6 +19,9 @@ WORTH_NAMES = 0.75
 
 #: Expressions with fewer leaves are written as they stand, or expanded where that is shorter.
 SHORT = 40
+
+#: The name of a shared part in a text.
+_SHARED = re.compile(r"σ_\d+\b")
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,34 @@ def _partly_named(expressions: Sequence[Expression]) -> Readable:
     forms |= dict(zip(long, roots, strict=True))
     listed = tuple(forms[i] for i in range(len(expressions)))
     return Readable(parts, listed, sum(map(leaves, [*listed, *(e for _, e in parts)])))
+
+
+def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, str]]:
+    """Expressions as pairs of a name and a text of ``most`` terms, as they stand or expanded.
+
+    Where one is long, and names for shared parts make the whole shorter, those are used: σ_1, σ_2, …, which follow.
+    """
+    expressions = [*named.values()]
+    plainly = as_text(expressions, most)
+    if max(map(len, plainly), default=0) > LONGEST:
+        shared, roots = with_names(expressions)
+        names = [*named, *(plain(name) for name, _ in shared)]
+        found = _met([*zip(names, as_text([*roots, *(e for _, e in shared)], most), strict=True)], len(named))
+        if sum(len(text) for _, text in found) < WORTH_NAMES * sum(map(len, plainly)):
+            return found
+    return list(zip(named, plainly, strict=True))
+
+
+def _met(listed: Sequence[tuple[str, str]], own: int) -> list[tuple[str, str]]:
+    """The first ``own`` texts, and after them the parts that they and each other mention, numbered anew."""
+    met = {name for _, text in listed[:own] for name in _SHARED.findall(text)}
+    for name, text in reversed(listed[own:]):
+        if name in met:
+            met |= {*_SHARED.findall(text)}
+    kept = [name for name, _ in listed[own:] if name in met]
+    numbers = {name: plain(Symbol(PART, k)) for k, name in enumerate(kept, 1)}
+    shown = [*listed[:own], *((name, text) for name, text in listed[own:] if name in met)]
+    return [(numbers.get(name, name), _SHARED.sub(lambda found: numbers[found[0]], text)) for name, text in shown]
 
 
 def leaves(form: Formula | Expression) -> int:

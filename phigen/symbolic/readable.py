@@ -28,6 +28,16 @@ SHOWN = 8
 #: Names of φ and its derivatives for readers, as text.
 _GREEK = {name: FUNCTIONS[name].letters.replace("′", "'").replace("″", "''") for name in SPECIAL}
 
+#: Functions of phigen's own in which flows are written, as they are known.
+UNFAMILIAR = {
+    "cosroot": "cosroot(s) = cos √s",
+    "sinroot": "sinroot(s) = sin(√s)/√s",
+    "arcroot": "arcroot(s) = (√s − sin √s)/√s³",
+    "exprel": "exprel(s) = (e^s − 1)/s",
+    "inv": "inv(s) = 1/s for s > 0",
+    "inv0": "inv0(s) = 1/s for s > 0, else 0",
+}
+
 #: The longest formula in a message.
 LONGEST = 160
 

@@ -80,8 +80,11 @@ def kind_of(name: str) -> str | None:
 
 
 def plain(name: str) -> str:
-    """A name for readers: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the step."""
+    """A name for readers: ``p_x1`` for the momentum of x1, as in specs, λ_C for the gauge of C, ``h`` for the step.
+
+    What formulas share is σ_1, σ_2, …
+    """
     if not isinstance(name, Symbol):
         return name
-    kind = "λ" if name.kind == GAUGE else name.kind
+    kind = {GAUGE: "λ", PART: "σ"}.get(name.kind, name.kind)
     return "_".join([kind, *(plain(k) if isinstance(k, str) else str(k) for k in name.key)])

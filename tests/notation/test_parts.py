@@ -1,0 +1,62 @@
+"""Names for what formulas share, in text."""
+
+import cmath
+import math
+import re
+from dataclasses import replace
+
+import pytest
+
+from phigen import resources
+from phigen.compiler import compile_spec
+from phigen.notation import flows, parts
+from phigen.spec import load
+from phigen.symbolic.expression import call, symbol, total
+from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.symbols import STEP
+
+POINT = {"x": 0.48, "y": -0.6, "z": 0.64, "h": 0.3, "K": 1.3, "B": 0.7, "damping_rate": 0.2}
+
+MEANINGS = {
+    "sqrt": math.sqrt,
+    "tanh": math.tanh,
+    "sin": math.sin,
+    "cos": math.cos,
+    "inv0": lambda s: 1 / s,
+    "cosroot": lambda s: cmath.cos(cmath.sqrt(s)).real,
+    "sinroot": lambda s: (cmath.sin(cmath.sqrt(s)) / cmath.sqrt(s)).real,
+}
+
+
+@pytest.fixture(scope="module")
+def damped_spin():
+    given = replace(load(resources.bundled_specs() / "landau_lifshitz.yaml"), scheme="splitting")
+    return compile_spec(given)
+
+
+def test_long_flows_are_written_by_what_they_share(damped_spin):
+    """In lines that a reader can take in, which together are the flow: each name by those before it."""
+    names = damped_spin.system.coordinates
+    listed = flows.formulas(damped_spin, None)
+    for k, flow in enumerate(flows.flows_of(damped_spin), 1):
+        lines = [(name.removeprefix(f"Φ_{k}: "), text) for name, text in listed if name.startswith(f"Φ_{k}: ")]
+        images = flows.images(flow, names)
+        assert max(len(text) for _, text in lines) < 160
+        assert [name for name, _ in lines[: len(images)]] == [*images]
+        known = dict(POINT)
+        for name, text in lines[len(images) :]:
+            known[name] = eval(text, dict(MEANINGS), known)
+        found = [eval(text, dict(MEANINGS), known) for _, text in lines[: len(images)]]
+        assert found == pytest.approx(evaluate([*images.values()], POINT | {STEP: POINT["h"]}), rel=1e-13)
+
+
+def test_parts_that_only_hidden_terms_mention_are_left_out():
+    a, b, c = map(symbol, "abc")
+    angles = [call("sin", call("cos", a * k + b * c + call("exp", a * b - k * c))) for k in range(2, 8)]
+    sums = {
+        name: total(factor**k * angle for k, angle in enumerate(angles, 1)) for name, factor in (("f", a), ("g", b))
+    }
+    everything, some = (parts.texts(sums, most) for most in (None, 4))
+    mentioned = {name for _, text in some for name in re.findall(r"σ_\d+", text)}
+    assert 2 < len(some) < len(everything)
+    assert [name for name, _ in some[2:]] == [f"σ_{k}" for k in range(1, len(mentioned) + 1)]
