@@ -304,44 +304,61 @@ def _ordered(spatial: bool) -> dict[str, str]:
 
 
 def _values(program: Program) -> dict[str, object]:
-    step = program.step
-    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
+    """What the templates read that are not of one part of the module only."""
+    said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted)}
+    return {**said, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
+
+
+def _of_fixed(program: Program) -> dict[str, object]:
+    """What a trajectory holds fixed, and steps in tau."""
     return {
-        "title": plain(program.about.title) or program.name,
-        **facts(program, listed, quoted),
         "gauge": listed(program.held),
         "monitored": program.monitor is not None,
         "said_of_tau": _OF_TAU * bool(program.monitor),
         "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
+        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.held else "values, 1e-100",
+    }
+
+
+def _of_time(program: Program) -> dict[str, object]:
+    """Where H depends on the time: arguments, and what is said of them."""
+    time = bool(program.time)
+    return {
+        "time": time,
+        "at_t": "t, " * time,
+        "t0_given": ", t0=0.0" * time,
+        "t0_passed": ", t0=t0" * time,
+        "said_from_t0": ", from the time t0" * time,
+        "said_of_t0": " t0 is the time of x0." * time,
+        "said_of_each": "h, t0 and parameters" if time else "h and parameters",
+    }
+
+
+def _of_step(program: Program) -> dict[str, object]:
+    """The kind of step, its coefficients and stages, and by what its equation is solved."""
+    step = program.step
+    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
+    return {
         "path": isinstance(step, Path),
         "splitting": isinstance(step, Splitting),
-        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.held else "values, 1e-100",
-        "plausible": repr(PLAUSIBLE),
-        "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
-        "most_pieces": MOST_PIECES,
-        **_noise_values(program),
-        "time": bool(program.time),
-        "at_t": "t, " * bool(program.time),
-        "t0_given": ", t0=0.0" * bool(program.time),
-        "t0_passed": ", t0=t0" * bool(program.time),
-        "said_from_t0": ", from the time t0" * bool(program.time),
-        "said_of_t0": " t0 is the time of x0." * bool(program.time),
-        "said_of_each": "h, t0 and parameters" if program.time else "h and parameters",
         "renewed": step.renewed,
         "prepared": step.prepared,
         "moments": listed(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
         "middles": listed(program.midpoints),
         "fractions": listed(program.fractions),
-        "terms": TERMS,
-        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
+        "plausible": repr(PLAUSIBLE),
         "max_iterations": inner.max_iterations,
         "tolerance": repr(inner.tolerance),
         # The floor of the scale of a component: see _size.
         "floor": "0.0" if inner.relative else "1e-6",
+        "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
+        "most_pieces": MOST_PIECES,
+        "terms": TERMS,
+        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
     }
 
 
-def _noise_values(program: Program) -> dict[str, object]:
+def _of_noise(program: Program) -> dict[str, object]:
     """What depends on whether coefficients are those of a single step, with its time or its noise."""
     noise = program.noise
     renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []
