@@ -1,0 +1,68 @@
+"""Attitudes in NumPy, from the states of a run."""
+
+from __future__ import annotations
+
+from phigen.scheme.program import Attitude, Program
+from phigen.scheme.steps import Path, Splitting
+from phigen.targets.numpy.kernels import function
+from phigen.targets.numpy.values import values_of
+from phigen.targets.rendering import render
+
+
+def pieces(program: Program, attitude: Attitude) -> list[str]:
+    """Attitudes: the kernels, and their use."""
+    group, step, rows = attitude.group, program.step, attitude.group.rows
+    solved = "_path(stage[0], x, solved)[1]" if isinstance(step, Path) else "solved"
+    shown = f"Attitudes have shape (rows, ..., {rows}, {rows})" if rows else "Attitudes have shape (rows, ..., 4)"
+    values = {
+        **values_of(program),
+        "size": group.size,
+        "what": f"matrix of {rows} rows" if rows else "quaternion" + " and a position" * bool(group.translation),
+        "rows": rows,
+        "position": bool(group.translation),
+        "exponential": attitude.exponential is not None,
+        "uniform": attitude.rate is not None,
+        "normalise": group.orthogonal,
+        "splitting": isinstance(step, Splitting),
+        "rates": f"_rate(parameters, {'gauge.T, ' * bool(program.gauge)}x)" if attitude.rate else "None",
+        "turn_of_stage": _turn_of_stage(attitude, solved),
+        "lengthened": attitude.lengthened,
+        "turn_of_flows": "_shorter(turn)" if attitude.lengthened else "turn",
+        "shaped": _shaped(rows, bool(group.translation)),
+        **_ordered(group.spatial),
+        "shapes": shown + ", positions (rows, ..., 3)" * bool(group.translation),
+    }
+    turns = "TURNS = (" + ", ".join(f"_turn{k}" for k in range(1, len(attitude.turns) + 1)) + ",)\n"
+    unused = attitude.turn if attitude.along else attitude.along
+    found = [function(program, kernel) for kernel in attitude.kernels if kernel is not unused]
+    found += [turns] if attitude.turns else []
+    own = ("matrices", "matrix_start") if rows else ("quaternions", "rotations", "start")
+    parts = [*(f"attitude_{part}" for part in own), "attitude", "reconstruct"]
+    return [*found, *(render("numpy", f"{part}.py", values) for part in parts)]
+
+
+def _turn_of_stage(attitude: Attitude, solved: str) -> str:
+    """The factors of a stage, less 1."""
+    turn = "_along(solved)" if attitude.along else f"_turn(stage[0], x + {solved})"
+    return f"_of_covector({turn})" if attitude.group.matrices and not attitude.cayley else turn
+
+
+def _shaped(rows: int, position: bool) -> str:
+    """The arrays that users get of rows of elements."""
+    if rows:
+        return f"elements.reshape(shape + ({rows}, {rows}))"
+    if not position:
+        return "elements.reshape(shape + (4,))"
+    return "elements[..., :4].reshape(shape + (4,)), elements[..., 4:].reshape(shape + (3,))"
+
+
+def _ordered(spatial: bool) -> dict[str, str]:
+    """Factors of products: later ones stand on the left where momenta are in space."""
+    pairs = {
+        "uniform_first": ("first", "_uniform(rate, t)"),
+        "element_first": ("first", "element"),
+        "factor_element": ("element", "factor"),
+        "quaternions": ("element[..., :4]", "turn[..., :4]"),
+    }
+    moved = "turn + np.eye(1, ELEMENT), element[..., 4:]" if spatial else "element, turn[..., 4:]"
+    return {"moved": moved} | {name: ", ".join(p[::-1] if spatial else p) for name, p in pairs.items()}

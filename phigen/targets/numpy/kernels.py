@@ -1,0 +1,76 @@
+"""Kernels as functions of NumPy."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+
+from phigen.scheme.kernel import SCALARS, Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.staging import TABLE
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import Symbol
+from phigen.targets.code import Code, bound, lower
+from phigen.targets.header import plain, sentence
+from phigen.targets.names import Scope
+from phigen.targets.numpy.language import LANGUAGE
+from phigen.targets.printer import Printer
+from phigen.targets.reserved import PYTHON_RESERVED
+
+
+def function(program: Program, kernel: Kernel) -> str:
+    """A kernel as a function: from arrays with any axes before that of the coordinates to such arrays."""
+    code = lower(kernel)
+    arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
+    lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
+    reserved = PYTHON_RESERVED | {*kernel.inputs, *(o.name for o in kernel.outputs), *LANGUAGE.functions.values()}
+    scope = Scope(reserved)
+    lines += _bindings(kernel, code, scope)
+    printer = LANGUAGE.printer(scope)
+    lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]
+    lines.append(_result(program, kernel, code, printer))
+    return "\n".join(lines) + "\n"
+
+
+def _docstring(text: str) -> list[str]:
+    said = plain(sentence(text)).replace(chr(34), chr(39))
+    return textwrap.wrap(f'"""{said}"""', 104, initial_indent="    ", subsequent_indent="    ")
+
+
+def _bindings(kernel: Kernel, code: Code, scope: Scope) -> list[str]:
+    def entry(array: str, i: int, s: str) -> str:
+        return array if array in SCALARS else f"{array}[{i}]" if isinstance(s, Symbol) else f"{array}[..., {i}]"
+
+    named = bound(kernel, code, scope, lambda s: f'parameters["{s}"]', entry, named=True)
+    return [f"    {name} = {place}" for name, place in named]
+
+
+def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> str:
+    values: dict[str, list[Expression]] = {o.name: [] for o in kernel.outputs}
+    for s in code.stores:
+        values[s.array].append(s.value)
+    state = _state(kernel)
+    if not state:
+        lists = [_list([printer(v) for v in entries]) for entries in values.values()]
+        return "    return " + ", ".join(lists)
+    n = program.dimension
+    arrays = []
+    for name, entries in values.items():
+        array = f"_filled({state}, {_list([printer(e) for e in entries])})"
+        arrays.append(array + (f".reshape({state}.shape + ({n},))" if name.endswith("jacobian") else ""))
+    if len(arrays) == 1:
+        return f"    return {arrays[0]}"
+    return "    return (\n" + "".join(f"        {a},\n" for a in arrays) + "    )"
+
+
+def _state(kernel: Kernel) -> str:
+    """The argument that holds states (..., DIM), which arrays are shaped by; empty where there is none."""
+    others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
+    return next((a for a in others if not isinstance(kernel.inputs[a][0], Symbol)), "")
+
+
+def _list(items: Sequence[str]) -> str:
+    text = "[" + ", ".join(items) + "]"
+    if len(text) < 90:
+        return text
+    return "[\n" + "".join(f"            {i},\n" for i in items) + "        ]"

@@ -1,0 +1,95 @@
+"""What the templates of modules in NumPy read that are not of one part of the module only."""
+
+from __future__ import annotations
+
+from phigen.scheme.program import Program
+from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, PLAUSIBLE, Implicit, InnerSolve, Path, Splitting
+from phigen.targets.header import facts, plain
+from phigen.targets.numpy.language import listed, quoted
+from phigen.targets.path import TERMS
+
+_NOISE_ARGUMENTS = """ The random
+    numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
+    on; increments (steps, increments) for all members, or (steps, members, increments), take their place."""
+
+#: What is said of what a trajectory holds fixed, and of steps in tau.
+_OF_GAUGE = """gauge (one value for each Casimir in GAUGE)
+    overrides the choice of the solver: the step is an exact Poisson map for each fixed gauge."""
+_OF_LEVEL = """gauge overrides e = -H(x0): the step
+    is an exact Poisson map for each fixed e."""
+_OF_TAU = """
+
+    The steps are of size h in tau; with times the result is a pair of the states and their times t: (rows, ...)."""
+
+
+def values_of(program: Program) -> dict[str, object]:
+    """All of it, by subjects."""
+    said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted)}
+    return {**said, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
+
+
+def _of_fixed(program: Program) -> dict[str, object]:
+    """What a trajectory holds fixed, and steps in tau."""
+    return {
+        "gauge": listed(program.held),
+        "monitored": program.monitor is not None,
+        "said_of_tau": _OF_TAU * bool(program.monitor),
+        "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
+        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.held else "values, 1e-100",
+    }
+
+
+def _of_time(program: Program) -> dict[str, object]:
+    """Where H depends on the time: arguments, and what is said of them."""
+    time = bool(program.time)
+    return {
+        "time": time,
+        "at_t": "t, " * time,
+        "t0_given": ", t0=0.0" * time,
+        "t0_passed": ", t0=t0" * time,
+        "said_from_t0": ", from the time t0" * time,
+        "said_of_t0": " t0 is the time of x0." * time,
+        "said_of_each": "h, t0 and parameters" if time else "h and parameters",
+    }
+
+
+def _of_step(program: Program) -> dict[str, object]:
+    """The kind of step, its coefficients and stages, and by what its equation is solved."""
+    step = program.step
+    inner = step.inner if isinstance(step, Implicit) else InnerSolve()
+    return {
+        "path": isinstance(step, Path),
+        "splitting": isinstance(step, Splitting),
+        "renewed": step.renewed,
+        "prepared": step.prepared,
+        "moments": listed(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
+        "middles": listed(program.midpoints),
+        "fractions": listed(program.fractions),
+        "plausible": repr(PLAUSIBLE),
+        "max_iterations": inner.max_iterations,
+        "tolerance": repr(inner.tolerance),
+        # The floor of the scale of a component: see _size.
+        "floor": "0.0" if inner.relative else "1e-6",
+        "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
+        "most_pieces": MOST_PIECES,
+        "terms": TERMS,
+        "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
+    }
+
+
+def _of_noise(program: Program) -> dict[str, object]:
+    """What depends on whether coefficients are those of a single step, with its time or its noise."""
+    noise = program.noise
+    renewed, drawn = bool(program.time or noise), ["drawn(done)"] if noise else []
+    now = ", ".join(["s", "t0 + done * h" if program.time else "done * h", "h", *drawn])
+    first = ["float(t0)" if program.time else "0.0", "float(h)"]
+    first += ["_drawing(float(h), len(x), seed, member, step0, increments)(0)"] if noise else []
+    named = ("seed", "member", "step0", "increments")
+    return {
+        "noise_given": ", seed=0, member=0, step0=0, increments=None" * bool(noise),
+        "noise_passed": "".join(f", {name}={name}" for name in named) * bool(noise),
+        "said_of_noise": _NOISE_ARGUMENTS * bool(noise),
+        "of_stage": ", ".join(["_, parameters, h", *(["t"] if program.time else []), *(["dw"] if noise else [])]),
+        "stages_now": f"[_renewed({now}) for s in stages]" if renewed else "stages",
+        "renewed_stage": f"            stage = _renewed({', '.join(['stage', *first])})\n" if renewed else "",
+    }
