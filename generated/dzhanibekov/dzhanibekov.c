@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 8de4172f119c0f7b1de3a39e1ee3bedfa927d8fd02c6b9ea968be60449aa9ac9
+ * body-sha256: 0013d65187f36011280815f41a62f988c1072ed732a9af1a334c1a1a01669d56
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -449,74 +449,123 @@ static inline void dzhanibekov_quaternion_product(const double a[4], const doubl
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-/* The product of two elements. */
-static void dzhanibekov_product(const double a[dzhanibekov_ELEMENT], const double b[dzhanibekov_ELEMENT],
-    double product[dzhanibekov_ELEMENT])
+/* What rotating a vector by a quaternion adds to it. */
+static void dzhanibekov_rotation(const double q[4], const double v[3], double change[3])
 {
-    dzhanibekov_quaternion_product(a, b, product);
+    const double x = q[2] * v[2] - q[3] * v[1], y = q[3] * v[0] - q[1] * v[2], z = q[1] * v[1] - q[2] * v[0];
+    change[0] = 2.0 * (q[0] * x + (q[2] * z - q[3] * y));
+    change[1] = 2.0 * (q[0] * y + (q[3] * x - q[1] * z));
+    change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
 }
 
-/* What a factor adds to an element. The quaternion of the factor is given less 1. */
-static void dzhanibekov_added(const double element[dzhanibekov_ELEMENT],
+/* What a factor of a step adds to an element. The quaternion of the factor is given less 1. */
+static inline void dzhanibekov_added(const double element[dzhanibekov_ELEMENT],
     const double turn[dzhanibekov_ELEMENT], double change[dzhanibekov_ELEMENT])
 {
     dzhanibekov_quaternion_product(element, turn, change);
 }
 
-/* Bring the length of a quaternion nearer to 1; what rounding leaves of that has no direction, and does not
-   add up. */
-static void dzhanibekov_normalise(const double q[4], double carry[4])
+/* The same for one from the other side. */
+static inline void dzhanibekov_added_aside(const double element[dzhanibekov_ELEMENT],
+    const double turn[dzhanibekov_ELEMENT], double change[dzhanibekov_ELEMENT])
 {
-    const double excess = 0.5 * (((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-    for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
+    dzhanibekov_quaternion_product(turn, element, change);
 }
 
-/* Multiply the element by a factor, given less 1, in compensated arithmetic. */
-static void dzhanibekov_turn_by(dzhanibekov_solver *s, const double factor[dzhanibekov_ELEMENT])
+/* The element, less 1, of the motion with a constant rate, for some time. */
+static void dzhanibekov_uniform(const double rate[dzhanibekov_RATE], double t,
+    double element[dzhanibekov_ELEMENT])
 {
-    double change[dzhanibekov_ELEMENT];
-    dzhanibekov_added(s->turned, factor, change);
+    const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2])),
+        quarter = 0.25 * (t * speed);
+    const double sine = sin(quarter), scale = speed > 0.0 ? 2.0 * (sine * cos(quarter)) / speed : 0.0;
+    element[0] = -2.0 * (sine * sine);
+    for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
+}
+
+/* Take a rate to the frame where momenta are constant, by the element of the attitude. */
+static void dzhanibekov_carry_rate(const double element[dzhanibekov_ELEMENT], double rate[dzhanibekov_RATE])
+{
+    double change[3];
+    const double *q = element;
+    for (int k = 0; k < dzhanibekov_RATE; k += 3) {
+        dzhanibekov_rotation(q, rate + k, change);
+        for (int i = 0; i < 3; ++i) rate[k + i] += change[i];
+    }
+}
+
+/* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no
+   direction, and does not add up. */
+static inline double dzhanibekov_excess(const double q[4])
+{
+    return ((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+}
+
+/* Make a factor, given less 1, one by which the length of q comes nearer to 1. */
+static inline void dzhanibekov_normalise(const double q[4], double factor[4])
+{
+    const double half = 0.5 * dzhanibekov_excess(q);
+    factor[0] -= half + half * factor[0];
+    for (int i = 1; i < 4; ++i) factor[i] -= half * factor[i];
+}
+
+/* Multiply the element by a factor of a step, in compensated arithmetic, and from the other side by one that
+   is the same for all steps: in the frame where momenta are constant, the Casimirs that are taken from H turn
+   uniformly. Both are given less 1; the other may be NULL. */
+static inline void dzhanibekov_turn_by(dzhanibekov_solver *s, double factor[dzhanibekov_ELEMENT],
+    const double *aside)
+{
+    double change[dzhanibekov_ELEMENT], element[dzhanibekov_ELEMENT], carry[dzhanibekov_ELEMENT];
+    memcpy(element, s->turned, sizeof element);
+    memcpy(carry, s->turned_carry, sizeof carry);
+    dzhanibekov_normalise(element, factor);
+    if (aside != NULL) {
+        dzhanibekov_added_aside(s->turned, aside, change);
+        for (int i = 0; i < dzhanibekov_ELEMENT; ++i) element[i] += change[i];
+        for (int i = 0; i < dzhanibekov_ELEMENT; ++i) carry[i] += change[i];
+    }
+    dzhanibekov_added(element, factor, change);
     for (int i = 0; i < dzhanibekov_ELEMENT; ++i) {
-        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved,
-            added = sum - s->turned[i];
-        s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
+        const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
+        s->turned_carry[i] = moved - (sum - s->turned[i]);
         s->turned[i] = sum;
     }
-    dzhanibekov_normalise(s->turned, s->turned_carry);
 }
 
-/* The element of a stage that was solved by y. */
-static inline void dzhanibekov_turn_stage(dzhanibekov_solver *s, const double y[dzhanibekov_DIM])
+/* What these Casimirs turn in one step, and in a block of steps. */
+static void dzhanibekov_set_aside(dzhanibekov_solver *s)
 {
-    double factor[dzhanibekov_ELEMENT];
-    dzhanibekov_turn(s->coef, y, factor);
-    dzhanibekov_turn_by(s, factor);
+    dzhanibekov_uniform(s->rate, s->h, s->aside);
 }
 
-/* The attitude proper: the first, then what the Casimirs that were taken from H have turned it by, which in
-   the frame where momenta are constant is a uniform motion, then the product of the elements of all steps. */
+/* The element, less 1, of a stage that was solved by y. */
+static inline void dzhanibekov_factor(const dzhanibekov_solver *s, const double y[dzhanibekov_DIM],
+    double factor[dzhanibekov_ELEMENT])
+{
+    dzhanibekov_turn(s->coef, y, factor);
+}
+
+/* The attitude proper. */
 static void dzhanibekov_read_attitude(dzhanibekov_solver *s)
 {
-    double found[dzhanibekov_ELEMENT], element[dzhanibekov_ELEMENT];
-    const double half = 0.5 * (s->t - s->attitude_from) * s->speed, c = cos(half), sine = sin(half);
-    for (int i = 0; i < 4; ++i) element[i] = c * s->first[i] + sine * s->aside[i];
-    dzhanibekov_product(element, s->turned, found);
-    memcpy(s->attitude, found, sizeof s->attitude);
+    memcpy(s->attitude, s->turned, sizeof s->attitude);
+}
+
+/* Where x or the attitude has been set: the rate at which the Casimirs that are taken from H turn from here
+   on. */
+static void dzhanibekov_take_rate(dzhanibekov_solver *s)
+{
+    dzhanibekov_rate(&s->params, s->gauge, s->x, s->rate);
+    dzhanibekov_carry_rate(s->turned, s->rate);
+    dzhanibekov_set_aside(s);
 }
 
 /* Begin at an element, where x is now. */
 static void dzhanibekov_begin_attitude(dzhanibekov_solver *s, const double first[dzhanibekov_ELEMENT])
 {
-    memcpy(s->first, first, sizeof s->first);
-    memset(s->turned, 0, sizeof s->turned);
     memset(s->turned_carry, 0, sizeof s->turned_carry);
-    s->turned[0] = 1.0;
-    double rate[dzhanibekov_RATE], axis[4] = { 0.0 };
-    dzhanibekov_rate(&s->params, s->gauge, s->x, rate);
-    s->speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
-    for (int i = 0; i < 3 && s->speed > 0.0; ++i) axis[i + 1] = rate[i] / s->speed;
-    dzhanibekov_product(s->first, axis, s->aside);
-    s->attitude_from = s->t;
+    memcpy(s->turned, first, sizeof s->turned);
+    dzhanibekov_take_rate(s);
     dzhanibekov_read_attitude(s);
 }
 
@@ -593,6 +642,8 @@ static dzhanibekov_status dzhanibekov_attempt(dzhanibekov_solver *s)
         const int stalled = previous < dzhanibekov_NEARLY_SOLVED && size > dzhanibekov_SHRINKING * previous;
         previous = size;
         if (!(remaining <= dzhanibekov_TOLERANCE || stalled)) continue;
+        double factor[dzhanibekov_ELEMENT]; /* made here, while what follows is computed beside it */
+        dzhanibekov_factor(s, y, factor);
         double small[dzhanibekov_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
         for (int i = 0; i < dzhanibekov_DIM; ++i)
             for (int j = 0; j < dzhanibekov_DIM; ++j) small[i] -= slope[i * dzhanibekov_DIM + j] * delta[j];
@@ -600,7 +651,7 @@ static dzhanibekov_status dzhanibekov_attempt(dzhanibekov_solver *s)
         if (!dzhanibekov_plausible(s, increment)) return dzhanibekov_NO_CONVERGENCE;
         if (!dzhanibekov_advance(s, increment, small)) return dzhanibekov_NOT_FINITE;
         dzhanibekov_remember(&s->history, y);
-        dzhanibekov_turn_stage(s, y);
+        dzhanibekov_turn_by(s, factor, s->aside);
         return dzhanibekov_OK;
     }
     return dzhanibekov_NO_CONVERGENCE;
@@ -663,6 +714,7 @@ dzhanibekov_status dzhanibekov_integrate(dzhanibekov_solver *s, double h, size_t
         dzhanibekov_prepare(&s->params, s->gauge, h, s->coef);
         memset(&s->history, 0, sizeof s->history);
         s->h = h;
+        dzhanibekov_set_aside(s);
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
     }
@@ -680,12 +732,6 @@ dzhanibekov_status dzhanibekov_integrate(dzhanibekov_solver *s, double h, size_t
 dzhanibekov_status dzhanibekov_step(dzhanibekov_solver *s, double h)
 {
     return dzhanibekov_integrate(s, h, 1);
-}
-
-/* The gauge turns the body at another rate from here on. */
-static void dzhanibekov_take_rate(dzhanibekov_solver *s)
-{
-    dzhanibekov_set_attitude(s, s->attitude);
 }
 
 dzhanibekov_status dzhanibekov_set_state(dzhanibekov_solver *s, const double x[dzhanibekov_DIM])

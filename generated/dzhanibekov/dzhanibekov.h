@@ -1,7 +1,7 @@
 /*
  * The declarations of dzhanibekov.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: aa7794b2f11a8e6251c3d79b4018d2aefc58faa09e02ed0988dd3712006113a7
+ * body-sha256: da64b0afd6baefb746c34f8452e76d0a26ae3140e865874ff58d5098dddf1f8e
  */
 #ifndef DZHANIBEKOV_H
 #define DZHANIBEKOV_H
@@ -57,12 +57,11 @@ typedef struct {
     double coef[dzhanibekov_COEFFICIENTS]; /* all that depends on params and h only */
     /* the quaternion (w, x, y, z) that turns body into space; see dzhanibekov_set_attitude */
     double attitude[dzhanibekov_ATTITUDE_SIZE];
-    double first[dzhanibekov_ELEMENT]; /* where the attitude began */
-    /* the product of what steps turned it by; what rounding took */
+    /* the product of what steps turned by; what rounding took */
     double turned[dzhanibekov_ELEMENT], turned_carry[dzhanibekov_ELEMENT];
-    /* of turning by the Casimirs that are taken from H; first, turned by pi about that axis */
-    double speed, aside[4];
-    double attitude_from;  /* the time when the attitude began */
+    /* the gradient of the Casimirs that are taken from H: the body turns by them too */
+    double rate[dzhanibekov_RATE];
+    double aside[dzhanibekov_ELEMENT]; /* what it turns by so in a step, less 1 */
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;
     dzhanibekov_history history; /* for starting guesses */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 63180ef07994d77a76c4ac18c2e5ffb679f939daac749d1f542da5397799c7f7
+ * body-sha256: 53997fdc6de3491f7f85f55c698ff674b766eb6db91eb4cf2475ff92e2dd1815
  */
 #include "satellite.h"
 #include <float.h>
@@ -1013,67 +1013,61 @@ static inline void satellite_quaternion_product(const double a[4], const double 
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-/* The product of two elements. */
-static void satellite_product(const double a[satellite_ELEMENT], const double b[satellite_ELEMENT],
-    double product[satellite_ELEMENT])
-{
-    satellite_quaternion_product(a, b, product);
-}
-
-/* What a factor adds to an element. The quaternion of the factor is given less 1. */
-static void satellite_added(const double element[satellite_ELEMENT], const double turn[satellite_ELEMENT],
-    double change[satellite_ELEMENT])
+/* What a factor of a step adds to an element. The quaternion of the factor is given less 1. */
+static inline void satellite_added(const double element[satellite_ELEMENT],
+    const double turn[satellite_ELEMENT], double change[satellite_ELEMENT])
 {
     satellite_quaternion_product(element, turn, change);
 }
 
-/* Bring the length of a quaternion nearer to 1; what rounding leaves of that has no direction, and does not
-   add up. */
-static void satellite_normalise(const double q[4], double carry[4])
+/* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no
+   direction, and does not add up. */
+static inline double satellite_excess(const double q[4])
 {
-    const double excess = 0.5 * (((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-    for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
+    return ((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
 }
 
-/* Multiply the element by a factor, given less 1, in compensated arithmetic. */
-static void satellite_turn_by(satellite_solver *s, const double factor[satellite_ELEMENT])
+/* Make a factor, given less 1, one by which the length of q comes nearer to 1. */
+static inline void satellite_normalise(const double q[4], double factor[4])
 {
-    double change[satellite_ELEMENT];
-    satellite_added(s->turned, factor, change);
+    const double half = 0.5 * satellite_excess(q);
+    factor[0] -= half + half * factor[0];
+    for (int i = 1; i < 4; ++i) factor[i] -= half * factor[i];
+}
+
+/* Multiply the element by a factor of a step, given less 1, in compensated arithmetic. */
+static inline void satellite_turn_by(satellite_solver *s, double factor[satellite_ELEMENT])
+{
+    double change[satellite_ELEMENT], element[satellite_ELEMENT], carry[satellite_ELEMENT];
+    memcpy(element, s->turned, sizeof element);
+    memcpy(carry, s->turned_carry, sizeof carry);
+    satellite_normalise(element, factor);
+    satellite_added(element, factor, change);
     for (int i = 0; i < satellite_ELEMENT; ++i) {
-        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved,
-            added = sum - s->turned[i];
-        s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
+        const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
+        s->turned_carry[i] = moved - (sum - s->turned[i]);
         s->turned[i] = sum;
     }
-    satellite_normalise(s->turned, s->turned_carry);
 }
 
-/* The element of a stage that was solved by y. */
-static inline void satellite_turn_stage(satellite_solver *s, int stage, const double y[satellite_DIM])
+/* The element, less 1, of a stage that was solved by y. */
+static inline void satellite_factor(const satellite_solver *s, int stage, const double y[satellite_DIM],
+    double factor[satellite_ELEMENT])
 {
-    double factor[satellite_ELEMENT];
     satellite_turn(s->coef[stage], y, factor);
-    satellite_turn_by(s, factor);
 }
 
-/* The attitude proper: the first, then what the Casimirs that were taken from H have turned it by, which in
-   the frame where momenta are constant is a uniform motion, then the product of the elements of all steps. */
+/* The attitude proper. */
 static void satellite_read_attitude(satellite_solver *s)
 {
-    double found[satellite_ELEMENT], element[satellite_ELEMENT];
-    memcpy(element, s->first, sizeof element);
-    satellite_product(element, s->turned, found);
-    memcpy(s->attitude, found, sizeof s->attitude);
+    memcpy(s->attitude, s->turned, sizeof s->attitude);
 }
 
 /* Begin at an element, where x is now. */
 static void satellite_begin_attitude(satellite_solver *s, const double first[satellite_ELEMENT])
 {
-    memcpy(s->first, first, sizeof s->first);
-    memset(s->turned, 0, sizeof s->turned);
     memset(s->turned_carry, 0, sizeof s->turned_carry);
-    s->turned[0] = 1.0;
+    memcpy(s->turned, first, sizeof s->turned);
     satellite_read_attitude(s);
 }
 
@@ -1147,6 +1141,8 @@ static satellite_status satellite_attempt(satellite_solver *s, int stage)
         const int stalled = previous < satellite_NEARLY_SOLVED && size > satellite_SHRINKING * previous;
         previous = size;
         if (!(remaining <= satellite_TOLERANCE || stalled)) continue;
+        double factor[satellite_ELEMENT]; /* made here, while what follows is computed beside it */
+        satellite_factor(s, stage, y, factor);
         double small[satellite_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
         for (int i = 0; i < satellite_DIM; ++i)
             for (int j = 0; j < satellite_DIM; ++j) small[i] -= slope[i * satellite_DIM + j] * delta[j];
@@ -1154,7 +1150,7 @@ static satellite_status satellite_attempt(satellite_solver *s, int stage)
         if (!satellite_plausible(s, stage, increment)) return satellite_NO_CONVERGENCE;
         if (!satellite_advance(s, increment, small)) return satellite_NOT_FINITE;
         satellite_remember(&s->history[stage], y);
-        satellite_turn_stage(s, stage, y);
+        satellite_turn_by(s, factor);
         return satellite_OK;
     }
     return satellite_NO_CONVERGENCE;

@@ -1,7 +1,7 @@
 /*
  * The declarations of satellite.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: e7f43248dab26b6e22511b555fb6a09cb60dd239e7836ea4f240073538fc84de
+ * body-sha256: 515f9169c5defd57a2b56162f0b1c3e9f5961c89d5979a319a04100505ff24d2
  */
 #ifndef SATELLITE_H
 #define SATELLITE_H
@@ -56,8 +56,7 @@ typedef struct {
     double coef[satellite_STAGES][satellite_COEFFICIENTS]; /* all that depends on params and h only */
     /* the quaternion (w, x, y, z) that turns body into space; see satellite_set_attitude */
     double attitude[satellite_ATTITUDE_SIZE];
-    double first[satellite_ELEMENT]; /* where the attitude began */
-    /* the product of what steps turned it by; what rounding took */
+    /* the product of what steps turned by; what rounding took */
     double turned[satellite_ELEMENT], turned_carry[satellite_ELEMENT];
     size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
     double t_before_h;

@@ -21,7 +21,6 @@ FEATURES = (
     Feature("ADVANCE", lambda p: not isinstance(p.step, Splitting) or p.extras.tangent or p.offers("kicks")),
     Feature("UNROLLED", lambda p: isinstance(p.step, Implicit) and p.profile == "fast" and p.step.eliminate),
     Feature("EACH", lambda p: not p.noise, ("ENSEMBLE",), "members"),
-    Feature("TURNS_ASIDE", lambda p: p.attitude and p.attitude.quaternion, ("RATE_OF_GAUGE",)),
     Feature("ATTITUDES", requires=("ATTITUDE", "ENSEMBLE")),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
     Feature("RECURRENCES", requires=("GUESSED",), part="recurrences"),

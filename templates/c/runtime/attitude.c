@@ -20,21 +20,34 @@ static void phi_matrix_product(const double a[PHI_ELEMENT], const double b[PHI_E
         }
 }
 
+/* What a factor of a step, given less 1, adds to an element. */
+static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
+{
+#if PHI_SPATIAL
+    phi_matrix_product(turn, element, change);
+#else
+    phi_matrix_product(element, turn, change);
+#endif
+}
+
 #if PHI_NORMALISE
-/* Bring a matrix that is nearly orthogonal nearer to that: G (G^T G - 1)/2 is taken from it. */
-static void phi_normalise(const double g[PHI_ELEMENT], double carry[PHI_ELEMENT])
+/* Make a factor, given less 1, that brings a matrix which is nearly orthogonal nearer to that. */
+static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT])
 {
     enum { N = PHI_ROWS_OF_ATTITUDE };
-    double excess[PHI_ELEMENT];
+    double excess[PHI_ELEMENT], change[PHI_ELEMENT];
     for (int i = 0; i < N; ++i)
         for (int j = 0; j < N; ++j) {
             double sum = i == j ? -1.0 : 0.0;
+#if PHI_SPATIAL
+            for (int k = 0; k < N; ++k) sum += g[i * N + k] * g[j * N + k];
+#else
             for (int k = 0; k < N; ++k) sum += g[k * N + i] * g[k * N + j];
+#endif
             excess[i * N + j] = 0.5 * sum;
         }
-    for (int i = 0; i < N; ++i)
-        for (int j = 0; j < N; ++j)
-            for (int k = 0; k < N; ++k) carry[i * N + j] -= g[i * N + k] * excess[k * N + j];
+    phi_added(excess, factor, change);
+    for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
 #endif
@@ -75,34 +88,28 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
 }
 
 #endif
-/* The product of two elements. */
-static void phi_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
+#if PHI_RATE_OF_GAUGE
+/* The same for one from the other side. */
+static void phi_added_aside(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT],
+    double change[PHI_ELEMENT])
 {
-    phi_matrix_product(a, b, product);
+#if PHI_SPATIAL
+    phi_matrix_product(element, turn, change);
+#else
+    phi_matrix_product(turn, element, change);
+#endif
 }
 
-#if PHI_RATE_OF_GAUGE
-/* The element of the motion with a constant rate, for some time. */
+/* The element, less 1, of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
     double p[PHI_RATE];
     for (int i = 0; i < PHI_SIZE; ++i) p[i] = t * rate[i];
     p[PHI_SIZE] = t * t * rate[PHI_SIZE];
     phi_matrix_exponential(p, element);
-    for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) element[i] += 1.0;
 }
 
 #endif
-/* What a factor, given less 1, adds to an element. */
-static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
-{
-#if PHI_SPATIAL
-    phi_matrix_product(turn, element, change);
-#else
-    phi_matrix_product(element, turn, change);
-#endif
-}
-
 #else
 /* The product of two quaternions. */
 static inline void phi_quaternion_product(const double a[4], const double b[4], double product[4])
@@ -113,7 +120,7 @@ static inline void phi_quaternion_product(const double a[4], const double b[4], 
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
 }
 
-#if PHI_POSITION
+#if PHI_POSITION || PHI_RATE_OF_GAUGE
 /* What rotating a vector by a quaternion adds to it. */
 static void phi_rotation(const double q[4], const double v[3], double change[3])
 {
@@ -124,35 +131,8 @@ static void phi_rotation(const double q[4], const double v[3], double change[3])
 }
 
 #endif
-/* The product of two elements. */
-static void phi_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
-{
-    phi_quaternion_product(a, b, product);
-#if PHI_POSITION
-    phi_rotation(a, b + 4, product + 4);
-    for (int i = 4; i < 7; ++i) product[i] += a[i] + b[i];
-#endif
-}
-
-#if PHI_RATE_OF_GAUGE && PHI_POSITION
-/* The element of the motion with a constant rate, for some time. */
-static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
-{
-    const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
-    const double angle = t * speed, scale = speed > 0.0 ? sin(0.5 * angle) / speed : 0.0;
-    element[0] = cos(0.5 * angle);
-    for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
-    const double *w = rate, *v = rate + 3, sine = speed > 0.0 ? sin(angle) / speed : t;
-    const double versine = 2.0 * scale * scale, along = (w[0] * v[0] + w[1] * v[1]) + w[2] * v[2];
-    const double rest = speed > 0.0 ? (t - sine) / (speed * speed) * along : 0.0;
-    element[4] = sine * v[0] + versine * (w[1] * v[2] - w[2] * v[1]) + rest * w[0];
-    element[5] = sine * v[1] + versine * (w[2] * v[0] - w[0] * v[2]) + rest * w[1];
-    element[6] = sine * v[2] + versine * (w[0] * v[1] - w[1] * v[0]) + rest * w[2];
-}
-
-#endif
-/* What a factor adds to an element. The quaternion of the factor is given less 1. */
-static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
+/* What a factor of a step adds to an element. The quaternion of the factor is given less 1. */
+static inline void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
 {
 #if PHI_SPATIAL
     phi_quaternion_product(turn, element, change);
@@ -169,45 +149,145 @@ static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_E
 #endif
 }
 
-/* Bring the length of a quaternion nearer to 1; what rounding leaves of that has no direction, and does not add up. */
-static void phi_normalise(const double q[4], double carry[4])
+#if PHI_RATE_OF_GAUGE
+/* The same for one from the other side. */
+static inline void phi_added_aside(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT],
+    double change[PHI_ELEMENT])
 {
-    const double excess = 0.5 * (((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]));
-    for (int i = 0; i < 4; ++i) carry[i] -= excess * q[i];
+#if PHI_SPATIAL
+    phi_quaternion_product(element, turn, change);
+#else
+    phi_quaternion_product(turn, element, change);
+#endif
+#if PHI_POSITION && !PHI_SPATIAL
+    const double q[4] = { 1.0 + turn[0], turn[1], turn[2], turn[3] };
+    phi_rotation(q, element + 4, change + 4);
+    for (int i = 4; i < 7; ++i) change[i] += turn[i];
+#elif PHI_POSITION
+    phi_rotation(element, turn + 4, change + 4);
+    for (int i = 4; i < 7; ++i) change[i] += turn[i];
+#endif
+}
+
+/* The element, less 1, of the motion with a constant rate, for some time. */
+static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
+{
+    const double speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2])), quarter = 0.25 * (t * speed);
+    const double sine = sin(quarter), scale = speed > 0.0 ? 2.0 * (sine * cos(quarter)) / speed : 0.0;
+    element[0] = -2.0 * (sine * sine);
+    for (int i = 0; i < 3; ++i) element[i + 1] = scale * rate[i];
+#if PHI_POSITION
+    const double *w = rate, *v = rate + 3, reach = speed > 0.0 ? 2.0 * (scale * (1.0 + element[0])) : t;
+    const double versine = 2.0 * (scale * scale), along = (w[0] * v[0] + w[1] * v[1]) + w[2] * v[2];
+    const double rest = speed > 0.0 ? (t - reach) / (speed * speed) * along : 0.0;
+    element[4] = reach * v[0] + versine * (w[1] * v[2] - w[2] * v[1]) + rest * w[0];
+    element[5] = reach * v[1] + versine * (w[2] * v[0] - w[0] * v[2]) + rest * w[1];
+    element[6] = reach * v[2] + versine * (w[0] * v[1] - w[1] * v[0]) + rest * w[2];
+#endif
+}
+
+/* Take a rate to the frame where momenta are constant, by the element of the attitude. */
+static void phi_carry_rate(const double element[PHI_ELEMENT], double rate[PHI_RATE])
+{
+    double change[3];
+#if PHI_SPATIAL
+    const double q[4] = { element[0], -element[1], -element[2], -element[3] };
+#if PHI_POSITION
+    const double *p = element + 4, *w = rate;
+    rate[3] -= p[1] * w[2] - p[2] * w[1];
+    rate[4] -= p[2] * w[0] - p[0] * w[2];
+    rate[5] -= p[0] * w[1] - p[1] * w[0];
+#endif
+#else
+    const double *q = element;
+#endif
+    for (int k = 0; k < PHI_RATE; k += 3) {
+        phi_rotation(q, rate + k, change);
+        for (int i = 0; i < 3; ++i) rate[k + i] += change[i];
+    }
+#if PHI_POSITION && !PHI_SPATIAL
+    const double *p = element + 4, *w = rate;
+    rate[3] += p[1] * w[2] - p[2] * w[1];
+    rate[4] += p[2] * w[0] - p[0] * w[2];
+    rate[5] += p[0] * w[1] - p[1] * w[0];
+#endif
 }
 
 #endif
+/* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no direction, and does
+   not add up. */
+static inline double phi_excess(const double q[4])
+{
+    return ((q[0] * q[0] - 1.0) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
+}
+
 #if PHI_LENGTHENED
-/* Divide a quaternion, given less 1, by its length. */
-static void phi_shorten(double q[4])
+/* Make a factor, given less 1, of which only the direction matters, one by which the length of q becomes 1. */
+static inline void phi_normalise(const double q[4], double factor[4])
 {
-    const double excess = (q[0] * (2.0 + q[0]) + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]);
-    const double length = sqrt(1.0 + excess), per = 1.0 / length;
-    q[0] = per * (q[0] - excess / (1.0 + length));
-    for (int i = 1; i < 4; ++i) q[i] *= per;
+    const double own = (factor[0] * (2.0 + factor[0]) + factor[1] * factor[1])
+        + (factor[2] * factor[2] + factor[3] * factor[3]);
+    const double excess = own + phi_excess(q) * (1.0 + own), length = sqrt(1.0 + excess), per = 1.0 / length;
+    factor[0] = per * (factor[0] - excess / (1.0 + length));
+    for (int i = 1; i < 4; ++i) factor[i] *= per;
 }
+#else
+/* Make a factor, given less 1, one by which the length of q comes nearer to 1. */
+static inline void phi_normalise(const double q[4], double factor[4])
+{
+    const double half = 0.5 * phi_excess(q);
+    factor[0] -= half + half * factor[0];
+    for (int i = 1; i < 4; ++i) factor[i] -= half * factor[i];
+}
+#endif
 
 #endif
-/* Multiply the element by a factor, given less 1, in compensated arithmetic. */
-static void phi_turn_by(phi_solver *s, const double factor[PHI_ELEMENT])
+#if PHI_RATE_OF_GAUGE
+/* Multiply the element by a factor of a step, in compensated arithmetic, and from the other side by one that is the same for
+   all steps: in the frame where momenta are constant, the Casimirs that are taken from H turn uniformly. Both are given less
+   1; the other may be NULL. */
+static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT], const double *aside)
+#else
+/* Multiply the element by a factor of a step, given less 1, in compensated arithmetic. */
+static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT])
+#endif
 {
-    double change[PHI_ELEMENT];
-    phi_added(s->turned, factor, change);
+    double change[PHI_ELEMENT], element[PHI_ELEMENT], carry[PHI_ELEMENT];
+    memcpy(element, s->turned, sizeof element);
+    memcpy(carry, s->turned_carry, sizeof carry);
+#if PHI_NORMALISE
+    phi_normalise(element, factor);
+#endif
+#if PHI_RATE_OF_GAUGE
+    if (aside != NULL) {
+        phi_added_aside(s->turned, aside, change);
+        for (int i = 0; i < PHI_ELEMENT; ++i) element[i] += change[i];
+        for (int i = 0; i < PHI_ELEMENT; ++i) carry[i] += change[i];
+    }
+#endif
+    phi_added(element, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) {
-        const double moved = change[i] + s->turned_carry[i], sum = s->turned[i] + moved, added = sum - s->turned[i];
-        s->turned_carry[i] = (s->turned[i] - (sum - added)) + (moved - added);
+        const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
+        s->turned_carry[i] = moved - (sum - s->turned[i]);
         s->turned[i] = sum;
     }
-#if PHI_NORMALISE
-    phi_normalise(s->turned, s->turned_carry);
+}
+
+#if PHI_RATE_OF_GAUGE
+/* What these Casimirs turn in one step, and in a block of steps. */
+static void phi_set_aside(phi_solver *s)
+{
+    phi_uniform(s->rate, s->h, s->aside);
+#if PHI_BLOCKS
+    phi_uniform(s->rate, PHI_AHEAD * s->h, s->aside_of_block);
 #endif
 }
 
+#endif
 #if PHI_IMPLICIT
-/* The element of a stage that was solved by y. */
-static inline void phi_turn_stage(phi_solver *s PHI_AND_INT_STAGE, const double y[PHI_DIM])
+/* The element, less 1, of a stage that was solved by y. */
+static inline void phi_factor(const phi_solver *s PHI_AND_INT_STAGE, const double y[PHI_DIM], double factor[PHI_ELEMENT])
 {
-    double factor[PHI_ELEMENT];
 #if PHI_TURNED_BY_COVECTOR
     double p[PHI_COVECTOR];
     phi_turn(PHI_OF(s->coef, stage), y, p);
@@ -215,7 +295,6 @@ static inline void phi_turn_stage(phi_solver *s PHI_AND_INT_STAGE, const double 
 #else
     phi_turn(PHI_OF(s->coef, stage), y, factor);
 #endif
-    phi_turn_by(s, factor);
 }
 
 #endif
@@ -241,77 +320,63 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = (first[i] + second[i]) + change[i];
 }
 
-/* Multiply by the elements of many stages in turn. */
+/* Multiply by the elements of the stages of a block in turn. */
 static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int count)
 {
     for (; count % 2 == 0; count /= 2) /* neighbours first: their products do not wait for one another */
         for (int k = 0; k < count / 2; ++k) phi_joined(sequence[2 * k], sequence[2 * k + 1], sequence[k]);
+#if PHI_RATE_OF_GAUGE
+    for (int k = 0; k < count; ++k) phi_turn_by(s, sequence[k], k == 0 ? s->aside_of_block : NULL);
+#else
     for (int k = 0; k < count; ++k) phi_turn_by(s, sequence[k]);
+#endif
 }
 
 #endif
-/* The attitude proper: the first, then what the Casimirs that were taken from H have turned it by, which in the frame where
-   momenta are constant is a uniform motion, then the product of the elements of all steps. */
+/* The attitude proper. */
 static void phi_read_attitude(phi_solver *s)
 {
-    double found[PHI_ELEMENT], element[PHI_ELEMENT];
-#if PHI_TURNS_ASIDE
-    const double half = 0.5 * (s->t - s->attitude_from) * s->speed, c = cos(half), sine = sin(half);
-    for (int i = 0; i < 4; ++i) element[i] = c * s->first[i] + sine * s->aside[i];
-#elif PHI_RATE_OF_GAUGE
-    double uniform[PHI_ELEMENT];
-    phi_uniform(s->rate, s->t - s->attitude_from, uniform);
-#if PHI_SPATIAL
-    phi_product(uniform, s->first, element);
+#if PHI_MATRICES && PHI_SPATIAL
+    phi_matrix_product(s->turned, s->first, s->attitude);
+#elif PHI_MATRICES
+    phi_matrix_product(s->first, s->turned, s->attitude);
 #else
-    phi_product(s->first, uniform, element);
+    memcpy(s->attitude, s->turned, sizeof s->attitude);
 #endif
-#else
-    memcpy(element, s->first, sizeof element);
-#endif
-#if PHI_SPATIAL
-    phi_product(s->turned, element, found);
-#else
-    phi_product(element, s->turned, found);
-#endif
-    memcpy(s->attitude, found, sizeof s->attitude);
 #if PHI_POSITION
-    memcpy(s->position, found + 4, sizeof s->position);
+    memcpy(s->position, s->turned + 4, sizeof s->position);
 #endif
 }
 
+#if PHI_RATE_OF_GAUGE
+/* Where x or the attitude has been set: the rate at which the Casimirs that are taken from H turn from here on. */
+static void phi_take_rate(phi_solver *s)
+{
+#if PHI_GAUGE
+    phi_rate(&s->params, s->gauge, s->x, s->rate);
+#else
+    phi_rate(&s->params, s->x, s->rate);
+#endif
+#if !PHI_MATRICES
+    phi_carry_rate(s->turned, s->rate);
+#endif
+    phi_set_aside(s);
+}
+
+#endif
 /* Begin at an element, where x is now. */
 static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
 {
-    memcpy(s->first, first, sizeof s->first);
-    memset(s->turned, 0, sizeof s->turned);
     memset(s->turned_carry, 0, sizeof s->turned_carry);
 #if PHI_MATRICES
+    memmove(s->first, first, sizeof s->first);
+    memset(s->turned, 0, sizeof s->turned);
     for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) s->turned[i] = 1.0;
 #else
-    s->turned[0] = 1.0;
-#endif
-#if PHI_TURNS_ASIDE
-    double rate[PHI_RATE], axis[4] = { 0.0 };
-#elif PHI_RATE_OF_GAUGE
-    double *rate = s->rate;
-#endif
-#if PHI_RATE_OF_GAUGE && PHI_GAUGE
-    phi_rate(&s->params, s->gauge, s->x, rate);
-#elif PHI_RATE_OF_GAUGE
-    phi_rate(&s->params, s->x, rate);
-#endif
-#if PHI_TURNS_ASIDE
-    s->speed = sqrt(rate[0] * rate[0] + (rate[1] * rate[1] + rate[2] * rate[2]));
-    for (int i = 0; i < 3 && s->speed > 0.0; ++i) axis[i + 1] = rate[i] / s->speed;
-#if PHI_SPATIAL
-    phi_product(axis, s->first, s->aside);
-#else
-    phi_product(s->first, axis, s->aside);
-#endif
+    memcpy(s->turned, first, sizeof s->turned);
 #endif
 #if PHI_RATE_OF_GAUGE
-    s->attitude_from = s->t;
+    phi_take_rate(s);
 #endif
     phi_read_attitude(s);
 }

@@ -72,9 +72,6 @@ static phi_status phi_stages(phi_solver *s)
     if (!(moved[PHI_TIME] * s->h > 0.0)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
     phi_pass(s, moved[PHI_TIME]);
-#if PHI_LENGTHENED
-    phi_shorten(element);
-#endif
 #if PHI_ATTITUDE
     phi_turn_by(s, element);
 #endif
@@ -106,10 +103,9 @@ static phi_status phi_stages(phi_solver *s)
     ++s->evaluations;
     if (!phi_finite(x, PHI_DIM)) return PHI_NOT_FINITE;
     phi_settle(s->x, s->carry, moved);
-#if PHI_LENGTHENED
-    phi_shorten(element);
-#endif
-#if PHI_ATTITUDE
+#if PHI_RATE_OF_GAUGE
+    phi_turn_by(s, element, s->aside);
+#elif PHI_ATTITUDE
     phi_turn_by(s, element);
 #endif
     return PHI_OK;

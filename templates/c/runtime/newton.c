@@ -72,6 +72,10 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
         const int stalled = previous < PHI_NEARLY_SOLVED && size > PHI_SHRINKING * previous;
         previous = size;
         if (!(remaining <= PHI_TOLERANCE || stalled)) continue;
+#if PHI_ATTITUDE
+        double factor[PHI_ELEMENT]; /* made here, while what follows is computed beside it */
+        phi_factor(s PHI_AND_STAGE, y, factor);
+#endif
         double small[PHI_DIM] = { 0.0 }; /* the correction of the increment, and the carry */
         for (int i = 0; i < PHI_DIM; ++i)
             for (int j = 0; j < PHI_DIM; ++j) small[i] -= slope[i * PHI_DIM + j] * delta[j];
@@ -91,8 +95,10 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 #elif PHI_GUESSED
         phi_remember(&PHI_OF(s->history, stage), y);
 #endif
-#if PHI_ATTITUDE
-        phi_turn_stage(s PHI_AND_STAGE, y);
+#if PHI_RATE_OF_GAUGE
+        phi_turn_by(s, factor, PHI_AT_FIRST(s->aside));
+#elif PHI_ATTITUDE
+        phi_turn_by(s, factor);
 #endif
         return PHI_OK;
     }

@@ -167,7 +167,13 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
             phi_remember(&PHI_OF(s->history, stage), y);
 #endif
 #if PHI_ATTITUDE
-            phi_turn_stage(s PHI_AND_STAGE, y);
+            double factor[PHI_ELEMENT];
+            phi_factor(s PHI_AND_STAGE, y, factor);
+#if PHI_RATE_OF_GAUGE
+            phi_turn_by(s, factor, PHI_AT_FIRST(s->aside));
+#else
+            phi_turn_by(s, factor);
+#endif
 #endif
             return PHI_OK;
         }

@@ -65,18 +65,6 @@ static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
 }
 
 #endif
-#if PHI_RATE_OF_GAUGE
-/* The gauge turns the body at another rate from here on. */
-static void phi_take_rate(phi_solver *s)
-{
-#if PHI_POSITION
-    phi_set_attitude(s, s->attitude, s->position);
-#else
-    phi_set_attitude(s, s->attitude);
-#endif
-}
-
-#endif
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 {
     if (s == NULL || x == NULL || !phi_finite(x, PHI_DIM)) return PHI_BAD_ARGUMENT;
@@ -100,7 +88,9 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
-#if PHI_RATE_OF_GAUGE
+#if PHI_RATE_OF_GAUGE && PHI_MATRICES
+    phi_begin_attitude(s, s->attitude);
+#elif PHI_RATE_OF_GAUGE
     phi_take_rate(s);
 #endif
     return PHI_OK;
@@ -127,7 +117,9 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];
 #endif
-#if PHI_RATE_OF_GAUGE
+#if PHI_RATE_OF_GAUGE && PHI_MATRICES
+    phi_begin_attitude(s, s->attitude);
+#elif PHI_RATE_OF_GAUGE
     phi_take_rate(s);
 #endif
     return PHI_OK;

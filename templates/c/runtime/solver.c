@@ -220,6 +220,9 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
         s->blocks.passes_without_recurrences = INT_MAX;
 #endif
         s->h = h;
+#if PHI_RATE_OF_GAUGE
+        phi_set_aside(s);
+#endif
 #if !PHI_MONITOR
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;

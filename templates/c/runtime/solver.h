@@ -87,15 +87,16 @@ typedef struct {
 #if PHI_POSITION
     double position[3]; /* of the body, in space */
 #endif
+#if PHI_MATRICES
     double first[PHI_ELEMENT]; /* where the attitude began */
-    double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT]; /* the product of what steps turned it by; what rounding took */
-#if PHI_TURNS_ASIDE
-    double speed, aside[4]; /* of turning by the Casimirs that are taken from H; first, turned by pi about that axis */
-#elif PHI_RATE_OF_GAUGE
-    double rate[PHI_RATE]; /* the gradient of the Casimirs that are taken from H: the body turns by them too */
 #endif
+    double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT]; /* the product of what steps turned by; what rounding took */
 #if PHI_RATE_OF_GAUGE
-    double attitude_from; /* the time when the attitude began */
+    double rate[PHI_RATE]; /* the gradient of the Casimirs that are taken from H: the body turns by them too */
+    double aside[PHI_ELEMENT]; /* what it turns by so in a step, less 1 */
+#endif
+#if PHI_RATE_OF_GAUGE && PHI_BLOCKS
+    double aside_of_block[PHI_ELEMENT]; /* the same in a block of steps */
 #endif
 #endif
 #if !PHI_MONITOR

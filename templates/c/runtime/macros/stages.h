@@ -14,6 +14,7 @@
 #define PHI_ROW_OF(pointer, stage) pointer + stage * PHI_ROW
 #define PHI_ALL_STAGES(number) PHI_STAGES * number
 #define PHI_FRACTION(h) phi_fractions[stage] * h
+#define PHI_AT_FIRST(pointer) stage == 0 ? pointer : NULL
 #else
 #define PHI_EACH_STAGE
 #define PHI_EACH_STAGE_BACK
@@ -26,5 +27,6 @@
 #define PHI_ROW_OF(pointer, stage) pointer
 #define PHI_ALL_STAGES(number) number
 #define PHI_FRACTION(h) h
+#define PHI_AT_FIRST(pointer) pointer
 #endif
 #endif
