@@ -224,7 +224,7 @@ static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t le
     }
     if (!phi_all_hold(s, s->x)) return PHI_NOT_FINITE;
     for (size_t f = 0; f < PHI_DIM; ++f)
-        if (g->leg > 1 && !phi_differ_by(s, s->x[f], began[f], PHI_ASTRAY * largest)) g->lost = 1;
+        if (g->leg > 1 && !phi_differ_by(s, s->x[f], began[f], PHI_UNLIKE * largest)) g->lost = 1;
     phi_copy(s->x, began, s);
     return g->lost ? PHI_NOT_FINITE : PHI_OK;
 }

@@ -1,5 +1,6 @@
 #ifndef PHI_FILE_LATTICE_TRAIL
 #define PHI_FILE_LATTICE_TRAIL
+#include <float.h>
 #include <stdint.h>
 #include <string.h>
 
@@ -90,7 +91,7 @@ static size_t phi_state_size(const phi_solver *s)
 /* Sweeps are undone on the way back, leg by leg: the state that a leg begins with is kept, so what rounding adds is left behind there.
    Where it has added much, as where fields grow fast, all is done once more with legs of one step. They are counted from
    where the run began: segments change no bit. */
-#define PHI_ASTRAY 1e-13 /* of the largest value of all fields */
+#define PHI_UNLIKE (450.0 * DBL_EPSILON) /* of the largest value of all fields, 1e-13 in double precision */
 
 /* The legs that steps from the beginning of one take. */
 static size_t phi_legs(size_t steps, size_t leg) { return steps / leg + (steps % leg > 0); }
