@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from support import compile_text, javascript, solver
 
 from phigen.proofs import attitude as proofs
+from phigen.runtime.interface import BackendError
 from phigen.symbolic.verdict import PROVED
 
 BODY = """coordinates: [x, y, z]
@@ -108,6 +109,16 @@ def test_c_and_javascript_agree_with_numpy(case):
     if "shaken" not in case:  # of these the increments are given
         found = javascript(made(case), f"x0: {START}", f"s.integrate({SPAN / 16}, 16)", "[...s.x, ...s.attitude]")
         assert found == pytest.approx(expected, abs=1e-13)
+
+
+def test_the_attitude_is_that_of_the_state_where_an_increment_is_refused():
+    backend, h = solver(made("shaken"), "c").backend, 0.1
+    given = np.array([[0.1, -0.2], [0.3, np.nan]])
+    stopped, whole = backend.start(np.array(START), {}), backend.start(np.array(START), {})
+    whole.advance_along(h, given[:1])
+    with pytest.raises(BackendError, match="BAD_ARGUMENT"):
+        stopped.advance_along(h, given)
+    assert (stopped.steps, [*stopped.state(), *stopped.element()]) == (1, [*whole.state(), *whole.element()])
 
 
 @pytest.mark.parametrize("target", ["c", "numpy"])

@@ -229,8 +229,15 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #endif
     }
     for (; steps > 0; --steps) {
-#if PHI_NOISE
+#if PHI_NOISE && PHI_ATTITUDE
+        if (!phi_draw(s, dw)) {
+            phi_read_attitude(s);
+            return PHI_BAD_ARGUMENT;
+        }
+#elif PHI_NOISE
         if (!phi_draw(s, dw)) return PHI_BAD_ARGUMENT;
+#endif
+#if PHI_NOISE
         if (dw != NULL) dw += PHI_DRAWS;
 #endif
 #if PHI_RENEWED
