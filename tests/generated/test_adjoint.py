@@ -191,6 +191,20 @@ def test_gradient_agrees_with_many_digits(kind):
         assert max(abs(found[name] - by[name]) for name in by) <= 1e-14 * max(map(abs, by.values()))
 
 
+def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
+    """Their zeros are not stored: a chain of seven species."""
+    rows = [[(j - i) if abs(i - j) == 1 else 0 for j in range(7)] for i in range(7)]
+    names = [f"x{k}" for k in range(7)]
+    text = f"coordinates: [{', '.join(names)}]\nparameters: {{r: 1.1}}\npoisson: {{log_canonical: {rows}}}\n"
+    text += f"hamiltonian: r*x0 + {' + '.join(names[1:])}\norder: 2\nadjoint: true\n"
+    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"))
+    assert made.program.step.factors
+    x, bar = 1 + 0.3 * np.arange(7) % 1.1, weights(7)
+    ours, theirs = (solver(made, target).pullback(x, 0.1, 21, bar, r=1.2) for target in ("c", "numpy"))
+    assert ours.x0_bar == pytest.approx(theirs.x0_bar, rel=1e-13)
+    assert ours.parameters_bar["r"] == pytest.approx(theirs.parameters_bar["r"], rel=1e-12)
+
+
 @pytest.mark.parametrize("target", TARGETS)
 def test_long_runs_are_pulled_back_in_segments(target, monkeypatch):
     made = solver(compilation("newton"), target)
