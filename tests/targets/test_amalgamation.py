@@ -105,7 +105,10 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
         text = run([tool("gcc"), "-E", "-P", "-nostdinc", "-I", "none", *switches, file], tmp_path)
         return re.findall(r"\w+|[^\w\s{}]", re.sub("^#.*$", "", text, flags=re.MULTILINE))
 
-    assert tokens("made.c") == tokens(code)
+    found = tokens("made.c")
+    assert found == tokens(code)
+    assert made.switches["COMPOSED"] or not {"stage", f"{made.name}_STAGES"} & set(found)
+    assert made.switches.get("HALO", True) or f"{made.name}_LEAD" not in found
 
 
 def test_every_macro_of_the_runtime_is_used():

@@ -1,7 +1,8 @@
 #ifndef PHI_FILE_STAGES
 #define PHI_FILE_STAGES
 /* What code says of the stages of a step. With one stage it has no loop over them, no array of one, and no argument that
-   says which. */
+   says which: PHI_OF is a place in an array, and with PHI_STAGES its declaration; PHI_IN and PHI_TO go from a pointer to the
+   first of several structs, which PHI_ADDRESS makes of their array. */
 #if PHI_COMPOSED
 #define PHI_EACH_STAGE for (int stage = 0; stage < PHI_STAGES; ++stage)
 #define PHI_EACH_STAGE_BACK for (int stage = PHI_STAGES - 1; stage >= 0; --stage)
