@@ -17,7 +17,7 @@ typedef struct {
 #if PHI_SERIES
     double *const *start, *const *out; /* where a stage starts, and where what is computed goes; x is y there */
 #endif
-#if PHI_SERIES || PHI_TANGENT
+#if PHI_SERIES && PHI_SLOPES || PHI_TANGENT
     double *const *varied;        /* a variation of x */
 #endif
 #if PHI_ADJOINT
