@@ -24,7 +24,7 @@ from phigen.lanes.functions import (
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
+from phigen.scheme.steps import VARIED, Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import SPECIAL
 
@@ -164,6 +164,9 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     seen = {kernel.name for gather in gathers for kernel in gather.kernels}
     looped = [kernel for kernel in step.kernels if kernel is not step.prepare and kernel.name not in seen]
     if program.profile == "small":
+        if not (program.extras.tangent or step.adjoint):  # variations are differences of sweeps there
+            along = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
+            looped = [kernel for kernel in looped if kernel.name not in {*VARIED, *along}]
         return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
     called = operations(swept) & _called_in_forms(step)
     near = tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()

@@ -174,6 +174,15 @@ def test_functions_of_lanes_are_there_if_loops_over_sites_call_them(adjoint: str
     assert [name for name in names if text.count(f"{name}(") > 1] == names == called
 
 
+@pytest.mark.parametrize("graph", [False, True])
+def test_short_code_has_no_functions_of_derivatives_that_are_differences(graph: bool) -> None:
+    text = f"phigen: 1\nname: ripple\nprofile: small\n{CANONICAL}"
+    text += "lattice: {graph: g}\nhamiltonian: {sites: p**2/2, bonds: 'cos(q[a] - q[b])'}\n" if graph else ""
+    text += "" if graph else "lattice: {axes: [i]}\nhamiltonian: 'p**2/2 - cos(q[i+1] - q)'\n"
+    code = emit(compile_spec(specs.loads(text)).program, "c", "phigen")["ripple.c"]
+    assert re.findall(r"^static inline double (\w+)_lane\(", code, re.M) == ["ripple_sin"] * (not graph)
+
+
 @pytest.mark.parametrize("name", ["ring", "net"])
 def test_short_code_makes_the_same_steps(name: str) -> None:
     x, more = start(name, (30,)), bonds(name, 30)

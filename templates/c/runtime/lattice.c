@@ -394,9 +394,10 @@ phi_status phi_passed(phi_solver *s, double h, size_t steps)
     const phi_status status = phi_set_step(s, h);
     if (status != PHI_OK || steps < s->steps_before_h) return PHI_BAD_ARGUMENT;
     s->steps = steps;
-    s->t = s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
 #if PHI_TIMED
-    s->now = s->t;
+    s->t = s->now = phi_time_after(s, steps);
+#else
+    s->t = s->t_before_h + (double)(steps - s->steps_before_h) * s->h;
 #endif
     return PHI_OK;
 }
