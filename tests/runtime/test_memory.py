@@ -93,8 +93,6 @@ TAKING = [
     ("the states of 9 members", "c", 8, 18, lambda solver, x: solver.ensemble(x, np.full(9, 0.05), 1)),
     ("2 frames of 9 members", "c", 17, 18, alike),
     ("501 frames", "numpy", 500, 1046, back),
-    ("what is kept of steps to go back", "c", 680, 681, back),
-    ("what is kept of steps to go back", "c", 15, 16, lambda solver, x: solver.pullback(x, 0.05, 0, x)),
     ("the states that are kept to go back", "numpy", 1045, 1046, back),
 ]
 
@@ -110,6 +108,19 @@ def test_vectors_members_and_ways_back_are_refused_where_they_do_not_fit(
     monkeypatch.setattr(memory, "available", lambda: refused * STATE)
     with pytest.raises(LimitError, match=words):
         call(solver, x)
+
+
+@pytest.mark.parametrize("steps", [0, 1])
+def test_there_is_room_for_one_step_to_go_back_or_it_is_refused(chain, steps, monkeypatch):
+    solver, x = compile(chain, target="c", adjoint=True), np.zeros((2, 12))
+    session = solver.backend.start(x, {})
+    least = session._c.trail_size(session._address, 1)
+    monkeypatch.setattr(memory, "UNASKED", 0)
+    monkeypatch.setattr(memory, "available", lambda: least)
+    solver.pullback(x, 0.05, steps, x)
+    monkeypatch.setattr(memory, "available", lambda: least - 1)
+    with pytest.raises(LimitError, match="what is kept of steps to go back"):
+        solver.pullback(x, 0.05, steps, x)
 
 
 def test_chunks_of_a_sweep_that_are_made_at_a_time_fit_together(chain, monkeypatch, tmp_path):
