@@ -10,6 +10,11 @@
 #include "lattice_back.c"
 
 /* ---- What is kept to go back ---- */
+#if !PHI_SERIES
+/* The sweeps that steps consist of where they are joined: without the last flow, unless that is all. */
+#define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
+
+#endif
 /* What is pulled back through steps, and the memory for it. */
 typedef struct phi_transpose {
     double *bar[PHI_BARS];       /* cotangents of the fields, then of parameters at sites, and at the bonds of each site */

@@ -1,0 +1,148 @@
+#ifndef PHI_FILE_LATTICE_KEEPING
+#define PHI_FILE_LATTICE_KEEPING
+#include <string.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "lattice_trail.c"
+
+/* ---- Fields that are kept ---- */
+/* The sweep of that number in a flow; -1 if there are no more. */
+static int phi_sweep_of(const phi_solver *s, int flow, int number)
+{
+    const int part = phi_flow_parts[flow];
+#if PHI_BY_COLOUR
+#if PHI_TIMED
+    const int last = s->flows;
+#else
+    const int last = s->flows - 1;
+#endif
+    const int found = part == 0 ? 0 : part == 2 ? last : part == 1 ? 1 + number : last - 1 - number;
+    return (part == 0 || part == 2) && number > 0 ? -1 : part % 2 == 1 && (found < 1 || found >= last) ? -1 : found;
+#else
+    (void)s;
+    return number == 0 ? part : -1;
+#endif
+}
+
+/* The part of H that a sweep belongs to, from 0 on. */
+static int phi_part_of(const phi_solver *s, int sweep)
+{
+#if PHI_BY_COLOUR
+    int part = 0;
+    for (int own; sweep >= (own = phi_by_colour[part] ? s->colour_count : 1); ++part) sweep -= own;
+    return part;
+#else
+    (void)s;
+    return sweep - 1;
+#endif
+}
+
+/* The numbers that a step keeps. */
+static size_t phi_numbers_kept(const phi_solver *s)
+{
+    size_t fields = 0;
+    for (int flow = 0; flow < PHI_OWN_FLOWS; ++flow)
+        for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)
+            for (int f = 0; f < PHI_DIM; ++f) fields += phi_keeps[phi_part_of(s, sweep)][f];
+    return (fields > 0 ? fields : 1) * phi_block(s->rows, s->width);
+}
+
+/* Keep the fields that a sweep will change, and that anything reads on the way back; returns where the next ones are kept. */
+static double *phi_keep(const phi_solver *s, int sweep, double *to)
+{
+    size_t first, end = phi_share(phi_units(s), &first);
+    for (int f = 0; f < PHI_DIM; ++f) {
+        if (!phi_keeps[phi_part_of(s, sweep)][f]) continue;
+        phi_keep_units(s, PHI_MEMORY_OF(s->x[f]), to, first, end);
+        to += phi_block(s->rows, s->width);
+    }
+    return to;
+}
+
+/* The same as phi_steps, but for none; what flows change is kept in s->kept. */
+static void phi_keep_steps(const phi_solver *s, size_t steps)
+{
+    const size_t of_step = phi_numbers_kept(s);
+    PHI_PARALLEL
+    for (size_t step = 0; step < steps; ++step) {
+        double *kept = s->kept + step * of_step;
+        for (int number = 0; number < PHI_OWN_FLOWS; ++number) {
+            const int own = PHI_FLOWS > 1 && number == 0 && (step > 0 || s->open) ? PHI_FLOWS : number;
+            phi_flow flow;
+            phi_find_flow(s, s->steps + step, own, &flow);
+            for (int k = 0, sweep; (sweep = phi_sweep_of(s, own, k)) >= 0; ++k) {
+                kept = phi_keep(s, sweep, kept);
+#if PHI_BY_COLOUR
+                phi_sweep_colour(s, sweep, flow.coef PHI_AND_FAR(s->far > 0));
+#else
+                phi_sweep_part(s, sweep, flow.coef PHI_AND_FAR(s->far > 0));
+#endif
+            }
+        }
+    }
+}
+
+/* Pull cotangents back through one sweep, x being the fields before it. */
+static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int sweep, const double *coef, int row,
+    double *const *x, double *const *bar)
+{
+    size_t first, end = phi_share(phi_units(s), &first);
+    phi_back_rows(s, sweep, coef PHI_AND_FAR(g->far), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+#if PHI_HANDS
+    if (!phi_hands[phi_part_of(s, sweep)]) return;
+    phi_wait();
+#if PHI_GATHER
+    phi_hand_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+#else
+    phi_hand_rows(s, sweep, x, bar, g->handed, first, end);
+#endif
+    phi_wait();
+#endif
+}
+
+/* Pull cotangents back through a flow in a step after so many; of its sweeps kept has the fields that they change, and
+   ends with them; x becomes the fields before it. Returns where what was kept before begins. */
+static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t steps, int number,
+    double *kept, double **x, double *const *bar)
+{
+    phi_flow flow;
+    phi_find_flow(s, steps, number, &flow);
+    int last = 0;
+    while (phi_sweep_of(s, number, last) >= 0) ++last;
+    while (last-- > 0) {
+        const int sweep = phi_sweep_of(s, number, last);
+        for (int f = PHI_DIM - 1; f >= 0; --f)
+            if (kept != NULL && phi_keeps[phi_part_of(s, sweep)][f]) {
+                kept -= g->block;
+                x[f] = PHI_FIRST_SITE(kept);
+            }
+        phi_sweep_back(s, g, sweep, flow.coef, number, x, bar);
+    }
+    return kept;
+}
+
+/* Pull the cotangents of all sweeps of the step after so many back, from where its sweeps have kept what they changed. */
+static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int joined, double *kept)
+{
+    PHI_PARALLEL
+    {
+        double *x[PHI_ARRAYS];
+        double *left = kept + g->of_step;
+        memcpy(x, g->x, sizeof x);
+        for (int flow = PHI_OWN_FLOWS - 1; flow >= 0; --flow)
+            left = phi_flow_back(s, g, steps, flow == 0 && joined ? PHI_FLOWS : flow, left, x, g->bar);
+    }
+    double *left = kept; /* what the step began with */
+    int seen[PHI_DIM] = { 0 };
+    for (int flow = 0; flow < PHI_OWN_FLOWS; ++flow)
+        for (int k = 0, sweep; (sweep = phi_sweep_of(s, flow, k)) >= 0; ++k)
+            for (int f = 0; f < PHI_DIM; ++f) {
+                if (!phi_keeps[phi_part_of(s, sweep)][f]) continue;
+                if (!seen[f]) g->x[f] = PHI_FIRST_SITE(left);
+                seen[f] = 1;
+                left += g->block;
+            }
+}
+#endif

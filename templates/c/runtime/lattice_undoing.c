@@ -1,0 +1,126 @@
+#ifndef PHI_FILE_LATTICE_UNDOING
+#define PHI_FILE_LATTICE_UNDOING
+#include <math.h>
+
+#include "lattice.h"
+#include "model.h"
+#include "rows.c"
+#include "lattice_trail.c"
+
+/* ---- Flows that are undone ---- */
+/* Pull cotangents back through a flow, and undo it, or hand what that has found, at pieces of rows. */
+static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end)
+{
+    const phi_transpose *g = flow->g;
+#if PHI_HANDS
+    if (flow->go > 1) phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
+    else phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+#else
+    phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+#endif
+}
+
+/* Go back through some flows, the last first; all threads come here at once. */
+static void phi_go_all_back(const phi_solver *s, const phi_flow *flows, size_t count)
+{
+#if PHI_WAVES
+    if (count > 1) {
+        phi_make_wave(s, flows, count);
+        return;
+    }
+#endif
+    size_t first, end = phi_share(phi_units(s), &first);
+    for (size_t k = 0; k < count; ++k) {
+        phi_go_back(s, flows + k, first, end);
+        phi_wait();
+    }
+}
+
+#if !PHI_WAVES
+enum { PHI_DEEPEST = 1 }; /* flows at once */
+#endif
+
+/* The way back through a flow of the step after so many, by its number, for those cotangents. */
+static void phi_find_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar, phi_flow *flow)
+{
+    phi_find_flow(s, step, number, flow);
+    flow->go = 1;
+    flow->row = number;
+    flow->g = g;
+    flow->bar = bar;
+}
+
+/* Pull cotangents back through so many steps, joined, after so many, and undo them: s->x becomes the fields before. */
+static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t before, size_t steps)
+{
+#if PHI_WAVES
+    const size_t depth = phi_depth(s);
+#else
+    const size_t depth = 1;
+#endif
+    phi_flow flows[PHI_DEEPEST];
+    size_t count = 0;
+    for (size_t left = steps * PHI_OWN_FLOWS; left-- > 0;) {
+        const size_t step = before + left / PHI_OWN_FLOWS;
+        const int flow = (int)(left % PHI_OWN_FLOWS), number = flow == 0 && step > g->first_step ? PHI_FLOWS : flow;
+        for (int go = 1, last = 1; go <= last; ++go) {
+            phi_flow *next = flows + count++;
+            phi_find_back(s, g, step, number, g->bar, next);
+            next->go = go;
+            last = 1 + phi_hands[next->part - 1];
+            if (count < depth) continue;
+            phi_go_all_back(s, flows, count);
+            count = 0;
+        }
+    }
+    phi_go_all_back(s, flows, count);
+}
+
+/* The state that a leg of a segment begins with. */
+static void phi_fields_of_leg(const phi_transpose *g, size_t leg, double *fields[PHI_DIM])
+{
+    for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->kept + (leg * PHI_DIM + f) * g->block);
+}
+
+/* The largest value of a field, in an order that lets loops vectorise. */
+static double phi_largest_of(const phi_solver *s, const double *field)
+{
+    double lanes[8] = { 0.0 };
+    const ptrdiff_t whole = s->length - s->length % 8;
+    PHI_EACH_ROW {
+        const double *row = PHI_ROW_AT(field);
+        for (ptrdiff_t i = 0; i < whole; i += 8)
+            for (int l = 0; l < 8; ++l) lanes[l] = fabs(row[i + l]) > lanes[l] ? fabs(row[i + l]) : lanes[l];
+        for (ptrdiff_t i = whole; i < s->length; ++i) lanes[0] = fabs(row[i]) > lanes[0] ? fabs(row[i]) : lanes[0];
+    }
+    for (int l = 1; l < 8; ++l) lanes[0] = lanes[l] > lanes[0] ? lanes[l] : lanes[0];
+    return lanes[0];
+}
+
+/* Whether two fields differ by so little. */
+static int phi_differ_by(const phi_solver *s, const double *one, const double *other, double most)
+{
+    int near = 1;
+    PHI_EACH_ROW {
+        const double *first = PHI_ROW_AT(one), *second = PHI_ROW_AT(other);
+        for (ptrdiff_t i = 0; i < s->length; ++i) near &= fabs(first[i] - second[i]) <= most;
+    }
+    return near;
+}
+
+/* Stand where a leg began, of which all steps have been undone, unless that is another state. */
+static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t leg)
+{
+    double *began[PHI_DIM], largest = 0.0;
+    phi_fields_of_leg(g, leg, began);
+    for (size_t f = 0; f < PHI_DIM; ++f) {
+        const double size = phi_largest_of(s, began[f]);
+        largest = size > largest ? size : largest;
+    }
+    if (!phi_all_hold(s, s->x)) return PHI_NOT_FINITE;
+    for (size_t f = 0; f < PHI_DIM; ++f)
+        if (g->leg > 1 && !phi_differ_by(s, s->x[f], began[f], PHI_UNLIKE * largest)) g->lost = 1;
+    phi_copy(s->x, began, s);
+    return g->lost ? PHI_NOT_FINITE : PHI_OK;
+}
+#endif
