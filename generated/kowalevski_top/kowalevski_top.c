@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 7ca954780e9a7a4fc951673b56255a687e060ecb934d9e26e1d3024d5f44ab7e
+ * body-sha256: 0727e8716c8cfa2c2d4b484ab764f0a8d95d835d94681a7cd2dfb16bd11ae866
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -2629,7 +2629,6 @@ static void kowalevski_top_evaluate_lanes(kowalevski_top_lanes coef[restrict 172
 typedef struct {
     kowalevski_top_lanes y[kowalevski_top_DIM], displacement[kowalevski_top_DIM],
         increment[kowalevski_top_DIM], residual[kowalevski_top_DIM];
-    kowalevski_top_lanes unit[kowalevski_top_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     kowalevski_top_lanes inverse[kowalevski_top_DIM * kowalevski_top_DIM],
         gain[kowalevski_top_DIM * kowalevski_top_DIM];
@@ -2637,30 +2636,36 @@ typedef struct {
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
    kowalevski_top_size. */
-static void kowalevski_top_measure(kowalevski_top_model *model)
+static void kowalevski_top_measure(const kowalevski_top_model *model,
+    kowalevski_top_lanes unit[restrict kowalevski_top_DIM])
 {
     kowalevski_top_lanes norm = { 0.0 };
-    for (int i = 0; i < kowalevski_top_DIM; ++i)
+    for (int i = 0; i < kowalevski_top_DIM; ++i) {
+        kowalevski_top_EACH_LANE
+        for (int lane = 0; lane < kowalevski_top_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
+        kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            const double least = kowalevski_top_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            const double least = kowalevski_top_FLOOR_OF_LANES * unit[i][lane];
             norm[lane] = least > norm[lane] ? least : norm[lane];
         }
+    }
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
-            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+            unit[i][lane] = 1.0 / (unit[i][lane] + norm[lane] + DBL_MIN);
     }
 }
 
 /* Take a correction from y; its size, summed over the components. */
 static void kowalevski_top_take(kowalevski_top_model *model,
-    kowalevski_top_lanes delta[restrict kowalevski_top_DIM], kowalevski_top_lanes size)
+    kowalevski_top_lanes delta[restrict kowalevski_top_DIM],
+    kowalevski_top_lanes unit[restrict kowalevski_top_DIM], kowalevski_top_lanes size)
 {
     memset(size, 0, kowalevski_top_LANES * sizeof size[0]);
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         kowalevski_top_EACH_LANE
         for (int lane = 0; lane < kowalevski_top_LANES; ++lane) {
-            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            size[lane] += fabs(delta[i][lane]) * unit[i][lane];
             model->y[i][lane] -= delta[i][lane];
         }
     }
@@ -2714,11 +2719,12 @@ static void kowalevski_top_gain(kowalevski_top_model *model,
 }
 
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
-static void kowalevski_top_correct(kowalevski_top_model *model, kowalevski_top_lanes size)
+static void kowalevski_top_correct(kowalevski_top_model *model,
+    kowalevski_top_lanes unit[restrict kowalevski_top_DIM], kowalevski_top_lanes size)
 {
     kowalevski_top_lanes delta[kowalevski_top_DIM];
     kowalevski_top_apply(model->inverse, model->residual, delta);
-    kowalevski_top_take(model, delta, size);
+    kowalevski_top_take(model, delta, unit, size);
 }
 
 /* Corrections below the first go on with the matrices of the last pass. After the square of so small a
@@ -2801,19 +2807,16 @@ static void kowalevski_top_linearise_stage(kowalevski_top_lanes coef[restrict], 
 static void kowalevski_top_update(kowalevski_top_lanes coef[restrict], kowalevski_top_model *model,
     int matrices)
 {
-    if (matrices) {
-        kowalevski_top_linearise_stage(coef, model);
-        kowalevski_top_measure(model);
-    } else {
-        kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-    }
+    if (matrices) kowalevski_top_linearise_stage(coef, model);
+    else kowalevski_top_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. most is the largest correction in each lane. */
-static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevski_top_DIM],
+static void kowalevski_top_chain(kowalevski_top_model *model,
+    kowalevski_top_lanes unit[restrict kowalevski_top_DIM], double x[kowalevski_top_DIM],
     double carry[kowalevski_top_DIM], kowalevski_top_lanes most)
 {
     double residual[kowalevski_top_DIM], sum[kowalevski_top_DIM], small[kowalevski_top_DIM];
@@ -2846,7 +2849,7 @@ static void kowalevski_top_chain(kowalevski_top_model *model, double x[kowalevsk
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    kowalevski_top_correct(model, most);
+    kowalevski_top_correct(model, unit, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -2984,7 +2987,7 @@ static int kowalevski_top_guess(kowalevski_top_solver *s, kowalevski_top_table *
 static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *table, int most)
 {
     kowalevski_top_model model;
-    kowalevski_top_lanes size, before, left;
+    kowalevski_top_lanes unit[kowalevski_top_DIM], size, before, left;
     double x[kowalevski_top_DIM], carry[kowalevski_top_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!kowalevski_top_guess(s, table, &model)) return 0;
@@ -2995,7 +2998,8 @@ static int kowalevski_top_block(kowalevski_top_solver *s, kowalevski_top_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         memcpy(before, size, sizeof before);
-        kowalevski_top_chain(&model, x, carry, size);
+        if (matrices) kowalevski_top_measure(&model, unit);
+        kowalevski_top_chain(&model, unit, x, carry, size);
         s->evaluations += kowalevski_top_LANES;
         kowalevski_top_leave(size, before, left);
         solved = kowalevski_top_largest(left) <= kowalevski_top_TOLERANCE;
@@ -3361,14 +3365,16 @@ static void kowalevski_top_group_predict(kowalevski_top_group *group,
    most allowed, lanes that are not solved leave the group. */
 static int kowalevski_top_group_solve(kowalevski_top_group *group, kowalevski_top_model *model)
 {
-    kowalevski_top_lanes size, before, left;
+    kowalevski_top_lanes unit[kowalevski_top_DIM], size, before, left;
     double largest = HUGE_VAL;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < kowalevski_top_LANES; ++lane) size[lane] = HUGE_VAL;
     kowalevski_top_group_predict(group, model->y);
     for (; open > 0 && iterations < kowalevski_top_MAX_ITERATIONS; ++iterations) {
         memcpy(before, size, sizeof size);
-        kowalevski_top_update(group->coef, model, largest > kowalevski_top_FROZEN);
+        const int matrices = largest > kowalevski_top_FROZEN;
+        kowalevski_top_update(group->coef, model, matrices);
+        if (matrices) kowalevski_top_measure(model, unit);
         for (int i = 0; i < kowalevski_top_DIM; ++i) {
             kowalevski_top_EACH_LANE
             for (int lane = 0; lane < kowalevski_top_LANES; ++lane)
@@ -3376,7 +3382,7 @@ static int kowalevski_top_group_solve(kowalevski_top_group *group, kowalevski_to
                     ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
                         - group->carry[i][lane];
         }
-        kowalevski_top_correct(model, size);
+        kowalevski_top_correct(model, unit, size);
         kowalevski_top_leave(size, before, left);
         open = kowalevski_top_group_open(group, size, left);
         largest = kowalevski_top_largest(size);

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 276e67d238e558f78aafd339757eb331aad96903133cab79ed1c41888541a9c6
+ * body-sha256: 38ad76c4b09378ef5d2cac7fc40cf1ab3bc9e9e7a1aefbaa51633963370efd2d
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -780,7 +780,6 @@ static void lotka_volterra_invert_lanes(lotka_volterra_lanes matrix[restrict 9],
 typedef struct {
     lotka_volterra_lanes y[lotka_volterra_DIM], displacement[lotka_volterra_DIM],
         increment[lotka_volterra_DIM], residual[lotka_volterra_DIM];
-    lotka_volterra_lanes unit[lotka_volterra_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     lotka_volterra_lanes inverse[lotka_volterra_DIM * lotka_volterra_DIM],
         gain[lotka_volterra_DIM * lotka_volterra_DIM];
@@ -788,30 +787,36 @@ typedef struct {
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
    lotka_volterra_size. */
-static void lotka_volterra_measure(lotka_volterra_model *model)
+static void lotka_volterra_measure(const lotka_volterra_model *model,
+    lotka_volterra_lanes unit[restrict lotka_volterra_DIM])
 {
     lotka_volterra_lanes norm = { 0.0 };
-    for (int i = 0; i < lotka_volterra_DIM; ++i)
+    for (int i = 0; i < lotka_volterra_DIM; ++i) {
+        lotka_volterra_EACH_LANE
+        for (int lane = 0; lane < lotka_volterra_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
+        lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            const double least = lotka_volterra_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            const double least = lotka_volterra_FLOOR_OF_LANES * unit[i][lane];
             norm[lane] = least > norm[lane] ? least : norm[lane];
         }
+    }
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
-            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+            unit[i][lane] = 1.0 / (unit[i][lane] + norm[lane] + DBL_MIN);
     }
 }
 
 /* Take a correction from y; its size, summed over the components. */
 static void lotka_volterra_take(lotka_volterra_model *model,
-    lotka_volterra_lanes delta[restrict lotka_volterra_DIM], lotka_volterra_lanes size)
+    lotka_volterra_lanes delta[restrict lotka_volterra_DIM],
+    lotka_volterra_lanes unit[restrict lotka_volterra_DIM], lotka_volterra_lanes size)
 {
     memset(size, 0, lotka_volterra_LANES * sizeof size[0]);
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         lotka_volterra_EACH_LANE
         for (int lane = 0; lane < lotka_volterra_LANES; ++lane) {
-            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            size[lane] += fabs(delta[i][lane]) * unit[i][lane];
             model->y[i][lane] -= delta[i][lane];
         }
     }
@@ -865,11 +870,12 @@ static void lotka_volterra_gain(lotka_volterra_model *model,
 }
 
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
-static void lotka_volterra_correct(lotka_volterra_model *model, lotka_volterra_lanes size)
+static void lotka_volterra_correct(lotka_volterra_model *model,
+    lotka_volterra_lanes unit[restrict lotka_volterra_DIM], lotka_volterra_lanes size)
 {
     lotka_volterra_lanes delta[lotka_volterra_DIM];
     lotka_volterra_apply(model->inverse, model->residual, delta);
-    lotka_volterra_take(model, delta, size);
+    lotka_volterra_take(model, delta, unit, size);
 }
 
 /* Corrections below the first go on with the matrices of the last pass. After the square of so small a
@@ -915,19 +921,16 @@ static void lotka_volterra_linearise_stage(lotka_volterra_lanes coef[restrict], 
 static void lotka_volterra_update(lotka_volterra_lanes coef[restrict], lotka_volterra_model *model,
     int matrices)
 {
-    if (matrices) {
-        lotka_volterra_linearise_stage(coef, model);
-        lotka_volterra_measure(model);
-    } else {
-        lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-    }
+    if (matrices) lotka_volterra_linearise_stage(coef, model);
+    else lotka_volterra_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. most is the largest correction in each lane. */
-static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_volterra_DIM],
+static void lotka_volterra_chain(lotka_volterra_model *model,
+    lotka_volterra_lanes unit[restrict lotka_volterra_DIM], double x[lotka_volterra_DIM],
     double carry[lotka_volterra_DIM], lotka_volterra_lanes most)
 {
     double residual[lotka_volterra_DIM], sum[lotka_volterra_DIM], small[lotka_volterra_DIM];
@@ -960,7 +963,7 @@ static void lotka_volterra_chain(lotka_volterra_model *model, double x[lotka_vol
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    lotka_volterra_correct(model, most);
+    lotka_volterra_correct(model, unit, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1098,7 +1101,7 @@ static int lotka_volterra_guess(lotka_volterra_solver *s, lotka_volterra_table *
 static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *table, int most)
 {
     lotka_volterra_model model;
-    lotka_volterra_lanes size, before, left;
+    lotka_volterra_lanes unit[lotka_volterra_DIM], size, before, left;
     double x[lotka_volterra_DIM], carry[lotka_volterra_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!lotka_volterra_guess(s, table, &model)) return 0;
@@ -1109,7 +1112,8 @@ static int lotka_volterra_block(lotka_volterra_solver *s, lotka_volterra_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         memcpy(before, size, sizeof before);
-        lotka_volterra_chain(&model, x, carry, size);
+        if (matrices) lotka_volterra_measure(&model, unit);
+        lotka_volterra_chain(&model, unit, x, carry, size);
         s->evaluations += lotka_volterra_LANES;
         lotka_volterra_leave(size, before, left);
         solved = lotka_volterra_largest(left) <= lotka_volterra_TOLERANCE;
@@ -1475,14 +1479,16 @@ static void lotka_volterra_group_predict(lotka_volterra_group *group,
    most allowed, lanes that are not solved leave the group. */
 static int lotka_volterra_group_solve(lotka_volterra_group *group, lotka_volterra_model *model)
 {
-    lotka_volterra_lanes size, before, left;
+    lotka_volterra_lanes unit[lotka_volterra_DIM], size, before, left;
     double largest = HUGE_VAL;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < lotka_volterra_LANES; ++lane) size[lane] = HUGE_VAL;
     lotka_volterra_group_predict(group, model->y);
     for (; open > 0 && iterations < lotka_volterra_MAX_ITERATIONS; ++iterations) {
         memcpy(before, size, sizeof size);
-        lotka_volterra_update(group->coef, model, largest > lotka_volterra_FROZEN);
+        const int matrices = largest > lotka_volterra_FROZEN;
+        lotka_volterra_update(group->coef, model, matrices);
+        if (matrices) lotka_volterra_measure(model, unit);
         for (int i = 0; i < lotka_volterra_DIM; ++i) {
             lotka_volterra_EACH_LANE
             for (int lane = 0; lane < lotka_volterra_LANES; ++lane)
@@ -1490,7 +1496,7 @@ static int lotka_volterra_group_solve(lotka_volterra_group *group, lotka_volterr
                     ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
                         - group->carry[i][lane];
         }
-        lotka_volterra_correct(model, size);
+        lotka_volterra_correct(model, unit, size);
         lotka_volterra_leave(size, before, left);
         open = lotka_volterra_group_open(group, size, left);
         largest = lotka_volterra_largest(size);

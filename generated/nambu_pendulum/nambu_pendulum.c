@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 0a098811ad6cc691eaade822b05e3ff4a55f401c85a7e0c1b5a7ce9a5cfe3f12
+ * body-sha256: b83ebcb1a8aaa06267364e5bf3c2af5ac6ac94fc26cadcaa4ace3413c1ecca16
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1094,7 +1094,6 @@ static void nambu_pendulum_invert_lanes(nambu_pendulum_lanes matrix[restrict 9],
 typedef struct {
     nambu_pendulum_lanes y[nambu_pendulum_DIM], displacement[nambu_pendulum_DIM],
         increment[nambu_pendulum_DIM], residual[nambu_pendulum_DIM];
-    nambu_pendulum_lanes unit[nambu_pendulum_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     nambu_pendulum_lanes inverse[nambu_pendulum_DIM * nambu_pendulum_DIM],
         gain[nambu_pendulum_DIM * nambu_pendulum_DIM];
@@ -1106,30 +1105,36 @@ typedef struct {
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
    nambu_pendulum_size. */
-static void nambu_pendulum_measure(nambu_pendulum_model *model)
+static void nambu_pendulum_measure(const nambu_pendulum_model *model,
+    nambu_pendulum_lanes unit[restrict nambu_pendulum_DIM])
 {
     nambu_pendulum_lanes norm = { 0.0 };
-    for (int i = 0; i < nambu_pendulum_DIM; ++i)
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) {
+        nambu_pendulum_EACH_LANE
+        for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
+        nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            const double least = nambu_pendulum_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            const double least = nambu_pendulum_FLOOR_OF_LANES * unit[i][lane];
             norm[lane] = least > norm[lane] ? least : norm[lane];
         }
+    }
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
-            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+            unit[i][lane] = 1.0 / (unit[i][lane] + norm[lane] + DBL_MIN);
     }
 }
 
 /* Take a correction from y; its size, summed over the components. */
 static void nambu_pendulum_take(nambu_pendulum_model *model,
-    nambu_pendulum_lanes delta[restrict nambu_pendulum_DIM], nambu_pendulum_lanes size)
+    nambu_pendulum_lanes delta[restrict nambu_pendulum_DIM],
+    nambu_pendulum_lanes unit[restrict nambu_pendulum_DIM], nambu_pendulum_lanes size)
 {
     memset(size, 0, nambu_pendulum_LANES * sizeof size[0]);
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         nambu_pendulum_EACH_LANE
         for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) {
-            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            size[lane] += fabs(delta[i][lane]) * unit[i][lane];
             model->y[i][lane] -= delta[i][lane];
         }
     }
@@ -1183,11 +1188,12 @@ static void nambu_pendulum_gain(nambu_pendulum_model *model,
 }
 
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
-static void nambu_pendulum_correct(nambu_pendulum_model *model, nambu_pendulum_lanes size)
+static void nambu_pendulum_correct(nambu_pendulum_model *model,
+    nambu_pendulum_lanes unit[restrict nambu_pendulum_DIM], nambu_pendulum_lanes size)
 {
     nambu_pendulum_lanes delta[nambu_pendulum_DIM];
     nambu_pendulum_apply(model->inverse, model->residual, delta);
-    nambu_pendulum_take(model, delta, size);
+    nambu_pendulum_take(model, delta, unit, size);
 }
 
 /* Corrections below the first go on with the matrices of the last pass. After the square of so small a
@@ -1663,10 +1669,7 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
     else nambu_pendulum_begin_at(coef, model->y, model->middle, &e);
     nambu_pendulum_extend(coef, &e, nambu_pendulum_NEGLIGIBLE);
     nambu_pendulum_check_ends(coef, &e, wrong);
-    if (matrices) {
-        nambu_pendulum_linearise_paths(coef, model, &e, hessian);
-        nambu_pendulum_measure(model);
-    }
+    if (matrices) nambu_pendulum_linearise_paths(coef, model, &e, hessian);
     nambu_pendulum_read_ends(model, &e, wrong);
 }
 
@@ -1674,7 +1677,8 @@ static void nambu_pendulum_update(nambu_pendulum_lanes coef[restrict], nambu_pen
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. most is the largest correction in each lane. */
-static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pendulum_DIM],
+static void nambu_pendulum_chain(nambu_pendulum_model *model,
+    nambu_pendulum_lanes unit[restrict nambu_pendulum_DIM], double x[nambu_pendulum_DIM],
     double carry[nambu_pendulum_DIM], nambu_pendulum_lanes most)
 {
     double residual[nambu_pendulum_DIM], sum[nambu_pendulum_DIM], small[nambu_pendulum_DIM];
@@ -1707,7 +1711,7 @@ static void nambu_pendulum_chain(nambu_pendulum_model *model, double x[nambu_pen
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    nambu_pendulum_correct(model, most);
+    nambu_pendulum_correct(model, unit, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1845,7 +1849,7 @@ static int nambu_pendulum_guess(nambu_pendulum_solver *s, nambu_pendulum_table *
 static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *table, int most)
 {
     nambu_pendulum_model model;
-    nambu_pendulum_lanes size, before, left;
+    nambu_pendulum_lanes unit[nambu_pendulum_DIM], size, before, left;
     double x[nambu_pendulum_DIM], carry[nambu_pendulum_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!nambu_pendulum_guess(s, table, &model)) return 0;
@@ -1856,7 +1860,8 @@ static int nambu_pendulum_block(nambu_pendulum_solver *s, nambu_pendulum_table *
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         memcpy(before, size, sizeof before);
-        nambu_pendulum_chain(&model, x, carry, size);
+        if (matrices) nambu_pendulum_measure(&model, unit);
+        nambu_pendulum_chain(&model, unit, x, carry, size);
         s->evaluations += nambu_pendulum_LANES;
         nambu_pendulum_leave(size, before, left);
         solved = nambu_pendulum_largest(left) <= nambu_pendulum_TOLERANCE;
@@ -2222,14 +2227,16 @@ static void nambu_pendulum_group_predict(nambu_pendulum_group *group,
    most allowed, lanes that are not solved leave the group. */
 static int nambu_pendulum_group_solve(nambu_pendulum_group *group, nambu_pendulum_model *model)
 {
-    nambu_pendulum_lanes size, before, left;
+    nambu_pendulum_lanes unit[nambu_pendulum_DIM], size, before, left;
     double largest = HUGE_VAL;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < nambu_pendulum_LANES; ++lane) size[lane] = HUGE_VAL;
     nambu_pendulum_group_predict(group, model->y);
     for (; open > 0 && iterations < nambu_pendulum_MAX_ITERATIONS; ++iterations) {
         memcpy(before, size, sizeof size);
-        nambu_pendulum_update(group->coef, model, largest > nambu_pendulum_FROZEN);
+        const int matrices = largest > nambu_pendulum_FROZEN;
+        nambu_pendulum_update(group->coef, model, matrices);
+        if (matrices) nambu_pendulum_measure(model, unit);
         for (int i = 0; i < nambu_pendulum_DIM; ++i) {
             nambu_pendulum_EACH_LANE
             for (int lane = 0; lane < nambu_pendulum_LANES; ++lane)
@@ -2237,7 +2244,7 @@ static int nambu_pendulum_group_solve(nambu_pendulum_group *group, nambu_pendulu
                     ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
                         - group->carry[i][lane];
         }
-        nambu_pendulum_correct(model, size);
+        nambu_pendulum_correct(model, unit, size);
         nambu_pendulum_leave(size, before, left);
         open = nambu_pendulum_group_open(group, size, left);
         largest = nambu_pendulum_largest(size);

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 5366a9b950c66d73bb0e03ef5a7df78dd4d1d349bd4766917f2507f4833a6f55
+ * body-sha256: 3b11d894a16d5b04f2a341643c0d049adb58da80627dcb06eca8eda661f18da4
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1166,37 +1166,40 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 typedef struct {
     rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
         residual[rigid_body_DIM];
-    rigid_body_lanes unit[rigid_body_DIM]; /* by which corrections of y are measured */
     /* a residual r of alpha(y) = x takes inverse r from y, and gain r from the increment */
     rigid_body_lanes inverse[rigid_body_DIM * rigid_body_DIM], gain[rigid_body_DIM * rigid_body_DIM];
 } rigid_body_model;
 
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in
    rigid_body_size. */
-static void rigid_body_measure(rigid_body_model *model)
+static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM])
 {
     rigid_body_lanes norm = { 0.0 };
-    for (int i = 0; i < rigid_body_DIM; ++i)
+    for (int i = 0; i < rigid_body_DIM; ++i) {
+        rigid_body_EACH_LANE
+        for (int lane = 0; lane < rigid_body_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
+        rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            const double least = rigid_body_FLOOR_OF_LANES * fabs(model->y[i][lane]);
+            const double least = rigid_body_FLOOR_OF_LANES * unit[i][lane];
             norm[lane] = least > norm[lane] ? least : norm[lane];
         }
+    }
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane)
-            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+            unit[i][lane] = 1.0 / (unit[i][lane] + norm[lane] + DBL_MIN);
     }
 }
 
 /* Take a correction from y; its size, summed over the components. */
 static void rigid_body_take(rigid_body_model *model, rigid_body_lanes delta[restrict rigid_body_DIM],
-    rigid_body_lanes size)
+    rigid_body_lanes unit[restrict rigid_body_DIM], rigid_body_lanes size)
 {
     memset(size, 0, rigid_body_LANES * sizeof size[0]);
     for (int i = 0; i < rigid_body_DIM; ++i) {
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            size[lane] += fabs(delta[i][lane]) * unit[i][lane];
             model->y[i][lane] -= delta[i][lane];
         }
     }
@@ -1248,11 +1251,12 @@ static void rigid_body_gain(rigid_body_model *model, rigid_body_lanes residual[r
 }
 
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
-static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes size)
+static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
+    rigid_body_lanes size)
 {
     rigid_body_lanes delta[rigid_body_DIM];
     rigid_body_apply(model->inverse, model->residual, delta);
-    rigid_body_take(model, delta, size);
+    rigid_body_take(model, delta, unit, size);
 }
 
 /* Corrections below the first go on with the matrices of the last pass. After the square of so small a
@@ -1297,20 +1301,16 @@ static void rigid_body_linearise_stage(rigid_body_lanes coef[restrict], rigid_bo
 /* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void rigid_body_update(rigid_body_lanes coef[restrict], rigid_body_model *model, int matrices)
 {
-    if (matrices) {
-        rigid_body_linearise_stage(coef, model);
-        rigid_body_measure(model);
-    } else {
-        rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-    }
+    if (matrices) rigid_body_linearise_stage(coef, model);
+    else rigid_body_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
 /* ---- The residuals of a block ---- */
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its
    carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. most is the largest correction in each lane. */
-static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], double carry[rigid_body_DIM],
-    rigid_body_lanes most)
+static void rigid_body_chain(rigid_body_model *model, rigid_body_lanes unit[restrict rigid_body_DIM],
+    double x[rigid_body_DIM], double carry[rigid_body_DIM], rigid_body_lanes most)
 {
     double residual[rigid_body_DIM], sum[rigid_body_DIM], small[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
@@ -1342,7 +1342,7 @@ static void rigid_body_chain(rigid_body_model *model, double x[rigid_body_DIM], 
         x[i] = sum[i] + small[i];
         carry[i] = small[i] - (x[i] - sum[i]);
     }
-    rigid_body_correct(model, most);
+    rigid_body_correct(model, unit, most);
 }
 
 /* ---- Blocks of steps ---- */
@@ -1476,7 +1476,7 @@ static int rigid_body_guess(rigid_body_solver *s, rigid_body_table *table, rigid
 static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int most)
 {
     rigid_body_model model;
-    rigid_body_lanes size, before, left;
+    rigid_body_lanes unit[rigid_body_DIM], size, before, left;
     double x[rigid_body_DIM], carry[rigid_body_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
     if (!rigid_body_guess(s, table, &model)) return 0;
@@ -1487,7 +1487,8 @@ static int rigid_body_block(rigid_body_solver *s, rigid_body_table *table, int m
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         memcpy(before, size, sizeof before);
-        rigid_body_chain(&model, x, carry, size);
+        if (matrices) rigid_body_measure(&model, unit);
+        rigid_body_chain(&model, unit, x, carry, size);
         s->evaluations += rigid_body_LANES;
         rigid_body_leave(size, before, left);
         solved = rigid_body_largest(left) <= rigid_body_TOLERANCE;
@@ -1842,14 +1843,16 @@ static void rigid_body_group_predict(rigid_body_group *group, rigid_body_lanes y
    most allowed, lanes that are not solved leave the group. */
 static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *model)
 {
-    rigid_body_lanes size, before, left;
+    rigid_body_lanes unit[rigid_body_DIM], size, before, left;
     double largest = HUGE_VAL;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < rigid_body_LANES; ++lane) size[lane] = HUGE_VAL;
     rigid_body_group_predict(group, model->y);
     for (; open > 0 && iterations < rigid_body_MAX_ITERATIONS; ++iterations) {
         memcpy(before, size, sizeof size);
-        rigid_body_update(group->coef, model, largest > rigid_body_FROZEN);
+        const int matrices = largest > rigid_body_FROZEN;
+        rigid_body_update(group->coef, model, matrices);
+        if (matrices) rigid_body_measure(model, unit);
         for (int i = 0; i < rigid_body_DIM; ++i) {
             rigid_body_EACH_LANE
             for (int lane = 0; lane < rigid_body_LANES; ++lane)
@@ -1857,7 +1860,7 @@ static int rigid_body_group_solve(rigid_body_group *group, rigid_body_model *mod
                     ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane])
                         - group->carry[i][lane];
         }
-        rigid_body_correct(model, size);
+        rigid_body_correct(model, unit, size);
         rigid_body_leave(size, before, left);
         open = rigid_body_group_open(group, size, left);
         largest = rigid_body_largest(size);

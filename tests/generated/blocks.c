@@ -238,7 +238,7 @@ static void increments_are_corrected(void)
 {
     static F(group) group;
     static F(model) model;
-    F(lanes) size, x[2][DIM], carry[DIM];
+    F(lanes) unit[DIM], size, x[2][DIM], carry[DIM];
     double a[DIM], b[DIM];
     memset(&group, 0, sizeof group);
     for (int lane = 0; lane < F(LANES); ++lane) EXPECT(join(&group, lane, start));
@@ -250,7 +250,12 @@ static void increments_are_corrected(void)
         for (int i = 0; i < DIM; ++i)
             for (int lane = 0; lane < F(LANES); ++lane)
                 model.residual[i][lane] = (model.y[i][lane] - group.x[i][lane]) + model.displacement[i][lane];
-        F(correct)(&model, size);
+#if STAGES == 1
+        F(measure)(&model, unit);
+#else
+        F(measure)(&model, 1, unit);
+#endif
+        F(correct)(&model, unit, size);
         memcpy(x[off], group.x, sizeof x[off]);
         memset(carry, 0, sizeof carry);
         F(group_advance)(x[off], carry, &model);

@@ -448,7 +448,7 @@ static void phi_turn_block(phi_solver *s, phi_table *table, phi_model *model)
 static int phi_block(phi_solver *s, phi_table *table, int most)
 {
     phi_model PHI_OF(model, PHI_STAGES);
-    phi_lanes size, before, left;
+    phi_lanes unit[PHI_DIM], size, before, left;
     double x[PHI_DIM], carry[PHI_DIM], previous = HUGE_VAL;
     int passes = 0, solved = 0;
 #if PHI_SWEPT
@@ -462,11 +462,16 @@ static int phi_block(phi_solver *s, phi_table *table, int most)
         memcpy(x, s->x, sizeof x);
         memcpy(carry, s->carry, sizeof carry);
         memcpy(before, size, sizeof before);
+#if PHI_COMPOSED
+        if (matrices) phi_measure(model, PHI_STAGES, unit);
+#else
+        if (matrices) phi_measure(&model, unit);
+#endif
 #if PHI_SWEPT
         if (matrices) phi_turn_residuals(model, turn);
-        phi_chain(model, turn, x, carry, size);
+        phi_chain(model, turn, unit, x, carry, size);
 #else
-        phi_chain(PHI_ADDRESS(model), x, carry, size);
+        phi_chain(PHI_ADDRESS(model), unit, x, carry, size);
 #endif
         s->evaluations += PHI_ALL_STAGES(PHI_LANES);
         phi_leave(size, before, left);

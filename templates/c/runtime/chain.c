@@ -97,8 +97,8 @@ static void phi_answer(phi_model *model, phi_lanes residual[restrict PHI_DIM], p
 /* Correct the points of all stages by the residuals along their linear models, and find where the steps lead. As X, the
    state with its carry, gains increment - gain residual, the next residual follows from this one; X itself is added up
    apart. most is the largest correction in each lane. */
-static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
-    phi_lanes most)
+static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DIM], phi_lanes unit[restrict PHI_DIM],
+    double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
 {
     phi_lanes residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM], size;
     memset(most, 0, PHI_LANES * sizeof most[0]);
@@ -119,7 +119,7 @@ static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DI
                 residual[i][lane] = (residual[i][lane] + gained[i][lane]) + this_stage->residual[i][lane];
             }
         }
-        phi_take(this_stage, delta, size);
+        phi_take(this_stage, delta, unit, size);
         phi_keep_largest(most, size);
     }
     for (int i = 0; i < PHI_DIM; ++i) {
@@ -138,7 +138,8 @@ static void phi_chain(phi_model *model, phi_lanes turn[restrict PHI_DIM * PHI_DI
 /* The steps of a block one after the other, each along the linear model of its lane. As X, the state with its carry, gains
    increment - gain residual, the next residual follows from this one; X itself is added up apart. most is the largest
    correction in each lane. */
-static void phi_chain(phi_model *model, double x[PHI_DIM], double carry[PHI_DIM], phi_lanes most)
+static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double x[PHI_DIM], double carry[PHI_DIM],
+    phi_lanes most)
 {
     double residual[PHI_DIM], sum[PHI_DIM], small[PHI_DIM];
 #if PHI_SPARSE
@@ -192,11 +193,11 @@ static void phi_chain(phi_model *model, double x[PHI_DIM], double carry[PHI_DIM]
     phi_lanes size;
     memset(most, 0, PHI_LANES * sizeof most[0]);
     for (int stage = 0; stage < PHI_STAGES; ++stage) {
-        phi_correct(model + stage, size);
+        phi_correct(model + stage, unit, size);
         phi_keep_largest(most, size);
     }
 #else
-    phi_correct(model, most);
+    phi_correct(model, unit, most);
 #endif
 }
 

@@ -182,21 +182,27 @@ static void phi_group_predict(phi_group *group PHI_AND_INT_STAGE, phi_lanes y[PH
    allowed, lanes that are not solved leave the group. */
 static int phi_group_solve(phi_group *group PHI_AND_INT_STAGE, phi_model *model)
 {
-    phi_lanes size, before, left;
+    phi_lanes unit[PHI_DIM], size, before, left;
     double largest = HUGE_VAL;
     int iterations = 0, open = 1;
     for (int lane = 0; lane < PHI_LANES; ++lane) size[lane] = HUGE_VAL;
     phi_group_predict(group PHI_AND_STAGE, model->y);
     for (; open > 0 && iterations < PHI_MAX_ITERATIONS; ++iterations) {
         memcpy(before, size, sizeof size);
-        phi_update(PHI_OF(group->coef, stage), model, largest > PHI_FROZEN);
+        const int matrices = largest > PHI_FROZEN;
+        phi_update(PHI_OF(group->coef, stage), model, matrices);
+#if PHI_COMPOSED
+        if (matrices) phi_measure(model, 1, unit);
+#else
+        if (matrices) phi_measure(model, unit);
+#endif
         for (int i = 0; i < PHI_DIM; ++i) {
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane)
                 model->residual[i][lane] =
                     ((model->y[i][lane] - group->x[i][lane]) + model->displacement[i][lane]) - group->carry[i][lane];
         }
-        phi_correct(model, size);
+        phi_correct(model, unit, size);
         phi_leave(size, before, left);
         open = phi_group_open(group, size, left);
         largest = phi_largest(size);

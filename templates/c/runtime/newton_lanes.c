@@ -21,7 +21,6 @@
 /* A stage in all lanes, linearised around y. */
 typedef struct {
     phi_lanes y[PHI_DIM], displacement[PHI_DIM], increment[PHI_DIM], residual[PHI_DIM];
-    phi_lanes unit[PHI_DIM]; /* by which corrections of y are measured */
 #if PHI_SPARSE
     /* of the Jacobian of alpha(y); that of the increment; what corrections take from the increment */
     phi_lanes factor[PHI_FACTORS], slope[PHI_DIM * PHI_DIM], gained[PHI_DIM];
@@ -37,30 +36,48 @@ typedef struct {
 #endif
 } phi_model;
 
+#if PHI_COMPOSED
+/* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in phi_size, or larger: by the
+   least that a component is in so many stages. */
+static void phi_measure(const phi_model *model, int stages, phi_lanes unit[restrict PHI_DIM])
+#else
 /* What makes of corrections of y, which are as small as matrices are kept for, their sizes as in phi_size. */
-static void phi_measure(phi_model *model)
+static void phi_measure(const phi_model *model, phi_lanes unit[restrict PHI_DIM])
+#endif
 {
     phi_lanes norm = { 0.0 };
-    for (int i = 0; i < PHI_DIM; ++i)
-        for (int lane = 0; lane < PHI_LANES; ++lane) {
-            const double least = PHI_FLOOR_OF_LANES * fabs(model->y[i][lane]);
-            norm[lane] = least > norm[lane] ? least : norm[lane];
-        }
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_LANES; ++lane)
-            model->unit[i][lane] = 1.0 / (fabs(model->y[i][lane]) + norm[lane] + DBL_MIN);
+        for (int lane = 0; lane < PHI_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
+#if PHI_COMPOSED
+        for (int stage = 1; stage < stages; ++stage) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) {
+                const double here = fabs(model[stage].y[i][lane]);
+                unit[i][lane] = here < unit[i][lane] ? here : unit[i][lane];
+            }
+        }
+#endif
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) {
+            const double least = PHI_FLOOR_OF_LANES * unit[i][lane];
+            norm[lane] = least > norm[lane] ? least : norm[lane];
+        }
+    }
+    for (int i = 0; i < PHI_DIM; ++i) {
+        PHI_EACH_LANE
+        for (int lane = 0; lane < PHI_LANES; ++lane) unit[i][lane] = 1.0 / (unit[i][lane] + norm[lane] + DBL_MIN);
     }
 }
 
 /* Take a correction from y; its size, summed over the components. */
-static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes size)
+static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     memset(size, 0, PHI_LANES * sizeof size[0]);
     for (int i = 0; i < PHI_DIM; ++i) {
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
-            size[lane] += fabs(delta[i][lane]) * model->unit[i][lane];
+            size[lane] += fabs(delta[i][lane]) * unit[i][lane];
             model->y[i][lane] -= delta[i][lane];
         }
     }
@@ -71,11 +88,11 @@ static void phi_take(phi_model *model, phi_lanes delta[restrict PHI_DIM], phi_la
 #if PHI_SPARSE
 /* Correct y by the residuals, with the factors of its matrix, and measure the corrections; also find what they take from
    the increments. */
-static void phi_correct(phi_model *model, phi_lanes size)
+static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];
     phi_substitute_lanes(model->factor, model->slope, model->residual, delta, model->gained);
-    phi_take(model, delta, size);
+    phi_take(model, delta, unit, size);
 }
 
 #else
@@ -111,11 +128,11 @@ static void phi_gain(phi_model *model, phi_lanes residual[restrict PHI_DIM], phi
 #endif
 #if !PHI_SWEPT || PHI_GROUPS
 /* Correct y by the residuals, with the inverse of its matrix, and measure the corrections. */
-static void phi_correct(phi_model *model, phi_lanes size)
+static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_lanes size)
 {
     phi_lanes delta[PHI_DIM];
     phi_apply(model->inverse, model->residual, delta);
-    phi_take(model, delta, size);
+    phi_take(model, delta, unit, size);
 }
 
 #endif
@@ -233,12 +250,8 @@ static void phi_linearise_stage(phi_lanes coef[restrict], phi_model *model)
 /* Evaluate a stage at the points y, with its matrices or with those of the last pass. */
 static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
 {
-    if (matrices) {
-        phi_linearise_stage(coef, model);
-        phi_measure(model);
-    } else {
-        phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
-    }
+    if (matrices) phi_linearise_stage(coef, model);
+    else phi_evaluate_lanes(coef, model->y, model->displacement, model->increment);
 }
 
 #endif

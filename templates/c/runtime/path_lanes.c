@@ -83,10 +83,7 @@ static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
     else phi_begin_at(coef, model->y, model->middle, &e);
     phi_extend(coef, &e, PHI_NEGLIGIBLE);
     phi_check_ends(coef, &e, wrong);
-    if (matrices) {
-        phi_linearise_paths(coef, model, &e, hessian);
-        phi_measure(model);
-    }
+    if (matrices) phi_linearise_paths(coef, model, &e, hessian);
     phi_read_ends(model, &e, wrong);
 }
 #endif
