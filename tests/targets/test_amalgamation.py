@@ -97,7 +97,8 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     (tmp_path / "macros").mkdir()
     write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in own.items()})
     write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in made.printed.items()})
-    write(tmp_path, {"made.c": made.text(code)})
+    made_text = made.text(code)
+    write(tmp_path, {"made.c": made_text})
     write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(own.values())), ""))
     switches = [f"-D{made.name}_{switch}={int(on)}" for switch, on in made.switches.items()]
 
@@ -109,6 +110,7 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     assert found == tokens(code)
     assert made.switches["COMPOSED"] or not {"stage", f"{made.name}_STAGES"} & set(found)
     assert made.switches.get("HALO", True) or f"{made.name}_LEAD" not in found
+    assert not made.switches.get("ONE_ROW") or "r < s->rows" not in made_text
 
 
 def test_every_macro_of_the_runtime_is_used():

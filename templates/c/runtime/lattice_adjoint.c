@@ -79,7 +79,7 @@ static int phi_parameters_hold(const phi_solver *s, const phi_transpose *g, cons
 {
     int hold = phi_finite(coef_bar, PHI_SUMS);
     for (size_t k = PHI_DIM; k < PHI_ARRAYS; ++k)
-        for (size_t r = 0; r < s->rows; ++r) hold &= phi_finite(g->bar[k] + (ptrdiff_t)r * s->width, (size_t)s->length);
+        PHI_EACH_ROW hold &= phi_finite(PHI_ROW_AT(g->bar[k]), (size_t)s->length);
 #if PHI_BOND_PARAMETERS
     for (int k = PHI_ARRAYS; k < PHI_BARS; ++k) hold &= phi_finite(g->bar[k], (size_t)s->bonds[s->sites]);
 #endif

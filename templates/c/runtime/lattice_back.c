@@ -68,6 +68,26 @@ static void phi_find_givers(const phi_solver *s, size_t index, ptrdiff_t at[PHI_
 }
 
 #endif
+#if PHI_SITE_PARAMETERS
+/* The derivatives along a parameter at sites, added to those of the caller, unless that wants none. */
+static void phi_add_at_sites(const phi_solver *s, const double *bar, double *to)
+{
+    if (to == NULL) return;
+    PHI_EACH_ROW {
+        const double *row = PHI_ROW_AT(bar);
+        for (ptrdiff_t i = 0; i < s->length; ++i) *to++ += row[i];
+    }
+}
+
+#endif
+#if PHI_BOND_PARAMETERS
+/* The derivatives along a parameter at bonds, added to those of the caller, unless that wants none. */
+static void phi_add_at_bonds(const phi_solver *s, const double *bar, double *to)
+{
+    for (int k = 0; to != NULL && k < s->bonds[s->sites]; ++k) to[s->number[k]] += bar[k];
+}
+
+#endif
 #include "adjoint_sweeps.h"
 #if PHI_SERIES
 
