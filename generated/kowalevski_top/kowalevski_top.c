@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 0727e8716c8cfa2c2d4b484ab764f0a8d95d835d94681a7cd2dfb16bd11ae866
+ * body-sha256: fb0f47f40f3df3c9a5019e4101fee97eeecf9a0aff95a7e92abee2a665d27783
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -1444,21 +1444,31 @@ kowalevski_top_status kowalevski_top_step(kowalevski_top_solver *s, double h)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define kowalevski_top_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x
+   would have had them, which differs from the motion as it was by what moved the state, and by the difference
+   of their slopes. Recurrences are of the motion as it was. From far away all begins anew, with the next
+   step. */
 static void kowalevski_top_move_guesses(kowalevski_top_solver *s, const double from[kowalevski_top_DIM])
 {
-    double distance = 0.0, size = 0.0;
+    double distance = 0.0, size = 0.0, before[kowalevski_top_DIM], slope[kowalevski_top_DIM];
     for (int i = 0; i < kowalevski_top_DIM; ++i) {
         distance += fabs(s->x[i] - from[i]);
         size += fabs(from[i]);
     }
-    if (!(distance <= kowalevski_top_NEAR_BY * size)) s->h = (double)NAN;
+    if (!(distance <= kowalevski_top_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    kowalevski_top_vector_field(&s->params, from, before);
+    kowalevski_top_vector_field(&s->params, s->x, slope);
+    for (int i = 0; i < kowalevski_top_DIM; ++i) slope[i] -= before[i];
     kowalevski_top_history *history = &s->history;
+    const double middle = 0.5 * s->h;
     const int count = history->count < kowalevski_top_HISTORY ? history->count : kowalevski_top_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < kowalevski_top_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
+        for (int i = 0; i < kowalevski_top_DIM; ++i)
+            history->past[k][i] += (s->x[i] - from[i]) - (middle + (double)(count - 1 - k) * s->h) * slope[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 38ad76c4b09378ef5d2cac7fc40cf1ab3bc9e9e7a1aefbaa51633963370efd2d
+ * body-sha256: 534ce8b943de26b1ff63e8d1f86fcb56ac39f48ab8ce9aa5a149f09b7ed39d65
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -549,21 +549,31 @@ lotka_volterra_status lotka_volterra_step(lotka_volterra_solver *s, double h)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define lotka_volterra_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x
+   would have had them, which differs from the motion as it was by what moved the state, and by the difference
+   of their slopes. Recurrences are of the motion as it was. From far away all begins anew, with the next
+   step. */
 static void lotka_volterra_move_guesses(lotka_volterra_solver *s, const double from[lotka_volterra_DIM])
 {
-    double distance = 0.0, size = 0.0;
+    double distance = 0.0, size = 0.0, before[lotka_volterra_DIM], slope[lotka_volterra_DIM];
     for (int i = 0; i < lotka_volterra_DIM; ++i) {
         distance = fmax(distance, fabs(s->x[i] / from[i] - 1.0));
         size = 1.0;
     }
-    if (!(distance <= lotka_volterra_NEAR_BY * size)) s->h = (double)NAN;
+    if (!(distance <= lotka_volterra_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    lotka_volterra_vector_field(&s->params, from, before);
+    lotka_volterra_vector_field(&s->params, s->x, slope);
+    for (int i = 0; i < lotka_volterra_DIM; ++i) slope[i] -= before[i];
     lotka_volterra_history *history = &s->history;
+    const double middle = 0.5 * s->h;
     const int count = history->count < lotka_volterra_HISTORY ? history->count : lotka_volterra_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < lotka_volterra_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
+        for (int i = 0; i < lotka_volterra_DIM; ++i)
+            history->past[k][i] += (s->x[i] - from[i]) - (middle + (double)(count - 1 - k) * s->h) * slope[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: b83ebcb1a8aaa06267364e5bf3c2af5ac6ac94fc26cadcaa4ace3413c1ecca16
+ * body-sha256: 664fae3334f25948fec4caeafdf61fbfb516c6a63af92e8a4507f54c164c09a8
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -717,21 +717,31 @@ nambu_pendulum_status nambu_pendulum_step(nambu_pendulum_solver *s, double h)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define nambu_pendulum_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x
+   would have had them, which differs from the motion as it was by what moved the state, and by the difference
+   of their slopes. Recurrences are of the motion as it was. From far away all begins anew, with the next
+   step. */
 static void nambu_pendulum_move_guesses(nambu_pendulum_solver *s, const double from[nambu_pendulum_DIM])
 {
-    double distance = 0.0, size = 0.0;
+    double distance = 0.0, size = 0.0, before[nambu_pendulum_DIM], slope[nambu_pendulum_DIM];
     for (int i = 0; i < nambu_pendulum_DIM; ++i) {
         distance += fabs(s->x[i] - from[i]);
         size += fabs(from[i]);
     }
-    if (!(distance <= nambu_pendulum_NEAR_BY * size)) s->h = (double)NAN;
+    if (!(distance <= nambu_pendulum_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    nambu_pendulum_vector_field(&s->params, from, before);
+    nambu_pendulum_vector_field(&s->params, s->x, slope);
+    for (int i = 0; i < nambu_pendulum_DIM; ++i) slope[i] -= before[i];
     nambu_pendulum_history *history = &s->history;
+    const double middle = 0.5 * s->h;
     const int count = history->count < nambu_pendulum_HISTORY ? history->count : nambu_pendulum_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < nambu_pendulum_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
+        for (int i = 0; i < nambu_pendulum_DIM; ++i)
+            history->past[k][i] += (s->x[i] - from[i]) - (middle + (double)(count - 1 - k) * s->h) * slope[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }

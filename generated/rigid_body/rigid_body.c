@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 3b11d894a16d5b04f2a341643c0d049adb58da80627dcb06eca8eda661f18da4
+ * body-sha256: d4a4270c28f8e27f3228a119197716dc6860eef40e69c915dca608adaebe8adb
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -889,21 +889,31 @@ rigid_body_status rigid_body_step(rigid_body_solver *s, double h) { return rigid
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define rigid_body_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x
+   would have had them, which differs from the motion as it was by what moved the state, and by the difference
+   of their slopes. Recurrences are of the motion as it was. From far away all begins anew, with the next
+   step. */
 static void rigid_body_move_guesses(rigid_body_solver *s, const double from[rigid_body_DIM])
 {
-    double distance = 0.0, size = 0.0;
+    double distance = 0.0, size = 0.0, before[rigid_body_DIM], slope[rigid_body_DIM];
     for (int i = 0; i < rigid_body_DIM; ++i) {
         distance += fabs(s->x[i] - from[i]);
         size += fabs(from[i]);
     }
-    if (!(distance <= rigid_body_NEAR_BY * size)) s->h = (double)NAN;
+    if (!(distance <= rigid_body_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    rigid_body_vector_field(&s->params, from, before);
+    rigid_body_vector_field(&s->params, s->x, slope);
+    for (int i = 0; i < rigid_body_DIM; ++i) slope[i] -= before[i];
     rigid_body_history *history = &s->history;
+    const double middle = 0.5 * s->h;
     const int count = history->count < rigid_body_HISTORY ? history->count : rigid_body_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < rigid_body_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
+        for (int i = 0; i < rigid_body_DIM; ++i)
+            history->past[k][i] += (s->x[i] - from[i]) - (middle + (double)(count - 1 - k) * s->h) * slope[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }

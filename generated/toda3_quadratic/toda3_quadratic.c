@@ -9,7 +9,7 @@
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Members of an
  *   ensemble; Ensembles
- * body-sha256: be8df93b1124b4857c15f3dbed5f0918aeb8d3a87b3d6c41d6c2e9cc972ee4b2
+ * body-sha256: 0d7943c20d59f06c0d09e727938095f7016445563edc386159a3edcfae8be343
  */
 #include "toda3_quadratic.h"
 #include <float.h>
@@ -753,21 +753,31 @@ toda3_quadratic_status toda3_quadratic_step(toda3_quadratic_solver *s, double h)
 /* how far the state may be moved, in its own size, for guesses to move with it */
 #define toda3_quadratic_NEAR_BY 0.125
 
-/* Guesses move with the state, by as many past values as extrapolation needs; recurrences are of the motion
-   as it was. From far away all begins anew, with the next step. */
+/* Guesses move with the state, by as many past values as extrapolation needs: to where a motion through x
+   would have had them, which differs from the motion as it was by what moved the state, and by the difference
+   of their slopes. Recurrences are of the motion as it was. From far away all begins anew, with the next
+   step. */
 static void toda3_quadratic_move_guesses(toda3_quadratic_solver *s, const double from[toda3_quadratic_DIM])
 {
-    double distance = 0.0, size = 0.0;
+    double distance = 0.0, size = 0.0, before[toda3_quadratic_DIM], slope[toda3_quadratic_DIM];
     for (int i = 0; i < toda3_quadratic_DIM; ++i) {
         distance += fabs(s->x[i] - from[i]);
         size += fabs(from[i]);
     }
-    if (!(distance <= toda3_quadratic_NEAR_BY * size)) s->h = (double)NAN;
+    if (!(distance <= toda3_quadratic_NEAR_BY * size)) {
+        s->h = (double)NAN;
+        return;
+    }
+    toda3_quadratic_vector_field(&s->params, from, before);
+    toda3_quadratic_vector_field(&s->params, s->x, slope);
+    for (int i = 0; i < toda3_quadratic_DIM; ++i) slope[i] -= before[i];
     toda3_quadratic_history *history = &s->history;
+    const double middle = 0.5 * s->h;
     const int count = history->count < toda3_quadratic_HISTORY ? history->count : toda3_quadratic_HISTORY;
     memmove(history->past, history->past + history->count - count, (size_t)count * sizeof history->past[0]);
     for (int k = 0; k < count; ++k)
-        for (int i = 0; i < toda3_quadratic_DIM; ++i) history->past[k][i] += s->x[i] - from[i];
+        for (int i = 0; i < toda3_quadratic_DIM; ++i)
+            history->past[k][i] += (s->x[i] - from[i]) - (middle + (double)(count - 1 - k) * s->h) * slope[i];
     history->count = count;
     history->recurrence_terms = history->use_recurrence = history->slow_steps = 0;
 }

@@ -1,11 +1,14 @@
 """Starting guesses affect the speed of a solver, and nothing else."""
 
+import ctypes
+
 import numpy as np
 import pytest
-from support import RATTLEBACK, compile_text
+from support import RATTLEBACK, RawC, compile_text
 
-from phigen import api, resources
+from phigen import api, resources, spec
 from phigen.api import solver_of
+from phigen.compiler import compile_spec
 from phigen.errors import StepError
 
 
@@ -55,3 +58,17 @@ def test_steps_that_are_too_large_lead_members_of_ensembles_nowhere_else():
     energies = np.array([solver.hamiltonian(x) for x in failure.value.trajectory])
     assert len(failure.value.members) > 5
     assert np.max(energies) < 2 * energies.min()
+
+
+def test_guesses_after_a_kick_are_of_the_motion_from_there():
+    """With what the kick changes of the slope, the step behind it converges as fast as one behind no kick."""
+    raw = RawC(compile_spec(spec.load(resources.bundled_specs() / "rigid_body.yaml"), order=4, profile="fast"))
+    assert raw.init([0.3, 1.0, 0.2]) == 0
+    rng = np.random.default_rng(1)
+    taken = []
+    for change in 0.01 * rng.uniform(-1, 1, (60, 3)):
+        before = int(raw.counters[1])
+        assert raw.step(0.05) == 0
+        taken.append(int(raw.counters[1]) - before)
+        assert raw.call("kick", ctypes.c_int, raw.here, ctypes.c_void_p(change.ctypes.data)) == 0
+    assert np.mean(taken[10:]) < 2.1
