@@ -104,11 +104,11 @@ def of_classical(
     return Method(name, step, rows, later=later)
 
 
-def by_differences(method: Method, x: Floats, h: float) -> Floats:
-    """The derivative (DIM, DIM) of a step by central differences of order 6."""
+def by_differences(method: Method, x: Floats, h: float, finer: float = 1.0) -> Floats:
+    """The derivative (DIM, DIM) of a step by central differences of order 6, at so many times smaller distances."""
     columns, size = [], float(np.max(np.abs(x))) or 1.0
     for j in range(len(x)):
-        width = _WIDTH * (max(abs(x[j]), 0.1 * size) if x[j] else 0.1 * size)
+        width = _WIDTH / finer * (max(abs(x[j]), 0.1 * size) if x[j] else 0.1 * size)
         total = np.zeros_like(x)
         for k, weight in _WEIGHTS:
             move = np.zeros_like(x)

@@ -18,7 +18,7 @@ from phigen.runtime.numpy_solver import NumpySolver
 from phigen.runtime.solver import Solver
 from phigen.scheme.assemble import build_program
 from phigen.spec.model import Extras
-from phigen.study import backward, verification
+from phigen.study import backward, measures, verification
 from phigen.study.meanings import meaning_of
 from phigen.study.methods import by_differences, field_of, of_classical, of_solver
 from phigen.study.summary import summarise
@@ -265,3 +265,16 @@ def test_command_draws_the_modified_hamiltonian_of_one_spec(tmp_path):
     assert done.exit_code == 0
     assert picture.read_text(encoding="utf-8").count("<path") > 10
     assert f"wrote {picture}" in done.stderr
+
+
+def test_derivatives_are_compared_near_a_singularity_too():
+    """Differences at two thousandths of the largest coordinate would lead to the other side of the sun."""
+    text = (
+        "coordinates: [q1, q2, p1, p2]\npoisson: {canonical: {q: [q1, q2], p: [p1, p2]}}\nscheme: splitting\norder: 2\n"
+    )
+    text += "hamiltonian: (p1**2 + p2**2)/2 - 1/sqrt(q1**2 + q2**2)\n"
+    kepler = solver_of(compilation_of(f"phigen: 1\nname: t\n{text}"), "numpy")
+    method = of_solver(kepler, {})
+    assert measures.tangent_error(method, np.array([0.01, 0.0, 0.0, 14.1]), 1e-4) < 1e-8
+    wrong = replace(method, tangent=lambda x, h: 1.00001 * method.tangent(x, h))
+    assert measures.tangent_error(wrong, np.array([0.01, 0.0, 0.0, 14.1]), 1e-4) > 1e-6
