@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: fb0f47f40f3df3c9a5019e4101fee97eeecf9a0aff95a7e92abee2a665d27783
+ * body-sha256: 0b66a5e4b861adadf904c6bc2b941100c68a229f10a42d64315f0308f458a537
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -2742,8 +2742,8 @@ static void kowalevski_top_correct(kowalevski_top_model *model,
 #define kowalevski_top_FROZEN 1e-4
 #define kowalevski_top_SMALL 1e-8
 #define kowalevski_top_ROUNDING 1e-10
-/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
-#define kowalevski_top_CAUTION 4.0
+/* frozen matrices leave twice what new ones did, of the same correction; this is far more */
+#define kowalevski_top_CAUTION 32.0
 
 /* What corrections of this size leave, after those of the size before: the first leave their square, later
    ones the part of themselves that they are of those before, or less. Nothing, where all that is left is

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 534ce8b943de26b1ff63e8d1f86fcb56ac39f48ab8ce9aa5a149f09b7ed39d65
+ * body-sha256: 65fb457cf59badff51b574803e4d638a8684b0c51db5d322792e84da2393a444
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -893,8 +893,8 @@ static void lotka_volterra_correct(lotka_volterra_model *model,
 #define lotka_volterra_FROZEN 1e-4
 #define lotka_volterra_SMALL 1e-8
 #define lotka_volterra_ROUNDING 1e-10
-/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
-#define lotka_volterra_CAUTION 4.0
+/* frozen matrices leave twice what new ones did, of the same correction; this is far more */
+#define lotka_volterra_CAUTION 32.0
 
 /* What corrections of this size leave, after those of the size before: the first leave their square, later
    ones the part of themselves that they are of those before, or less. Nothing, where all that is left is

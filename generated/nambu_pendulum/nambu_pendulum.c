@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 664fae3334f25948fec4caeafdf61fbfb516c6a63af92e8a4507f54c164c09a8
+ * body-sha256: ace95f5c66d63c8e553d701d507ea5364bcf19a02eb46ce5005203f6fab3465f
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -1211,8 +1211,8 @@ static void nambu_pendulum_correct(nambu_pendulum_model *model,
 #define nambu_pendulum_FROZEN 1e-4
 #define nambu_pendulum_SMALL 1e-8
 #define nambu_pendulum_ROUNDING 1e-10
-/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
-#define nambu_pendulum_CAUTION 4.0
+/* frozen matrices leave twice what new ones did, of the same correction; this is far more */
+#define nambu_pendulum_CAUTION 32.0
 
 /* What corrections of this size leave, after those of the size before: the first leave their square, later
    ones the part of themselves that they are of those before, or less. Nothing, where all that is left is

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: d4a4270c28f8e27f3228a119197716dc6860eef40e69c915dca608adaebe8adb
+ * body-sha256: b0fedd5e7388af0324f10338f05205645ea3c71edbc4062a89da2adf59ada961
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1274,8 +1274,8 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[re
 #define rigid_body_FROZEN 1e-4
 #define rigid_body_SMALL 1e-8
 #define rigid_body_ROUNDING 1e-10
-/* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
-#define rigid_body_CAUTION 4.0
+/* frozen matrices leave twice what new ones did, of the same correction; this is far more */
+#define rigid_body_CAUTION 32.0
 
 /* What corrections of this size leave, after those of the size before: the first leave their square, later
    ones the part of themselves that they are of those before, or less. Nothing, where all that is left is

@@ -142,7 +142,7 @@ static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
 #define PHI_ROUNDING 1e-10
-#define PHI_CAUTION 4.0 /* frozen matrices leave twice what new ones did, of the same correction; this is twice as much */
+#define PHI_CAUTION 32.0 /* frozen matrices leave twice what new ones did, of the same correction; this is far more */
 
 /* What corrections of this size leave, after those of the size before: the first leave their square, later ones the part of
    themselves that they are of those before, or less. Nothing, where all that is left is rounding. */
