@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 98cf3a350e472f3e4d5550f8a3d1136f9d19c8cf3967bfc31448b44e7a7a558f
+ * body-sha256: 8e3b195189af62492bb37bb7d4b51a274e2377d24a25a195064963a2687c5c61
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -326,12 +326,11 @@ ablowitz_ladik_status ablowitz_ladik_init(ablowitz_ladik_solver *s, const ablowi
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + ablowitz_ladik_LEAD;
     const size_t block = ablowitz_ladik_block(rows, width);
-    for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k)
-        s->before[k] = aligned + (ablowitz_ladik_ARRAYS + k) * block;
+    for (size_t k = 0; k < ablowitz_ladik_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < ablowitz_ladik_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) ablowitz_ladik_put(s, s->x[k], x0 + k * sites);
     return ablowitz_ladik_OK;
 }
@@ -370,9 +369,8 @@ static void ablowitz_ladik_copy(double *const *to, double *const *from, const ab
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void ablowitz_ladik_make_flow(const ablowitz_ladik_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * ablowitz_ladik_ROW;
     (void)steps;
-    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[number], coef);
+    ablowitz_ladik_sweep_part(s, ablowitz_ladik_flow_parts[number], s->coef + number * ablowitz_ladik_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -395,14 +393,12 @@ static int ablowitz_ladik_try(ablowitz_ladik_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 ablowitz_ladik_status ablowitz_ladik_integrate(ablowitz_ladik_solver *s, double h, size_t steps)
 {
     ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
     if (status != ablowitz_ladik_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) ablowitz_ladik_copy(s->x, s->before, s);
+    if (s->open) ablowitz_ladik_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else ablowitz_ladik_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = ablowitz_ladik_STRETCH; s->steps < end && status == ablowitz_ladik_OK;) {

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: ca439634ef9a948121c3d80a0046a2553b8265cb08209d4d613c76f531bef203
+ * body-sha256: 9e1f92be8a283efbe042070efa9ec22c9b3f0166dc3b65d6f1dd28e97d11259a
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -24,7 +24,7 @@
 /* ---- The model ---- */
 const chiral_magnet_params chiral_magnet_default_params = { 1.0, 0.5, NULL, NULL, 0.1, 0.15 };
 
-enum { chiral_magnet_RESERVED = 9 };      /* arrays over the sites in the memory of a solver */
+enum { chiral_magnet_RESERVED = 7 };      /* arrays over the sites in the memory of a solver */
 enum { chiral_magnet_ROW = 5 };           /* coefficients of one flow */
 enum { chiral_magnet_ROWS_OF_FLOWS = 6 }; /* rows of coefficients */
 enum { chiral_magnet_FLOWS = 5 };         /* in a step */
@@ -32,8 +32,7 @@ enum { chiral_magnet_FLOWS = 5 };         /* in a step */
 /* Along each axis: the smallest size. */
 static const size_t chiral_magnet_least[chiral_magnet_AXES] = { 1 };
 
-/* Whether a part of H is that of the sites of one colour. The flows are those of all parts, of each colour
-   where so. */
+/* Whether a part of H is that of the sites of one colour: then it has a flow for each colour. */
 enum { chiral_magnet_PARTS = 5 };
 static const unsigned char chiral_magnet_by_colour[chiral_magnet_PARTS] = { 1, 0, 0, 0, 1 };
 
@@ -69,12 +68,9 @@ static void chiral_magnet_prepare(const chiral_magnet_params *params, double h, 
 /* A piece of a row, and what loops over its sites are told. */
 typedef struct {
     const chiral_magnet_solver *s;
-    double *const *x;        /* see chiral_magnet_solver */
-    ptrdiff_t from, to;      /* its sites, to not among them */
-    double *const *at_bonds; /* see chiral_magnet_solver */
-    double side;             /* 1, or -1 where a loop is told of bonds as if they ran the other way */
-    int chosen;              /* the colour that a part of H belongs to */
-    int across;              /* whether it is that of the other ends of bonds, where a loop is told */
+    double *const *x;   /* see chiral_magnet_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
+    int chosen;         /* the colour that a part of H belongs to */
 } chiral_magnet_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -95,10 +91,7 @@ static inline chiral_magnet_row chiral_magnet_row_of(const chiral_magnet_solver 
     row.x = s->x;
     row.from = 0;
     row.to = s->length;
-    row.at_bonds = s->at_bonds;
-    row.side = 1.0;
     row.chosen = 0;
-    row.across = 0;
     return row;
 }
 
@@ -149,17 +142,18 @@ static inline double chiral_magnet_sin_lane(double u)
 }
 
 /* What all other sites b add to the forces of H_1, H_5 at a site a. */
-static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row)
+static inline void chiral_magnet_gather1_0(const double *coef, const chiral_magnet_row *row,
+    double *const *at_bonds, double sign, int across)
 {
     const double c1 = coef[1];
     const double *restrict y_row = row->x[1];
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         double sum0 = 0.0;
         for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
-            if (row->s->colours[row->across ? row->s->other[k] : i] != row->chosen) continue;
+            if (row->s->colours[across ? row->s->other[k] : i] != row->chosen) continue;
             const ptrdiff_t j = row->s->other[k];
-            const double side = k < row->s->middle[i] ? row->side : -row->side;
-            const double y_b_ = y_row[j], Dx = side * row->at_bonds[0][k];
+            const double side = k < row->s->middle[i] ? sign : -sign;
+            const double y_b_ = y_row[j], Dx = side * at_bonds[0][k];
             sum0 += -(y_b_ * (Dx * c1));
         }
         row->s->gathered[0][i] = sum0;
@@ -238,13 +232,13 @@ static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int flow, 
 #endif
     for (size_t unit = 0; unit < units; ++unit) {
         chiral_magnet_row row = chiral_magnet_piece_of(s, unit);
+        row.chosen = colour;
         switch (part) {
         case 1:
-            row.chosen = colour;
-            chiral_magnet_gather1_0(coef, &row);
+            chiral_magnet_gather1_0(coef, &row, s->at_bonds, 1.0, 0);
             chiral_magnet_sweep_x_y(coef, &row);
-            row.side = -1.0, row.across = 1, row.x = y_z_x;
-            chiral_magnet_gather1_0(coef, &row);
+            row.x = y_z_x;
+            chiral_magnet_gather1_0(coef, &row, s->at_bonds, -1.0, 1);
             row.x = z_x_y;
             chiral_magnet_sweep_x_y(coef, &row);
             break;
@@ -266,74 +260,36 @@ static void chiral_magnet_sweep_colour(const chiral_magnet_solver *s, int flow, 
             chiral_magnet_sweep4(coef, &row);
             break;
         default:
-            row.chosen = colour;
-            row.at_bonds = Dy_Dx, row.side = -1.0, row.x = z_x_y;
-            chiral_magnet_gather1_0(coef, &row);
+            row.x = z_x_y;
+            chiral_magnet_gather1_0(coef, &row, Dy_Dx, -1.0, 0);
             row.x = s->x;
             chiral_magnet_sweep_x_y(coef, &row);
-            row.side = 1.0, row.across = 1, row.x = y_z_x;
-            chiral_magnet_gather1_0(coef, &row);
+            row.x = y_z_x;
+            chiral_magnet_gather1_0(coef, &row, Dy_Dx, 1.0, 1);
             chiral_magnet_sweep_x_y(coef, &row);
             break;
         }
     }
 }
 
-/* What a site b adds to the forces at a site a. */
-static inline void chiral_magnet_bond_forces(const chiral_magnet_row *row)
-{
-    const double J = row->s->params.J, D = row->s->params.D;
-    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
-    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
-        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->s->other[k];
-            const double side = k < row->s->middle[i] ? row->side : -row->side;
-            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = side * row->at_bonds[0][k],
-                Dy = side * row->at_bonds[1][k];
-            const double t1 = D * Dy;
-            const double t2 = D * Dx;
-            sum0 += -(J * x_b_ + z_b_ * t1);
-            sum1 += z_b_ * t2 - J * y_b_;
-            sum2 += x_b_ * t1 - J * z_b_ - y_b_ * t2;
-        }
-        row->s->gathered[0][i] = sum0;
-        row->s->gathered[1][i] = sum1;
-        row->s->gathered[2][i] = sum2;
-    }
-}
-
-/* The energy of a bond. */
-static inline void chiral_magnet_bond_energy(const chiral_magnet_row *row)
-{
-    const double J = row->s->params.J, D = row->s->params.D;
-    const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
-    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double x_a_ = x_row[i], y_a_ = y_row[i], z_a_ = z_row[i];
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->s->other[k];
-            const double side = k < row->s->middle[i] ? row->side : -row->side;
-            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j], Dx = side * row->at_bonds[0][k],
-                Dy = side * row->at_bonds[1][k];
-            const double t1 = D * (Dx * (y_a_ * z_b_ - y_b_ * z_a_) + Dy * (x_b_ * z_a_ - x_a_ * z_b_))
-                - J * (z_a_ * z_b_ + (x_a_ * x_b_ + y_a_ * y_b_));
-            sum0 += t1;
-        }
-        row->s->gathered[0][i] = sum0;
-    }
-}
-
 /* The density of the Hamiltonian, at the sites of a row. */
 static void chiral_magnet_energy_row(const chiral_magnet_row *row, double *restrict out)
 {
-    chiral_magnet_bond_energy(row);
-    const double K = row->s->params.K, B = row->s->params.B;
-    const double *restrict z_row = row->x[2];
-    chiral_magnet_EACH_SITE
+    const double J = row->s->params.J, D = row->s->params.D, K = row->s->params.K, B = row->s->params.B;
+    const double *restrict z_row = row->x[2], *restrict x_row = row->x[0], *restrict y_row = row->x[1];
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double z = z_row[i];
-        out[i - row->from] = -(B * z + K * (z * z)) + 0.5 * row->s->gathered[0][i];
+        const double z = z_row[i], x = x_row[i], y = y_row[i];
+        double sum0 = 0.0;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? 1.0 : -1.0;
+            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j],
+                Dx = side * row->s->at_bonds[0][k], Dy = side * row->s->at_bonds[1][k];
+            const double t1 = D * (Dx * (y * z_b_ - y_b_ * z) + Dy * (x_b_ * z - x * z_b_))
+                - J * (z * z_b_ + (x * x_b_ + y * y_b_));
+            sum0 += t1;
+        }
+        out[i - row->from] = -(B * z + K * (z * z)) + 0.5 * sum0;
     }
 }
 
@@ -351,17 +307,27 @@ static void chiral_magnet_casimirs_row(const chiral_magnet_row *row, double *res
 /* Pi grad H, at the sites of a row. */
 static void chiral_magnet_vector_field_row(const chiral_magnet_row *row, double *restrict out)
 {
-    chiral_magnet_bond_forces(row);
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
-    const double K = row->s->params.K, B = row->s->params.B;
+    const double J = row->s->params.J, D = row->s->params.D, K = row->s->params.K, B = row->s->params.B;
     const double *restrict x_row = row->x[0], *restrict y_row = row->x[1], *restrict z_row = row->x[2];
-    chiral_magnet_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double t1 = row->s->gathered[2][i] + ((-2.0) * (K * z) - B);
-        out[i - row->from] = row->s->gathered[1][i] * z - y * t1;
-        out[apart + i - row->from] = x * t1 - row->s->gathered[0][i] * z;
-        out[2 * apart + i - row->from] = row->s->gathered[0][i] * y - row->s->gathered[1][i] * x;
+        double sum0 = 0.0, sum1 = 0.0, sum2 = 0.0;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? 1.0 : -1.0;
+            const double x_b_ = x_row[j], y_b_ = y_row[j], z_b_ = z_row[j],
+                Dx = side * row->s->at_bonds[0][k], Dy = side * row->s->at_bonds[1][k];
+            const double t1 = D * Dy;
+            const double t2 = D * Dx;
+            sum0 += -(J * x_b_ + z_b_ * t1);
+            sum1 += z_b_ * t2 - J * y_b_;
+            sum2 += x_b_ * t1 - J * z_b_ - y_b_ * t2;
+        }
+        const double t1 = sum2 + ((-2.0) * (K * z) - B);
+        out[i - row->from] = sum1 * z - y * t1;
+        out[apart + i - row->from] = x * t1 - sum0 * z;
+        out[2 * apart + i - row->from] = sum0 * y - sum1 * x;
     }
 }
 
@@ -471,9 +437,8 @@ size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bo
 /* Values of sites, the last axis fastest, into rows. */
 static void chiral_magnet_put(const chiral_magnet_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
+    memset(rows, 0, (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
 }
 
 /* The parameters at bonds, in the order of the bonds of each site. */
@@ -521,15 +486,13 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = chiral_magnet_block(rows, width);
-    for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < chiral_magnet_DIM; ++k)
-        s->before[k] = aligned + (chiral_magnet_ARRAYS + k) * block;
-    for (size_t k = 0; k < chiral_magnet_GATHERED; ++k)
-        s->gathered[k] = aligned + (chiral_magnet_ARRAYS + chiral_magnet_DIM + k) * block;
+    chiral_magnet_connect(s, bonds, memory + chiral_magnet_RESERVED * block);
+    for (size_t k = 0; k < chiral_magnet_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < chiral_magnet_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < chiral_magnet_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->x[k], x0 + k * sites);
-    chiral_magnet_connect(s, bonds, aligned + chiral_magnet_RESERVED * block);
     chiral_magnet_put_at_bonds(s, &own);
     return chiral_magnet_OK;
 }
@@ -576,9 +539,8 @@ static void chiral_magnet_sweep_part(const chiral_magnet_solver *s, int kind, co
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void chiral_magnet_make_flow(const chiral_magnet_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * chiral_magnet_ROW;
     (void)steps;
-    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[number], coef);
+    chiral_magnet_sweep_part(s, chiral_magnet_flow_parts[number], s->coef + number * chiral_magnet_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -601,14 +563,12 @@ static int chiral_magnet_try(chiral_magnet_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 chiral_magnet_status chiral_magnet_integrate(chiral_magnet_solver *s, double h, size_t steps)
 {
     chiral_magnet_status status = chiral_magnet_set_step(s, h);
     if (status != chiral_magnet_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) chiral_magnet_copy(s->x, s->before, s);
+    if (s->open) chiral_magnet_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else chiral_magnet_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = chiral_magnet_STRETCH; s->steps < end && status == chiral_magnet_OK;) {

@@ -1,7 +1,7 @@
 /*
  * The declarations of chiral_magnet.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 315caebe06d4e267f918d941360e581ca91966c68bec0ca762d3d6405cb12509
+ * body-sha256: 1c6068c813d06a2d27bc1a210a937d6f853d8cfeee3fae7c2fb7c9f1f2b3cbda
  */
 #ifndef CHIRAL_MAGNET_H
 #define CHIRAL_MAGNET_H
@@ -29,7 +29,7 @@ extern const chiral_magnet_params chiral_magnet_default_params;
 
 enum { chiral_magnet_ARRAYS = 3 };        /* arrays over the sites: fields, then parameters */
 enum { chiral_magnet_COEFFICIENTS = 30 }; /* numbers that depend on params and h only */
-enum { chiral_magnet_GATHERED = 3 };      /* sums over other sites that are held for each site */
+enum { chiral_magnet_GATHERED = 1 };      /* sums over other sites that are held for each site */
 enum { chiral_magnet_BOND_ARRAYS = 2 };   /* parameters at bonds */
 
 typedef enum { chiral_magnet_OK = 0, chiral_magnet_NO_CONVERGENCE, chiral_magnet_SINGULAR,
@@ -64,15 +64,13 @@ typedef struct {
     double t_before_h;
 } chiral_magnet_solver;
 
-/* The bonds of a graph: number k runs from the site ends[2 * k] to another one, ends[2 * k + 1], both counted
-   from 0. */
+/* The bonds of a graph: number k runs from site ends[2 * k] to another, ends[2 * k + 1], counted from 0. */
 typedef struct {
     size_t count;
     const size_t *ends;
 } chiral_magnet_bonds;
 
-/* The bytes that the solver of a graph with so many sites and bonds needs as its memory; 0 if they are too
-   many. */
+/* The bytes that the solver of a graph with so many sites and bonds needs as memory; 0 for too many. */
 size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bonds);
 
 /* Start at x0[field][site], with chiral_magnet_work_size(sizes, bonds->count) bytes of memory, as from

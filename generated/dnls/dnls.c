@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7bb0d09ccd921e20dd81afc5869e8c324f4b03151a901f4f30f2b0393d7319f8
+ * body-sha256: 95a45908d95b9687d30d3303c7d177e93502b9b590ff40cd955cf5da54fa50aa
  */
 #include "dnls.h"
 #include <float.h>
@@ -309,10 +309,10 @@ dnls_status dnls_init(dnls_solver *s, const dnls_params *params, const size_t si
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_LEAD;
     const size_t block = dnls_block(rows, width);
-    for (size_t k = 0; k < dnls_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < dnls_DIM; ++k) s->before[k] = aligned + (dnls_ARRAYS + k) * block;
+    for (size_t k = 0; k < dnls_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < dnls_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < dnls_DIM; ++k) dnls_put(s, s->x[k], x0 + k * sites);
     return dnls_OK;
 }
@@ -350,9 +350,8 @@ static void dnls_copy(double *const *to, double *const *from, const dnls_solver 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void dnls_make_flow(const dnls_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * dnls_ROW;
     (void)steps;
-    dnls_sweep_part(s, dnls_flow_parts[number], coef);
+    dnls_sweep_part(s, dnls_flow_parts[number], s->coef + number * dnls_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -374,14 +373,12 @@ static int dnls_try(dnls_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 dnls_status dnls_integrate(dnls_solver *s, double h, size_t steps)
 {
     dnls_status status = dnls_set_step(s, h);
     if (status != dnls_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) dnls_copy(s->x, s->before, s);
+    if (s->open) dnls_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else dnls_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_STRETCH; s->steps < end && status == dnls_OK;) {

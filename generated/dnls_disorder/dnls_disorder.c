@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b0ae2657eb189ac25d1e788e7716f8c553f66534b34a4d352b437a41cb16a4a0
+ * body-sha256: 4a28f53db496c607b7d95c06e197fcf88e5d80d72df05ddcb843774e665af13f
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -329,12 +329,10 @@ dnls_disorder_status dnls_disorder_init(dnls_disorder_solver *s, const dnls_diso
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
-        + dnls_disorder_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + dnls_disorder_LEAD;
     const size_t block = dnls_disorder_block(rows, width);
-    for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < dnls_disorder_DIM; ++k)
-        s->before[k] = aligned + (dnls_disorder_ARRAYS + k) * block;
+    for (size_t k = 0; k < dnls_disorder_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < dnls_disorder_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_put(s, s->x[k], x0 + k * sites);
     dnls_disorder_put_parameters(s, &own);
     return dnls_disorder_OK;
@@ -374,9 +372,8 @@ static void dnls_disorder_copy(double *const *to, double *const *from, const dnl
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void dnls_disorder_make_flow(const dnls_disorder_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * dnls_disorder_ROW;
     (void)steps;
-    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[number], coef);
+    dnls_disorder_sweep_part(s, dnls_disorder_flow_parts[number], s->coef + number * dnls_disorder_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -399,14 +396,12 @@ static int dnls_disorder_try(dnls_disorder_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 dnls_disorder_status dnls_disorder_integrate(dnls_disorder_solver *s, double h, size_t steps)
 {
     dnls_disorder_status status = dnls_disorder_set_step(s, h);
     if (status != dnls_disorder_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) dnls_disorder_copy(s->x, s->before, s);
+    if (s->open) dnls_disorder_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else dnls_disorder_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = dnls_disorder_STRETCH; s->steps < end && status == dnls_disorder_OK;) {

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3f9f6d21b951960178a681dd516a4a066d42ff619d270695252b6fc68c41cb7d
+ * body-sha256: 1824a8794de6ba45de6fb182298364c75415163cc174b7907fd0c4a6ffb60105
  */
 #include "food_web.h"
 #include <float.h>
@@ -32,8 +32,7 @@ enum { food_web_FLOWS = 25 };         /* in a step */
 /* Along each axis: the smallest size. */
 static const size_t food_web_least[food_web_AXES] = { 1 };
 
-/* Whether a part of H is that of the sites of one colour. The flows are those of all parts, of each colour
-   where so. */
+/* Whether a part of H is that of the sites of one colour: then it has a flow for each colour. */
 enum { food_web_PARTS = 1 };
 static const unsigned char food_web_by_colour[food_web_PARTS] = { 1 };
 
@@ -71,11 +70,9 @@ static void food_web_prepare(const food_web_params *params, double h, double coe
 /* A piece of a row, and what loops over its sites are told. */
 typedef struct {
     const food_web_solver *s;
-    double *const *x;        /* see food_web_solver */
-    ptrdiff_t from, to;      /* its sites, to not among them */
-    double *const *at_bonds; /* see food_web_solver */
-    double side;             /* 1, or -1 where a loop is told of bonds as if they ran the other way */
-    int chosen;              /* the colour that a part of H belongs to */
+    double *const *x;   /* see food_web_solver */
+    ptrdiff_t from, to; /* its sites, to not among them */
+    int chosen;         /* the colour that a part of H belongs to */
 } food_web_row;
 
 /* Before a loop over sites: tells compilers that they are independent. */
@@ -96,8 +93,6 @@ static inline food_web_row food_web_row_of(const food_web_solver *s)
     row.x = s->x;
     row.from = 0;
     row.to = s->length;
-    row.at_bonds = s->at_bonds;
-    row.side = 1.0;
     row.chosen = 0;
     return row;
 }
@@ -156,7 +151,8 @@ static inline double food_web_expm1_lane(double u)
 }
 
 /* What all other sites b add to the forces of H_1 at a site a. */
-static inline void food_web_gather1(const double *coef, const food_web_row *row)
+static inline void food_web_gather1(const double *coef, const food_web_row *row, double *const *at_bonds,
+    double sign)
 {
     (void)coef;
     const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
@@ -165,8 +161,8 @@ static inline void food_web_gather1(const double *coef, const food_web_row *row)
         for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
             if (row->s->colours[row->s->other[k]] != row->chosen) continue;
             const ptrdiff_t j = row->s->other[k];
-            const double side = k < row->s->middle[i] ? row->side : -row->side;
-            const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
+            const double side = k < row->s->middle[i] ? sign : -sign;
+            const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * at_bonds[0][k];
             sum0 += A * x_b_ * (1.0 - k_b_ / x_b_);
         }
         row->s->gathered[0][i] = sum0;
@@ -197,25 +193,8 @@ static void food_web_sweep_colour(const food_web_solver *s, int flow, const doub
     for (size_t unit = 0; unit < units; ++unit) {
         food_web_row row = food_web_piece_of(s, unit);
         row.chosen = colour;
-        food_web_gather1(coef, &row);
+        food_web_gather1(coef, &row, s->at_bonds, 1.0);
         food_web_sweep1(coef, &row);
-    }
-}
-
-/* What a site b adds to the forces at a site a. */
-static inline void food_web_bond_forces(const food_web_row *row)
-{
-    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
-    for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        const double x_a_ = x_row[i];
-        double sum0 = 0.0;
-        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
-            const ptrdiff_t j = row->s->other[k];
-            const double side = k < row->s->middle[i] ? row->side : -row->side;
-            const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->at_bonds[0][k];
-            sum0 += x_b_ * (A * x_a_) * (1.0 - k_b_ / x_b_);
-        }
-        row->s->gathered[0][i] = sum0;
     }
 }
 
@@ -233,10 +212,17 @@ static void food_web_energy_row(const food_web_row *row, double *restrict out)
 /* Pi grad H, at the sites of a row. */
 static void food_web_vector_field_row(const food_web_row *row, double *restrict out)
 {
-    food_web_bond_forces(row);
-    food_web_EACH_SITE
+    const double *restrict k_row = row->x[1], *restrict x_row = row->x[0];
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
-        out[i - row->from] = row->s->gathered[0][i];
+        const double x = x_row[i];
+        double sum0 = 0.0;
+        for (ptrdiff_t k = row->s->bonds[i]; k < row->s->bonds[i + 1]; ++k) {
+            const ptrdiff_t j = row->s->other[k];
+            const double side = k < row->s->middle[i] ? 1.0 : -1.0;
+            const double k_b_ = k_row[j], x_b_ = x_row[j], A = side * row->s->at_bonds[0][k];
+            sum0 += x_b_ * (A * x) * (1.0 - k_b_ / x_b_);
+        }
+        out[i - row->from] = sum0;
     }
 }
 
@@ -346,9 +332,8 @@ size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 /* Values of sites, the last axis fastest, into rows. */
 static void food_web_put(const food_web_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
+    memset(rows, 0, (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
 }
 
 /* The values of a parameter at sites, or one value for all. */
@@ -409,15 +394,14 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = food_web_block(rows, width);
-    for (size_t k = 0; k < food_web_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < food_web_DIM; ++k) s->before[k] = aligned + (food_web_ARRAYS + k) * block;
-    for (size_t k = 0; k < food_web_GATHERED; ++k)
-        s->gathered[k] = aligned + (food_web_ARRAYS + food_web_DIM + k) * block;
+    food_web_connect(s, bonds, memory + food_web_RESERVED * block);
+    for (size_t k = 0; k < food_web_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < food_web_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < food_web_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->x[k], x0 + k * sites);
     food_web_put_parameters(s, &own);
-    food_web_connect(s, bonds, aligned + food_web_RESERVED * block);
     food_web_put_at_bonds(s, &own);
     return food_web_OK;
 }
@@ -464,9 +448,8 @@ static void food_web_sweep_part(const food_web_solver *s, int kind, const double
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void food_web_make_flow(const food_web_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * food_web_ROW;
     (void)steps;
-    food_web_sweep_part(s, food_web_flow_parts[number], coef);
+    food_web_sweep_part(s, food_web_flow_parts[number], s->coef + number * food_web_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -488,14 +471,12 @@ static int food_web_try(food_web_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 food_web_status food_web_integrate(food_web_solver *s, double h, size_t steps)
 {
     food_web_status status = food_web_set_step(s, h);
     if (status != food_web_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) food_web_copy(s->x, s->before, s);
+    if (s->open) food_web_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else food_web_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = food_web_STRETCH; s->steps < end && status == food_web_OK;) {

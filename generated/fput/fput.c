@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 69c529297b07f5571eda4dc817647ab06ef291b048a2e2b73bd6684a7f5f8db9
+ * body-sha256: 908d43bef500cbb7a527df06fd57596fd92ccb28fb7cba7209d45fce8a5838d9
  */
 #include "fput.h"
 #include <float.h>
@@ -316,10 +316,10 @@ fput_status fput_init(fput_solver *s, const fput_params *params, const size_t si
     s->to = s->length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + fput_LEAD;
     const size_t block = fput_block(rows, width);
-    for (size_t k = 0; k < fput_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < fput_DIM; ++k) s->before[k] = aligned + (fput_ARRAYS + k) * block;
+    for (size_t k = 0; k < fput_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < fput_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < fput_DIM; ++k) fput_put(s, s->x[k], x0 + k * sites);
     return fput_OK;
 }
@@ -463,14 +463,12 @@ static int fput_try(fput_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 fput_status fput_integrate(fput_solver *s, double h, size_t steps)
 {
     fput_status status = fput_set_step(s, h);
     if (status != fput_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) fput_copy(s->x, s->before, s);
+    if (s->open) fput_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else fput_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = fput_STRETCH; s->steps < end && status == fput_OK;) {

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 6100e5fa19262d2f231a101e864417a159335b5e363b66ed5dcfcc27aa59cceb
+ * body-sha256: 9e5e8d098aeb3278f88f7aa5d581b702fa435bc5cf69432fbcd922ca11b166c5
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -619,12 +619,12 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + heisenberg_LEAD;
     const size_t block = heisenberg_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_LEAD + heisenberg_RESERVED * block);
+    s->lines = (ptrdiff_t *)(void *)(memory - heisenberg_LEAD + heisenberg_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) heisenberg_find_lines(s, r, s->lines + r * heisenberg_LINES);
-    for (size_t k = 0; k < heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < heisenberg_DIM; ++k) s->before[k] = aligned + (heisenberg_ARRAYS + k) * block;
+    for (size_t k = 0; k < heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->x[k], x0 + k * sites);
     heisenberg_put_parameters(s, &own);
     return heisenberg_OK;
@@ -797,8 +797,7 @@ heisenberg_status heisenberg_integrate(heisenberg_solver *s, double h, size_t st
 {
     heisenberg_status status = heisenberg_set_step(s, h);
     if (status != heisenberg_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) heisenberg_copy(s->x, s->before, s);
+    if (s->open) heisenberg_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else heisenberg_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = heisenberg_STRETCH; s->steps < end && status == heisenberg_OK;) {

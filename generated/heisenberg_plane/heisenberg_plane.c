@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6f332c0a5cce51200eff80dfbb07f8c494dd51d7a42c585b575f5b5118c095d7
+ * body-sha256: 95c5fd0e8c9d6ff87d84756f9ee4eb5a06c3809b65dda054e30e5768929208c2
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -427,15 +427,14 @@ heisenberg_plane_status heisenberg_plane_init(heisenberg_plane_solver *s,
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + heisenberg_plane_LEAD;
     const size_t block = heisenberg_plane_block(rows, width);
-    s->lines = (ptrdiff_t *)(void *)(aligned - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block);
+    s->lines = (ptrdiff_t *)(void *)(memory - heisenberg_plane_LEAD + heisenberg_plane_RESERVED * block);
     for (size_t r = 0; r < rows; ++r)
         heisenberg_plane_find_lines(s, r, s->lines + r * heisenberg_plane_LINES);
-    for (size_t k = 0; k < heisenberg_plane_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < heisenberg_plane_DIM; ++k)
-        s->before[k] = aligned + (heisenberg_plane_ARRAYS + k) * block;
+    for (size_t k = 0; k < heisenberg_plane_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < heisenberg_plane_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k) heisenberg_plane_put(s, s->x[k], x0 + k * sites);
     return heisenberg_plane_OK;
 }
@@ -475,9 +474,9 @@ static void heisenberg_plane_copy(double *const *to, double *const *from, const 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void heisenberg_plane_make_flow(const heisenberg_plane_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * heisenberg_plane_ROW;
     (void)steps;
-    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[number], coef);
+    heisenberg_plane_sweep_part(s, heisenberg_plane_flow_parts[number],
+        s->coef + number * heisenberg_plane_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -501,13 +500,12 @@ static int heisenberg_plane_try(heisenberg_plane_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 heisenberg_plane_status heisenberg_plane_integrate(heisenberg_plane_solver *s, double h, size_t steps)
 {
     heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
     if (status != heisenberg_plane_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
+    /* undoes the last flow, which the next makes too */
     if (s->open) heisenberg_plane_copy(s->x, s->before, s);
     else heisenberg_plane_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 3dd65cf6538279f050968231683be0dd0165d26987a91448ac19be1f795dd50d
+ * body-sha256: 7d2d127cb8f480f780fd40bcc375b9a0a77a91ec012ba72cf2ec0f8cf048d1df
  */
 #include "kdv.h"
 #include <float.h>
@@ -31,7 +31,6 @@ enum { kdv_RESERVED = 9 };      /* arrays over the sites in the memory of a solv
 enum { kdv_ROW = 7 };           /* coefficients of one flow */
 enum { kdv_ROWS_OF_FLOWS = 1 }; /* rows of coefficients */
 enum { kdv_SIDES = 2 };         /* y before and after a sweep */
-enum { kdv_IMPLICIT = 7 };      /* of these for y, its guesses and its variations */
 enum { kdv_MOST_SWEEPS = 200 }; /* that a stage may take */
 enum { kdv_REACH = 2 };         /* sites that y at a site depends on, to each side */
 enum { kdv_BAND = 2 };          /* diagonals beside that of the matrix of Newton's method */
@@ -365,12 +364,12 @@ kdv_status kdv_init(kdv_solver *s, const kdv_params *params, const size_t sizes[
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + kdv_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + kdv_LEAD;
     const size_t block = kdv_block(rows, width);
-    s->matrix = aligned - kdv_LEAD + kdv_RESERVED * block;
-    for (size_t k = 0; k < kdv_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < kdv_DIM; ++k) s->before[k] = aligned + (kdv_ARRAYS + k) * block;
-    kdv_place_middle(s, aligned + (kdv_RESERVED - kdv_IMPLICIT) * block, block);
+    s->matrix = memory - kdv_LEAD + kdv_RESERVED * block;
+    for (size_t k = 0; k < kdv_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < kdv_DIM; ++k, memory += block) s->before[k] = memory;
+    kdv_place_middle(s, memory, block);
     for (size_t k = 0; k < kdv_DIM; ++k) kdv_put(s, s->x[k], x0 + k * sites);
     return kdv_OK;
 }

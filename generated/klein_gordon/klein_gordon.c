@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e0c89aa4b3ea8220641e6618fcfb74d28b0a147f2e7b7a616f07aa0a2f0c547d
+ * body-sha256: 6bee4f9dc53bdbbeadfe6b255055cc8e982c01200959bb12796687024eee38b5
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -260,10 +260,10 @@ klein_gordon_status klein_gordon_init(klein_gordon_solver *s, const klein_gordon
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + klein_gordon_LEAD;
     const size_t block = klein_gordon_block(rows, width);
-    for (size_t k = 0; k < klein_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < klein_gordon_DIM; ++k) s->before[k] = aligned + (klein_gordon_ARRAYS + k) * block;
+    for (size_t k = 0; k < klein_gordon_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < klein_gordon_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) klein_gordon_put(s, s->x[k], x0 + k * sites);
     return klein_gordon_OK;
 }
@@ -302,9 +302,8 @@ static void klein_gordon_copy(double *const *to, double *const *from, const klei
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void klein_gordon_make_flow(const klein_gordon_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * klein_gordon_ROW;
     (void)steps;
-    klein_gordon_sweep_part(s, klein_gordon_flow_parts[number], coef);
+    klein_gordon_sweep_part(s, klein_gordon_flow_parts[number], s->coef + number * klein_gordon_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -327,14 +326,12 @@ static int klein_gordon_try(klein_gordon_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 klein_gordon_status klein_gordon_integrate(klein_gordon_solver *s, double h, size_t steps)
 {
     klein_gordon_status status = klein_gordon_set_step(s, h);
     if (status != klein_gordon_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) klein_gordon_copy(s->x, s->before, s);
+    if (s->open) klein_gordon_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else klein_gordon_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = klein_gordon_STRETCH; s->steps < end && status == klein_gordon_OK;) {

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0a781c657c1aa9d088d688c0a3481862c4368bf68cd5af586e01714970d079e2
+ * body-sha256: 3d850cee5f6eb62235ccc14e6fdc8e36bb8d5041672360ff89b5cc1a90cb3a6f
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -277,12 +277,11 @@ nonlinear_wave_status nonlinear_wave_init(nonlinear_wave_solver *s, const nonlin
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + nonlinear_wave_LEAD;
     const size_t block = nonlinear_wave_block(rows, width);
-    for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < nonlinear_wave_DIM; ++k)
-        s->before[k] = aligned + (nonlinear_wave_ARRAYS + k) * block;
+    for (size_t k = 0; k < nonlinear_wave_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < nonlinear_wave_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k) nonlinear_wave_put(s, s->x[k], x0 + k * sites);
     return nonlinear_wave_OK;
 }
@@ -321,9 +320,8 @@ static void nonlinear_wave_copy(double *const *to, double *const *from, const no
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void nonlinear_wave_make_flow(const nonlinear_wave_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * nonlinear_wave_ROW;
     (void)steps;
-    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[number], coef);
+    nonlinear_wave_sweep_part(s, nonlinear_wave_flow_parts[number], s->coef + number * nonlinear_wave_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -346,14 +344,12 @@ static int nonlinear_wave_try(nonlinear_wave_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 nonlinear_wave_status nonlinear_wave_integrate(nonlinear_wave_solver *s, double h, size_t steps)
 {
     nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
     if (status != nonlinear_wave_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) nonlinear_wave_copy(s->x, s->before, s);
+    if (s->open) nonlinear_wave_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else nonlinear_wave_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = nonlinear_wave_STRETCH; s->steps < end && status == nonlinear_wave_OK;) {

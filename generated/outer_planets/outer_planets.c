@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6dde609fcdc8b1d5054f143da56d33adeb7d4219b4a2ccee36191c115626036c
+ * body-sha256: f0d757ab38fc88fb3811449f62baca6c848c40306d79aed02cf6770bfd209c24
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -293,9 +293,8 @@ size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 /* Values of sites, the last axis fastest, into rows. */
 static void outer_planets_put(const outer_planets_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
+    memset(rows, 0, (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
 }
 
 /* The values of a parameter at sites, or one value for all. */
@@ -346,13 +345,11 @@ outer_planets_status outer_planets_init(outer_planets_solver *s, const outer_pla
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = outer_planets_block(rows, width);
-    for (size_t k = 0; k < outer_planets_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < outer_planets_DIM; ++k)
-        s->before[k] = aligned + (outer_planets_ARRAYS + k) * block;
-    for (size_t k = 0; k < outer_planets_GATHERED; ++k)
-        s->gathered[k] = aligned + (outer_planets_ARRAYS + outer_planets_DIM + k) * block;
+    for (size_t k = 0; k < outer_planets_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < outer_planets_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < outer_planets_GATHERED; ++k, memory += block) s->gathered[k] = memory;
     for (size_t k = 0; k < outer_planets_DIM; ++k) outer_planets_put(s, s->x[k], x0 + k * sites);
     outer_planets_put_parameters(s, &own);
     return outer_planets_OK;
@@ -391,9 +388,8 @@ static void outer_planets_copy(double *const *to, double *const *from, const out
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void outer_planets_make_flow(const outer_planets_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * outer_planets_ROW;
     (void)steps;
-    outer_planets_sweep_part(s, outer_planets_flow_parts[number], coef);
+    outer_planets_sweep_part(s, outer_planets_flow_parts[number], s->coef + number * outer_planets_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -416,14 +412,12 @@ static int outer_planets_try(outer_planets_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 outer_planets_status outer_planets_integrate(outer_planets_solver *s, double h, size_t steps)
 {
     outer_planets_status status = outer_planets_set_step(s, h);
     if (status != outer_planets_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) outer_planets_copy(s->x, s->before, s);
+    if (s->open) outer_planets_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else outer_planets_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = outer_planets_STRETCH; s->steps < end && status == outer_planets_OK;) {

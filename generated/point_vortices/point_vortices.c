@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 8af19a3e60f3146e01e069694a412c00152de5824d64ea1da422df27ddd79723
+ * body-sha256: 0779535552f075a4a3cf04a0081a3a6b4e4d88864d609d943521e45dc685a22e
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -30,7 +30,6 @@ enum { point_vortices_RESERVED = 84 };     /* arrays over the sites in the memor
 enum { point_vortices_ROW = 1 };           /* coefficients of one flow */
 enum { point_vortices_ROWS_OF_FLOWS = 5 }; /* rows of coefficients */
 enum { point_vortices_SIDES = 2 };         /* y before and after a sweep */
-enum { point_vortices_IMPLICIT = 75 };     /* of these for y, its guesses and its variations */
 enum { point_vortices_MOST_SWEEPS = 200 }; /* that a stage may take */
 
 /* Along each axis: the smallest size. */
@@ -319,9 +318,8 @@ size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 /* Values of sites, the last axis fastest, into rows. */
 static void point_vortices_put(const point_vortices_solver *s, double *rows, const double *values)
 {
-    double *row = rows;
-    memset(row, 0, (size_t)s->width * sizeof *row);
-    memcpy(row, values, (size_t)s->length * sizeof *row);
+    memset(rows, 0, (size_t)s->width * sizeof *rows);
+    memcpy(rows, values, (size_t)s->length * sizeof *rows);
 }
 
 /* The values of a parameter at sites, or one value for all. */
@@ -389,15 +387,12 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64);
     const size_t block = point_vortices_block(rows, width);
-    for (size_t k = 0; k < point_vortices_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < point_vortices_DIM; ++k)
-        s->before[k] = aligned + (point_vortices_ARRAYS + k) * block;
-    for (size_t k = 0; k < point_vortices_GATHERED; ++k)
-        s->gathered[k] = aligned + (point_vortices_ARRAYS + point_vortices_DIM + k) * block;
-    point_vortices_place_middle(s, aligned + (point_vortices_RESERVED - point_vortices_IMPLICIT) * block,
-        block);
+    for (size_t k = 0; k < point_vortices_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < point_vortices_DIM; ++k, memory += block) s->before[k] = memory;
+    for (size_t k = 0; k < point_vortices_GATHERED; ++k, memory += block) s->gathered[k] = memory;
+    point_vortices_place_middle(s, memory, block);
     for (size_t k = 0; k < point_vortices_DIM; ++k) point_vortices_put(s, s->x[k], x0 + k * sites);
     point_vortices_put_parameters(s, &own);
     return point_vortices_OK;

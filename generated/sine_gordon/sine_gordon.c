@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6883867376cb8c238aaf2992bb8fb16c38d36df290a624365b4042344c65e8bd
+ * body-sha256: 57649338a4a28bac09a94a993f08fd8a5acfb06146cdc475d22a24b02c93cea8
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -286,10 +286,10 @@ sine_gordon_status sine_gordon_init(sine_gordon_solver *s, const sine_gordon_par
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + sine_gordon_LEAD;
     const size_t block = sine_gordon_block(rows, width);
-    for (size_t k = 0; k < sine_gordon_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < sine_gordon_DIM; ++k) s->before[k] = aligned + (sine_gordon_ARRAYS + k) * block;
+    for (size_t k = 0; k < sine_gordon_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < sine_gordon_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) sine_gordon_put(s, s->x[k], x0 + k * sites);
     return sine_gordon_OK;
 }
@@ -328,9 +328,8 @@ static void sine_gordon_copy(double *const *to, double *const *from, const sine_
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void sine_gordon_make_flow(const sine_gordon_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * sine_gordon_ROW;
     (void)steps;
-    sine_gordon_sweep_part(s, sine_gordon_flow_parts[number], coef);
+    sine_gordon_sweep_part(s, sine_gordon_flow_parts[number], s->coef + number * sine_gordon_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -353,14 +352,12 @@ static int sine_gordon_try(sine_gordon_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 sine_gordon_status sine_gordon_integrate(sine_gordon_solver *s, double h, size_t steps)
 {
     sine_gordon_status status = sine_gordon_set_step(s, h);
     if (status != sine_gordon_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) sine_gordon_copy(s->x, s->before, s);
+    if (s->open) sine_gordon_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else sine_gordon_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = sine_gordon_STRETCH; s->steps < end && status == sine_gordon_OK;) {

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: fe08980a4487232f21250acf89e49ed551dfb8f7d526a452cec8d1bda65defd2
+ * body-sha256: e4b66bbdc5b3e2e83a8d9c2156d7cdf9e2a676a4a7b3c2495aab2bdcddb2eb4a
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -527,12 +527,11 @@ thermal_heisenberg_status thermal_heisenberg_init(thermal_heisenberg_solver *s,
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64)
         + thermal_heisenberg_LEAD;
     const size_t block = thermal_heisenberg_block(rows, width);
-    for (size_t k = 0; k < thermal_heisenberg_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < thermal_heisenberg_DIM; ++k)
-        s->before[k] = aligned + (thermal_heisenberg_ARRAYS + k) * block;
+    for (size_t k = 0; k < thermal_heisenberg_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < thermal_heisenberg_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < thermal_heisenberg_DIM; ++k) thermal_heisenberg_put(s, s->x[k], x0 + k * sites);
     thermal_heisenberg_put_parameters(s, &own);
     return thermal_heisenberg_OK;
@@ -601,8 +600,7 @@ static int thermal_heisenberg_try(thermal_heisenberg_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 thermal_heisenberg_status thermal_heisenberg_integrate(thermal_heisenberg_solver *s, double h, size_t steps)
 {
     thermal_heisenberg_status status = thermal_heisenberg_set_step(s, h);

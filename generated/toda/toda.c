@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a028ef711f0049e960301774ff636d8479d5e3630688cfa9f46de8013346672e
+ * body-sha256: 709ff655d2d8e6116840e168c871c9b84ae4d4c915b96ce40d53aeb14a53dc1f
  */
 #include "toda.h"
 #include <float.h>
@@ -297,10 +297,10 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + toda_LEAD;
     const size_t block = toda_block(rows, width);
-    for (size_t k = 0; k < toda_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < toda_DIM; ++k) s->before[k] = aligned + (toda_ARRAYS + k) * block;
+    for (size_t k = 0; k < toda_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < toda_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->x[k], x0 + k * sites);
     return toda_OK;
 }
@@ -338,9 +338,8 @@ static void toda_copy(double *const *to, double *const *from, const toda_solver 
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void toda_make_flow(const toda_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * toda_ROW;
     (void)steps;
-    toda_sweep_part(s, toda_flow_parts[number], coef);
+    toda_sweep_part(s, toda_flow_parts[number], s->coef + number * toda_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -362,14 +361,12 @@ static int toda_try(toda_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 toda_status toda_integrate(toda_solver *s, double h, size_t steps)
 {
     toda_status status = toda_set_step(s, h);
     if (status != toda_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) toda_copy(s->x, s->before, s);
+    if (s->open) toda_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else toda_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = toda_STRETCH; s->steps < end && status == toda_OK;) {

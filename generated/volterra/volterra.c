@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a441128d26b561d836547662668d4283b27297f30a2cf7f62030da458681f11d
+ * body-sha256: 0264b569b0016bad8cce9d5bdf29dca25d363b8edad4b0135312a8c47a62ad74
  */
 #include "volterra.h"
 #include <float.h>
@@ -302,10 +302,10 @@ volterra_status volterra_init(volterra_solver *s, const volterra_params *params,
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + volterra_LEAD;
     const size_t block = volterra_block(rows, width);
-    for (size_t k = 0; k < volterra_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < volterra_DIM; ++k) s->before[k] = aligned + (volterra_ARRAYS + k) * block;
+    for (size_t k = 0; k < volterra_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < volterra_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < volterra_DIM; ++k) volterra_put(s, s->x[k], x0 + k * sites);
     return volterra_OK;
 }
@@ -343,9 +343,8 @@ static void volterra_copy(double *const *to, double *const *from, const volterra
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void volterra_make_flow(const volterra_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * volterra_ROW;
     (void)steps;
-    volterra_sweep_part(s, volterra_flow_parts[number], coef);
+    volterra_sweep_part(s, volterra_flow_parts[number], s->coef + number * volterra_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -367,14 +366,12 @@ static int volterra_try(volterra_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 volterra_status volterra_integrate(volterra_solver *s, double h, size_t steps)
 {
     volterra_status status = volterra_set_step(s, h);
     if (status != volterra_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) volterra_copy(s->x, s->before, s);
+    if (s->open) volterra_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else volterra_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = volterra_STRETCH; s->steps < end && status == volterra_OK;) {

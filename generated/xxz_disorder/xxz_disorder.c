@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7d82436661b3334f5986b02d836b448824d217855e159c7cb281ee99fc472ead
+ * body-sha256: 9f7cb0f815fdaeef726117e1d44cc651113f6ac276b4201a47dc2c015cb5818b
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -346,10 +346,10 @@ xxz_disorder_status xxz_disorder_init(xxz_disorder_solver *s, const xxz_disorder
     s->length = (ptrdiff_t)length;
     s->width = width;
     s->params = own;
-    double *aligned = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
+    double *memory = (double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64) + xxz_disorder_LEAD;
     const size_t block = xxz_disorder_block(rows, width);
-    for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < xxz_disorder_DIM; ++k) s->before[k] = aligned + (xxz_disorder_ARRAYS + k) * block;
+    for (size_t k = 0; k < xxz_disorder_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < xxz_disorder_DIM; ++k, memory += block) s->before[k] = memory;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) xxz_disorder_put(s, s->x[k], x0 + k * sites);
     xxz_disorder_put_parameters(s, &own);
     return xxz_disorder_OK;
@@ -389,9 +389,8 @@ static void xxz_disorder_copy(double *const *to, double *const *from, const xxz_
 /* The flow of that number in a step after so many; after those of a step the last and the first together. */
 static void xxz_disorder_make_flow(const xxz_disorder_solver *s, size_t steps, int number)
 {
-    const double *coef = s->coef + number * xxz_disorder_ROW;
     (void)steps;
-    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[number], coef);
+    xxz_disorder_sweep_part(s, xxz_disorder_flow_parts[number], s->coef + number * xxz_disorder_ROW);
 }
 
 /* Some steps, joined, without the last flow; no steps are that flow alone. */
@@ -414,14 +413,12 @@ static int xxz_disorder_try(xxz_disorder_solver *s, size_t steps)
     return 0;
 }
 
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by
-   one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 xxz_disorder_status xxz_disorder_integrate(xxz_disorder_solver *s, double h, size_t steps)
 {
     xxz_disorder_status status = xxz_disorder_set_step(s, h);
     if (status != xxz_disorder_OK || steps == 0) return status;
-    /* undoes the last flow, which the next step makes with its first */
-    if (s->open) xxz_disorder_copy(s->x, s->before, s);
+    if (s->open) xxz_disorder_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else xxz_disorder_copy(s->before, s->x, s);
     const size_t end = s->steps + steps;
     for (size_t stretch = xxz_disorder_STRETCH; s->steps < end && status == xxz_disorder_OK;) {

@@ -163,11 +163,14 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 static void phi_put(const phi_solver *s, double *rows, const double *values)
 {
     PHI_EACH_ROW {
+#if PHI_HALO
         double *row = PHI_ROW_AT(rows);
         memset(PHI_MEMORY_OF(row), 0, (size_t)s->width * sizeof *row);
         memcpy(row, PHI_VALUES_AT(values), (size_t)s->length * sizeof *row);
-#if PHI_HALO
         phi_ends(row, s->length, 0, s->length);
+#else
+        memset(PHI_ROW_AT(rows), 0, (size_t)s->width * sizeof *rows);
+        memcpy(PHI_ROW_AT(rows), PHI_VALUES_AT(values), (size_t)s->length * sizeof *rows);
 #endif
     }
 }
@@ -330,36 +333,36 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->t = s->now = t0;
 #endif
     s->params = own;
-    double *aligned = PHI_FIRST_SITE((double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64));
+    double *memory = PHI_FIRST_SITE((double *)(void *)((char *)work + (64 - (uintptr_t)work % 64) % 64));
     const size_t block = phi_block(rows, width);
 #if !PHI_ONE_ROW
-    s->lines = (ptrdiff_t *)(void *)(PHI_MEMORY_OF(aligned) + PHI_RESERVED * block);
+    s->lines = (ptrdiff_t *)(void *)(PHI_MEMORY_OF(memory) + PHI_RESERVED * block);
     for (size_t r = 0; r < rows; ++r) phi_find_lines(s, r, s->lines + r * PHI_LINES);
 #endif
 #if PHI_BANDED
-    s->matrix = PHI_MEMORY_OF(aligned) + PHI_RESERVED * block;
+    s->matrix = PHI_MEMORY_OF(memory) + PHI_RESERVED * block;
 #endif
-    for (size_t k = 0; k < PHI_ARRAYS; ++k) s->x[k] = aligned + k * block;
-    for (size_t k = 0; k < PHI_DIM; ++k) s->before[k] = aligned + (PHI_ARRAYS + k) * block;
+#if PHI_GRAPH
+    phi_connect(s, bonds, PHI_MEMORY_OF(memory) + PHI_RESERVED * block);
+#endif
+    for (size_t k = 0; k < PHI_ARRAYS; ++k, memory += block) s->x[k] = memory;
+    for (size_t k = 0; k < PHI_DIM; ++k, memory += block) s->before[k] = memory;
 #if PHI_GATHER
-    for (size_t k = 0; k < PHI_GATHERED; ++k) s->gathered[k] = aligned + (PHI_ARRAYS + PHI_DIM + k) * block;
+    for (size_t k = 0; k < PHI_GATHERED; ++k, memory += block) s->gathered[k] = memory;
 #endif
 #if PHI_SERIES
-    phi_place_middle(s, aligned + (PHI_RESERVED - PHI_IMPLICIT) * block, block);
+    phi_place_middle(s, memory, block);
 #endif
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->x[k], x0 + k * sites);
 #if PHI_COMPENSATED
-    for (size_t k = 0; k < 2 * PHI_DIM; ++k) s->carry[k] = aligned + (PHI_RESERVED - 2 * PHI_DIM + k) * block;
+    for (size_t k = 0; k < 2 * PHI_DIM; ++k, memory += block) s->carry[k] = memory;
     phi_forget(s);
 #endif
 #if PHI_SITE_PARAMETERS
     phi_put_parameters(s, &own);
 #endif
-#if PHI_GRAPH
-    phi_connect(s, bonds, PHI_MEMORY_OF(aligned) + PHI_RESERVED * block);
-#if PHI_BOND_PARAMETERS
+#if PHI_GRAPH && PHI_BOND_PARAMETERS
     phi_put_at_bonds(s, &own);
-#endif
 #endif
     return PHI_OK;
 }

@@ -123,13 +123,13 @@ typedef struct {
 } phi_solver;
 
 #if PHI_GRAPH
-/* The bonds of a graph: number k runs from the site ends[2 * k] to another one, ends[2 * k + 1], both counted from 0. */
+/* The bonds of a graph: number k runs from site ends[2 * k] to another, ends[2 * k + 1], counted from 0. */
 typedef struct {
     size_t count;
     const size_t *ends;
 } phi_bonds;
 
-/* The bytes that the solver of a graph with so many sites and bonds needs as its memory; 0 if they are too many. */
+/* The bytes that the solver of a graph with so many sites and bonds needs as memory; 0 for too many. */
 size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds);
 
 /* Start at x0[field][site], with phi_work_size(sizes, bonds->count) bytes of memory, as from malloc, which must stay.

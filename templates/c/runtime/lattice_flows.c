@@ -89,11 +89,11 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 #if PHI_RENEWED
     double coef[PHI_ROW];
     phi_renew(s, number, steps, coef);
-#else
-    const double *coef = s->coef + number * PHI_ROW;
-    (void)steps;
-#endif
     phi_sweep_part(s, phi_flow_parts[number], coef PHI_AND_FAR(s->far > 0));
+#else
+    (void)steps;
+    phi_sweep_part(s, phi_flow_parts[number], s->coef + number * PHI_ROW PHI_AND_FAR(s->far > 0));
+#endif
 }
 
 #endif
@@ -194,7 +194,7 @@ static int phi_close(phi_solver *s)
 /* Functions for small arguments give no number for larger ones. The state is looked at after a stretch of steps only: where
    it is not finite, these are made again one by one, and that which fails by functions for arguments of any size. */
 #else
-/* The state is looked at after a stretch of steps only: where it is not finite, these are made again one by one. */
+/* The state is looked at after a stretch of steps only: if not finite, these are made again one by one. */
 #endif
 #if PHI_ADJOINT
 /* Steps from s->before, where s->x stands too, but for the last flow of the last step. */
@@ -209,7 +209,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next step makes with its first */
+    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else phi_copy(s->before, s->x, s);
 #endif
 #endif
@@ -253,7 +253,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
 #if PHI_NOISE
     phi_copy(s->before, s->x, s);
 #else
-    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next step makes with its first */
+    if (s->open) phi_copy(s->x, s->before, s); /* undoes the last flow, which the next makes too */
     else phi_copy(s->before, s->x, s);
 #endif
     status = phi_march(s, steps);

@@ -26,17 +26,8 @@ typedef struct {
 #if PHI_GIVERS
     ptrdiff_t givers[PHI_LINES];  /* the rows that hand something to this one, where they have been found */
 #endif
-#if PHI_BOND_PARAMETERS
-    double *const *at_bonds;      /* see phi_solver */
-#if PHI_SIDED
-    double side;                  /* 1, or -1 where a loop is told of bonds as if they ran the other way */
-#endif
-#endif
 #if PHI_BY_COLOUR
     int chosen;                   /* the colour that a part of H belongs to */
-#if PHI_ACROSS
-    int across;                   /* whether it is that of the other ends of bonds, where a loop is told */
-#endif
 #endif
 #if PHI_OPEN && !PHI_ONE_ROW
     double present[PHI_WEIGHTS];  /* 1 for terms of H that are there as far as the other axes say, else 0 */
@@ -132,17 +123,8 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 #if PHI_ADJOINT
     row.bar = row.handed = NULL;
 #endif
-#if PHI_BOND_PARAMETERS
-    row.at_bonds = s->at_bonds;
-#if PHI_SIDED
-    row.side = 1.0;
-#endif
-#endif
 #if PHI_BY_COLOUR
     row.chosen = 0;
-#if PHI_ACROSS
-    row.across = 0;
-#endif
 #endif
 #if PHI_COLOURS
 #if !PHI_ONE_ROW

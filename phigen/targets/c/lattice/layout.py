@@ -98,6 +98,11 @@ class Layout:
         """Whether bonds are given at run time."""
         return self.partners.graph
 
+    @property
+    def sums_up(self) -> bool:
+        """Whether what is seen at a site adds up what bonds add to it by itself: where no stage needs these sums."""
+        return self.graph and self.step.equation is None
+
 
 def layout_of(program: Program, step: Sweeps) -> Layout:
     """The layout of a lattice."""
@@ -129,8 +134,6 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SWEPT": program.profile == "small",
         "PAIRS": step.partners is not None and not layout.graph,
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
-        "SIDED": program.profile == "small" and bool(step.parts),
-        "ACROSS": program.profile == "small" and not step.adjoint and {"here", "there"} <= chosen_ends(step),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
         "HANDS": any(hands(program, step)),
         "SHARES": shares(step),

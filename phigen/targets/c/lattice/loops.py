@@ -15,7 +15,6 @@ from phigen.symbolic.expression import ONE, ZERO, gradient, substitute
 from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
 from phigen.targets.c.kernels import FUNCTIONS, lane_calls
-from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
 from phigen.targets.c.layout import comment
@@ -156,7 +155,7 @@ def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls:
     swept = sweep.colour if program.profile == "fast" or sweep.is_tangent else "row->swept"
     first = f"{name}_first(row, {swept}, row->from)"
     over = f"for (ptrdiff_t i = {first}, to = row->to; i < to; i += {layout.colour_step})" if coloured else OVER_SITES
-    text = _looped(head, names, body, name, over)
+    text = looped(head, names, body, name, over)
     shared = (
         "_".join(["tangent" if sweep.is_tangent else "sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
     )
@@ -190,7 +189,7 @@ def middle_loop(
     body = names.loaded()
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     body += [f"{out[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
-    text = _looped(head, names, body, program.name)
+    text = looped(head, names, body, program.name)
     return Loop(kernel.name + form, _purpose(kernel, form), told(program), text)
 
 
@@ -199,29 +198,8 @@ def _added(name: str, read: bool, value: str) -> str:
     return f"= {name} + {value}" if read else f"+= {value}"
 
 
-def seen_loop(program: Program, layout: Layout, kernel: Kernel) -> str:
-    """A kernel as a loop that fills arrays over the sites."""
-    name, code, partners = program.name, lower(kernel), layout.partners
-    calls = seen_calls(program)
-    names = SiteNames(program, layout, kernel, code, set(), calls, partners.field.names)
-    head = comment(f"/* {plain(sentence(kernel.purpose + ', at the sites of a row'))} */")
-    head.append(f"static void {name}_{kernel.name}_row(const {name}_row *row, double *restrict out)\n{{")
-    body = names.loaded()
-    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    early = list[str]()
-    gather = {"energy": partners.energy, "vector_field": partners.field}.get(kernel.name)
-    for own, _ in over_ends(gather) if gather else ():
-        early.append(f"    {name}_{own.kernel.name}(row);")
-    shared = " + 0.5 * row->s->gathered[0][i]" * bool(kernel.name == "energy" and early)
-    for s in code.stores:
-        place = f"{s.index} * apart + ".removeprefix("1 * ") * (s.index > 0)
-        body.append(f"out[{place}i - row->from] = {f'{names.show(s.value)}{shared}'.removeprefix('0.0 + ')};")
-    apart = ["    const ptrdiff_t apart = (ptrdiff_t)row->s->sites;"] * (len(code.stores) > 1)
-    text = _looped([*head, *early, *apart], names, body, name)
-    return text + "}\n"
-
-
-def _looped(head: list[str], names: SiteNames, body: list[str], name: str, over: str = OVER_SITES) -> str:
+def looped(head: list[str], names: SiteNames, body: list[str], name: str, over: str = OVER_SITES) -> str:
+    """The declarations of what is read before a loop over sites, and that loop."""
     lines = [*head, *(f"    {line}" for line in names.pointers())]
     lines += [f"    {name}_EACH_SITE", f"    {over} {{", *(f"        {line}" for line in body), "    }"]
     return "\n".join(lines) + "\n"

@@ -67,11 +67,12 @@ def _differences(program: Program) -> int:
 def _gathered(layout: Layout) -> int:
     """Sums over bonds or pairs that are held for each site at once."""
     own, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
-    return max(len(g.names) for g in (*swept, own.energy, own.field, own.varied))
+    seen = () if layout.sums_up else (own.energy, own.field, own.varied)
+    return max([1, *(len(g.names) for g in (*swept, *seen))])
 
 
-def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> tuple[int, int]:
-    """Arrays over the sites in the memory of a solver, and those of them that a stage needs."""
+def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
+    """Arrays over the sites in the memory of a solver."""
     own, stage = program.dimension, 0
     if layout.step.equation:
         stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
@@ -79,7 +80,7 @@ def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> tupl
         stage += has["BANDED"] + (DIRECTIONS + 1 + (own + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
         stage = stage * own + has["KRYLOV"]  # one for sums over pieces
     fields = own + 2 * own * has["COMPENSATED"]  # before a step, and what rounding leaves out
-    return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage, stage
+    return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
 def _bars(program: Program, member: Mapping[str, str]) -> list[str]:
@@ -122,11 +123,10 @@ def model(program: Program, step: Sweeps) -> str:
     joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
     multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
     has = switches(program, step, layout)
-    reserved, of_stage = _reserved(program, layout, has)
     constants = [
         *[("HALO", layout.halo, "sites that are copied beside a row")] * has["HALO"],
         *[("LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row")] * has["HALO"],
-        ("RESERVED", reserved, "arrays over the sites in the memory of a solver"),
+        ("RESERVED", _reserved(program, layout, has), "arrays over the sites in the memory of a solver"),
         *[("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it")] * several,
         ("ROW", max(1, step.row), "coefficients of one flow"),
         ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
@@ -143,7 +143,6 @@ def model(program: Program, step: Sweeps) -> str:
         constants += [
             ("SIDES", 2 if layout.slopes else 3, "y before and after a sweep" + ", and varied" * (not layout.slopes))
         ]
-        constants += [("IMPLICIT", of_stage, "of these for y, its guesses and its variations")]
         constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
         if has["BANDED"]:
             constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]

@@ -17,7 +17,10 @@ from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
-_OWN = frozenset({"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole"})
+_OWN = frozenset(
+    {"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole"}
+    | {"at_bonds", "sign", "across"}
+)
 
 
 #: The loop over the sites of a piece of a row.
@@ -44,14 +47,18 @@ class SiteNames:
         seeds: Mapping[str, Sequence[str]] = MappingProxyType({}),
         here: str = "a",
         opposite: Set[str] = frozenset(),
+        at_bonds: str = "row->s->at_bonds",
+        inside: bool = False,
     ) -> None:
+        """``opposite`` are the parameters with the sign of bonds, and all are in arrays ``at_bonds``; ``inside`` a loop
+        over sites are those over their bonds, so that the end a of a bond is the site itself."""
         self.layout, self.moved, self.code, self._fields = layout, moved, code, program.coordinates
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
         shares = {f"share{k}" for k in range(layout.step.row + len(program.parameters))}
         numbered = {f"{word}{k}" for word in ("change", "add", "sum") for k in range(3)} | shares
         self.scope = Scope(C_RESERVED | _OWN | called | numbered)
         self.show = printer(self.scope, calls)
-        self._here = here
+        self._here, self._inside = here, inside
         self._pointers: dict[tuple[str, int], str] = {}
         self._loaded: list[str] = []
         self._weights: list[str] = []
@@ -66,7 +73,8 @@ class SiteNames:
                 self.scope.bind(s, named)
                 self._first.append(f"{named} = coef[{s.key[0]}]")
             elif isinstance(s, Symbol) and s.kind == GATHERED:
-                self.scope.bind(s, f"row->s->gathered[{list(sums).index(s)}][i]")
+                number = list(sums).index(s)
+                self.scope.bind(s, f"sum{number}" if inside else f"row->s->gathered[{number}][i]")
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
                 self.scope.bind(s, "(row->s->colours[i] == row->chosen ? 1.0 : 0.0)")
             elif isinstance(s, Symbol) and s.kind == VARIATION:
@@ -91,14 +99,18 @@ class SiteNames:
                 self._bind_site(s)
             elif s in layout.step.sites.at_bonds:
                 side = "side * " if s in opposite else ""
-                self._other.append(f"{self.scope[s]} = {side}row->at_bonds[{layout.step.sites.at_bonds.index(s)}][k]")
+                self._other.append(f"{self.scope[s]} = {side}{at_bonds}[{layout.step.sites.at_bonds.index(s)}][k]")
             else:
                 self._first.append(f"{self.scope[s]} = row->s->params.{member[s]}")
 
     def _bind_end(self, s: str) -> None:
         base, end = self.layout.step.sites.ends[s]
         pointer = self.pointer(base, 0)
-        self._bind_at(end, f"{self.scope[s]} = {pointer}")
+        if self._inside and end == self._here:
+            self.scope.bind(s, self.scope[base])
+            self._loaded.append(f"{self.scope[base]} = {pointer}[i]")
+        else:
+            self._bind_at(end, f"{self.scope[s]} = {pointer}")
 
     def _bind_at(self, end: str, text: str) -> None:
         """What is read at the site i that a loop is over, or at the other site j of a bond or a pair."""
@@ -167,7 +179,7 @@ class SiteNames:
 
     def loaded(self) -> list[str]:
         """What is read at the beginning of the loop."""
-        return [*together(self._loaded), *self._weights]
+        return [*together([*dict.fromkeys(self._loaded)]), *self._weights]
 
     def pointers(self) -> list[str]:
         """What is read before the loop."""

@@ -23,11 +23,11 @@ from phigen.targets.c.lattice.loops import (
     has_ends,
     in_loops,
     middle_loop,
-    seen_loop,
     site_block,
     sweep_loop,
 )
-from phigen.targets.c.lattice.partners import gathering, is_told_ends, partners
+from phigen.targets.c.lattice.partners import gathering, partners, told_of_bonds
+from phigen.targets.c.lattice.seen import seen_loop
 from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
 from phigen.targets.lattice import bounds
 from phigen.targets.rendering import render
@@ -221,16 +221,14 @@ class Case:
 class _Call:
     """A loop for some sites of a piece: their bounds, if not all of them; the ``colour`` that it is told, if any; the
     fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
-    likewise, and the ``side`` that bonds are seen from; whether the colour that is chosen lies ``across`` them;
-    ``others`` would do the same."""
+    likewise; what it is ``told`` of bonds besides; ``others`` would do the same."""
 
     loop: Loop
     sites: str = ""
     colour: int | None = None
     order: tuple[str, ...] = ()
-    bonds: tuple[str, ...] | None = None
-    side: float | None = None
-    across: bool | None = None
+    bonds: tuple[str, ...] = ()
+    told: tuple[str, ...] = ()
     others: tuple[_Call, ...] = ()
 
 
@@ -238,20 +236,8 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
     """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
     order: tuple[str, ...] = ()
     colour: int | None = 0
-    bonds: tuple[str, ...] | None = ()
-    side: float | None = 1.0
-    across: bool | None = False
     for call in called:
         told = list[str]()
-        if call.bonds not in (bonds, None):
-            bonds = call.bonds
-            told.append(f"row.at_bonds = {'_'.join(bonds) or 's->at_bonds'}")
-        if call.side not in (side, None):
-            side = call.side
-            told.append(f"row.side = {side!r}")
-        if call.across not in (across, None):
-            across = call.across
-            told.append(f"row.across = {int(across)}")
         if call.colour not in (colour, None):
             colour = call.colour
             told.append(f"row.swept = {colour}")
@@ -259,10 +245,10 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
             order = call.order
             told.append(f"row.x = {'_'.join(order) or 's->x'}")
         yield from [f"{', '.join(told)};"] if told else []
-        yield f"{program.name}_{names[call.loop.code]}(coef, {at(program, call.sites)});"
+        yield f"{program.name}_{names[call.loop.code]}({', '.join(['coef', at(program, call.sites), *call.told])});"
 
 
-def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...] | None]) -> Iterator[str]:
+def _other_bonds(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]:
     """The parameters at bonds, in other orders that are used."""
     for order in dict.fromkeys(order for order in used if order):
         places = ", ".join(f"s->at_bonds[{layout.step.sites.at_bonds.index(p)}]" for p in order)
@@ -283,16 +269,21 @@ def _reordered(layout: Layout, used: Sequence[tuple[str, ...]]) -> Iterator[str]
 
 def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Iterator[_Call]:
     """The loops of a sweep, in the order in which they are called for a piece of a row."""
-    told = layout.graph and is_told_ends(program, layout)
-    meant = [ends.chosen for ends, _ in over_ends(sweep.gather)] if sweep.gather else []
-    across = [chosen == "there" if told and chosen else None for chosen in meant]
+    meant = over_ends(sweep.gather) if sweep.gather else []
+
+    def told(k: int, bonds: tuple[str, ...], sign: float) -> tuple[str, ...]:
+        ends, opposite = meant[k]
+        values = {"at_bonds": "_".join(bonds) or "s->at_bonds", "sign": f"{sign!r}"}
+        values["across"] = str(int(ends.chosen == "there"))
+        return tuple(values[name] for name in told_of_bonds(program, layout, ends, opposite))
+
     for k, loop in enumerate(gathering(program, layout, sweep.gather, "coef") if sweep.gather else ()):
         others = []
         alone = program.profile == "fast" or layout.step.adjoint
-        for gather, bonds, side in () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather):
+        for gather, bonds, sign in () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather):
             again = [*gathering(program, layout, gather, "coef")]
-            others.append(_Call(again[k], bonds=bonds, side=side, across=across[k]))
-        yield _Call(loop, bonds=(), side=1.0, across=across[k], others=tuple(others))
+            others.append(_Call(again[k], bonds=bonds, told=told(k, bonds, sign)))
+        yield _Call(loop, told=told(k, (), 1.0), others=tuple(others))
     loops = [
         sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
         for kernel, more in forms_of(program, sweep.kernel)
@@ -300,8 +291,8 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
     if len(loops) == 1 and wide(layout, sweep):
         yield _Call(loops[0], "0, (s->length + 7) & ~(ptrdiff_t)7")
     else:
-        told = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
-        yield from (replace(call, colour=sweep.colour if told else None) for call in calls_over_sites(loops))
+        swept = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
+        yield from (replace(call, colour=sweep.colour if swept else None) for call in calls_over_sites(loops))
 
 
 def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
@@ -431,7 +422,7 @@ def _over_pieces(
     """
     pieces = [case for case in cases if isinstance(case, Case)]
     ends = [_copied_ends(program, layout, case.moved, case) for case in pieces]
-    own, last = [[*case.setup, *case.calls] for case in pieces], list[str]()
+    own, last = [[*case.calls] for case in pieces], list[str]()
     if layout.step.sites.open == (True,) and any(ends):
         (line,) = _copied_ends(program, layout, ["k"], pieces[0])
         last = [f"for (int k = 0; k < {program.name}_DIM; ++k) {line}"]
@@ -439,7 +430,8 @@ def _over_pieces(
         own = [[*lines, *copied] for lines, copied in zip(own, ends, strict=True)]
     if len(own) > 1 and program.profile == "small":
         calls = ["switch (part) {", *_cases(own, labels), "}", *last]
-        return _piece(values, Case(calls, (), beside=False))
+        setup = [*dict.fromkeys(line for case in pieces for line in case.setup)]
+        return _piece(values, Case(calls, setup, beside=False))
     whole = iter([replace(case, calls=[*case.calls, *copied]) for case, copied in zip(pieces, ends, strict=True)])
     loops = [[case] if isinstance(case, str) else _piece(values, next(whole)) for case in cases]
     return loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels), "}"]
