@@ -153,7 +153,8 @@ class _Domain:
     ) -> None:
         self.lattice, self.comm, self.sizes, self.h = lattice, lattice.comm, sizes, h
         self.stages: list[Stage] = lattice.stages
-        self.joined = len(self.stages) - 1
+        self.noisy = bool(lattice.solver.interface.noise)
+        self.joined = len(self.stages) - (not self.noisy)
         self.last = max(1, self.joined - 1)
         reach = [max(s.behind for s in self.stages), max(s.ahead for s in self.stages)]
         self.planes = self._share(sizes[0], max(reach))
@@ -171,7 +172,6 @@ class _Domain:
         session = lattice.solver.started(Beginning(checked, h, values, t0, draws))
         assert isinstance(session, CLatticeSession)
         self.session = session
-        self.noisy = bool(lattice.solver.interface.noise)
         if self.noisy:  # each site has the random numbers that it has in the whole
             session.set_planes((self.planes[0] - ghosts[0]) % sizes[0], sizes[0])
         self.session.begin(h)

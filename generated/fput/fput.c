@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 908d43bef500cbb7a527df06fd57596fd92ccb28fb7cba7209d45fce8a5838d9
+ * body-sha256: 06bd3fb2e0dabdce92bfe30c1744c01f9d6b72e22d5d18356a13eff8614613cb
  */
 #include "fput.h"
 #include <float.h>
@@ -576,11 +576,14 @@ void fput_vector_field(const fput_solver *s, double *out)
 }
 
 /* ---- Steps by hand ---- */
+/* Sweeps that have a number: those of a step, and the joined one, which with noise there is not. */
+enum { fput_NUMBERED = fput_FLOWS + 1 };
+
 size_t fput_stages(void) { return fput_FLOWS; }
 
 fput_status fput_describe(size_t number, fput_stage *about)
 {
-    if (number > fput_FLOWS || about == NULL) return fput_BAD_ARGUMENT;
+    if (number >= fput_NUMBERED || about == NULL) return fput_BAD_ARGUMENT;
     *about = fput_stages_of[fput_flow_parts[number] - 1];
     return fput_OK;
 }
@@ -589,7 +592,7 @@ fput_status fput_begin(fput_solver *s, double h) { return fput_set_step(s, h); }
 
 fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size_t to)
 {
-    if (s == NULL || !s->prepared || number > fput_FLOWS || from > to || to > s->sizes[0])
+    if (s == NULL || !s->prepared || number >= fput_NUMBERED || from > to || to > s->sizes[0])
         return fput_BAD_ARGUMENT;
     (void)far;
     const int part = fput_flow_parts[number];

@@ -1,7 +1,7 @@
 /*
  * The declarations of fput.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 88a278d072f838e28801ef59eacd7985c60993cb13b31b49408954e5cab6df67
+ * body-sha256: a81498a141b23801a2d6962a76f86768e4a1d9c068d2b8c794d70d2bdb9cab6f
  */
 #ifndef FPUT_H
 #define FPUT_H
@@ -89,9 +89,10 @@ void fput_vector_field(const fput_solver *s, double *out);
 
 /* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ...
    before fput_stages(), each a sweep over all planes: the sites of one place along the first axis. Number
-   fput_stages() is the last stage of a step and the first of the next together, as fput_integrate does them.
-   A stage may be made in any number of pieces, in any order, with the bits of fput_step; before that, the
-   planes beside a piece that it reads must have made the stages before. */
+   fput_stages(), which with noise there is not, is the last stage of a step and the first of the next
+   together, as fput_integrate does them. A stage may be made in any number of pieces, in any order, with the
+   bits of fput_step; before that, the planes beside a piece that it reads must have made the stages
+   before. */
 typedef struct {
     /* planes before the first one swept, and after the last one, that are read */
     size_t behind, ahead;

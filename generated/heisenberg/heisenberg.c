@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 9e5e8d098aeb3278f88f7aa5d581b702fa435bc5cf69432fbcd922ca11b166c5
+ * body-sha256: 5629f0d4c61586e81112cd747ad64cea23e8db763d0fc9720c5f06296fd0b018
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -932,11 +932,14 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out)
 }
 
 /* ---- Steps by hand ---- */
+/* Sweeps that have a number: those of a step, and the joined one, which with noise there is not. */
+enum { heisenberg_NUMBERED = heisenberg_FLOWS + 1 };
+
 size_t heisenberg_stages(void) { return heisenberg_FLOWS; }
 
 heisenberg_status heisenberg_describe(size_t number, heisenberg_stage *about)
 {
-    if (number > heisenberg_FLOWS || about == NULL) return heisenberg_BAD_ARGUMENT;
+    if (number >= heisenberg_NUMBERED || about == NULL) return heisenberg_BAD_ARGUMENT;
     *about = heisenberg_stages_of[heisenberg_flow_parts[number] - 1];
     return heisenberg_OK;
 }
@@ -948,7 +951,7 @@ static size_t heisenberg_rows_of_plane(const heisenberg_solver *s) { return s->r
 
 heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far, size_t from, size_t to)
 {
-    if (s == NULL || !s->prepared || number > heisenberg_FLOWS || from > to || to > s->sizes[0])
+    if (s == NULL || !s->prepared || number >= heisenberg_NUMBERED || from > to || to > s->sizes[0])
         return heisenberg_BAD_ARGUMENT;
     const int part = heisenberg_flow_parts[number];
     const double *coef = s->coef + number * heisenberg_ROW;

@@ -1,7 +1,7 @@
 /*
  * The declarations of heisenberg.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c7d0994562de25c2c891e194787c18cb6d9948d50c2e106fbdfae632b14374d4
+ * body-sha256: 21b99811df45cccf9ff35382c7df283131ec74c865a886c496e18dc246c20a11
  */
 #ifndef HEISENBERG_H
 #define HEISENBERG_H
@@ -90,9 +90,10 @@ void heisenberg_vector_field(const heisenberg_solver *s, double *out);
 
 /* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ...
    before heisenberg_stages(), each a sweep over all planes: the sites of one place along the first axis.
-   Number heisenberg_stages() is the last stage of a step and the first of the next together, as
-   heisenberg_integrate does them. A stage may be made in any number of pieces, in any order, with the bits of
-   heisenberg_step; before that, the planes beside a piece that it reads must have made the stages before. */
+   Number heisenberg_stages(), which with noise there is not, is the last stage of a step and the first of the
+   next together, as heisenberg_integrate does them. A stage may be made in any number of pieces, in any
+   order, with the bits of heisenberg_step; before that, the planes beside a piece that it reads must have
+   made the stages before. */
 typedef struct {
     /* planes before the first one swept, and after the last one, that are read */
     size_t behind, ahead;

@@ -308,12 +308,15 @@ class CLattice:
         self._c = bound(self._library, interface.name, wanted, _OFFERED, single=interface.single)
 
     def stages(self) -> list[Stage]:
-        """The sweeps of a step in order, then the last and the first together. Raises `ValueError` if not offered."""
+        """The sweeps of a step in order, then the last and the first together, which are apart where there is noise.
+
+        Raises `ValueError` if they are not offered.
+        """
         if not hasattr(self._c, "stages"):
             raise ValueError(
                 f"{self.interface.name} has no steps by hand: it is no grid that is split, or profile small"
             )
-        found = [Stage() for _ in range(self._c.stages() + 1)]
+        found = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]
         for k, stage in enumerate(found):
             self._c.describe(k, ctypes.addressof(stage))
         return found

@@ -246,10 +246,10 @@ void phi_vector_field(const phi_solver *s, double *out);
 
 #if PHI_BY_HAND
 /* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ... before
-   phi_stages(), each a sweep over all planes: the sites of one place along the first axis. Number phi_stages() is the
-   last stage of a step and the first of the next together, as phi_integrate does them. A stage may be made in any number
-   of pieces, in any order, with the bits of phi_step; before that, the planes beside a piece that it reads must have
-   made the stages before. */
+   phi_stages(), each a sweep over all planes: the sites of one place along the first axis. Number phi_stages(), which with
+   noise there is not, is the last stage of a step and the first of the next together, as phi_integrate does them. A stage
+   may be made in any number of pieces, in any order, with the bits of phi_step; before that, the planes beside a piece
+   that it reads must have made the stages before. */
 typedef struct {
     size_t behind, ahead;        /* planes before the first one swept, and after the last one, that are read */
     unsigned long read, changed; /* fields that are read there, and those that are changed; bit k is field k */

@@ -6,11 +6,18 @@
 #include "sweeps.h"
 
 /* ---- Steps by hand ---- */
+/* Sweeps that have a number: those of a step, and the joined one, which with noise there is not. */
+#if PHI_NOISE
+enum { PHI_NUMBERED = PHI_FLOWS };
+#else
+enum { PHI_NUMBERED = PHI_FLOWS + 1 };
+#endif
+
 size_t phi_stages(void) { return PHI_FLOWS; }
 
 phi_status phi_describe(size_t number, phi_stage *about)
 {
-    if (number > PHI_FLOWS || about == NULL) return PHI_BAD_ARGUMENT;
+    if (number >= PHI_NUMBERED || about == NULL) return PHI_BAD_ARGUMENT;
     *about = phi_stages_of[phi_flow_parts[number] - 1];
     return PHI_OK;
 }
@@ -24,7 +31,7 @@ static size_t phi_rows_of_plane(const phi_solver *s) { return s->rows / s->sizes
 #endif
 phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t to)
 {
-    if (s == NULL || !s->prepared || number > PHI_FLOWS || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+    if (s == NULL || !s->prepared || number >= PHI_NUMBERED || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
 #if !PHI_NEAR
     (void)far;
 #endif
