@@ -63,7 +63,7 @@ class SiteNames:
         self._loaded: list[str] = []
         self._weights: list[str] = []
         self._own: list[str] = []
-        self._other: list[str] = []
+        self._other: dict[str, str] = {}
         self._first: list[str] = []
         self._starts: list[tuple[str, str]] = []
         member = members(program)
@@ -99,7 +99,7 @@ class SiteNames:
                 self._bind_site(s)
             elif s in layout.step.sites.at_bonds:
                 side = "side * " if s in opposite else ""
-                self._other.append(f"{self.scope[s]} = {side}{at_bonds}[{layout.step.sites.at_bonds.index(s)}][k]")
+                self._other[s] = f"{self.scope[s]} = {side}{at_bonds}[{layout.step.sites.at_bonds.index(s)}][k]"
             else:
                 self._first.append(f"{self.scope[s]} = row->s->params.{member[s]}")
 
@@ -110,17 +110,19 @@ class SiteNames:
             self.scope.bind(s, self.scope[base])
             self._loaded.append(f"{self.scope[base]} = {pointer}[i]")
         else:
-            self._bind_at(end, f"{self.scope[s]} = {pointer}")
+            self._bind_at(s, end, f"{self.scope[s]} = {pointer}")
 
-    def _bind_at(self, end: str, text: str) -> None:
+    def _bind_at(self, s: str, end: str, text: str) -> None:
         """What is read at the site i that a loop is over, or at the other site j of a bond or a pair."""
-        own = end == self._here
-        (self._own if own else self._other).append(f"{text}[{'i' if own else 'j'}]")
+        if end == self._here:
+            self._own.append(f"{text}[i]")
+        else:
+            self._other[s] = f"{text}[j]"
 
     def _bind_seed(self, s: Symbol, text: str, *, of_pair: bool) -> None:
         """A cotangent, of what is found at a site, or of the sums over its bonds or pairs."""
         if of_pair:
-            self._bind_at("a", f"{self.scope[s]} = {text}")
+            self._bind_at(s, "a", f"{self.scope[s]} = {text}")
         else:
             self._loaded.append(f"{self.scope[s]} = {text}[i]")
 
@@ -142,13 +144,13 @@ class SiteNames:
         array = f"row->varied[{self._fields.index(field)}]"
         self._starts.append(("const double *", f"{pointer} = {array}{self.layout.at(line)}"))
         if end:
-            self._bind_at(end, f"{self.scope[s]} = {pointer}")
+            self._bind_at(s, end, f"{self.scope[s]} = {pointer}")
         else:
             self.scope.bind(s, beside(pointer, offset[-1]))
 
-    def of_pair(self) -> tuple[list[str], list[str]]:
-        """What is read at the other site, and at the site that a loop is over."""
-        return together(self._other), together(self._own)
+    def of_pair(self, code: Code) -> tuple[list[str], list[str]]:
+        """What some code reads at the other site, and at the site that a loop is over."""
+        return together([text for s, text in self._other.items() if s in code.used]), together(self._own)
 
     def _bind_weight(self, s: Symbol) -> None:
         k = self.layout.weights.index(s)

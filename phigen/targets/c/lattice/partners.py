@@ -93,7 +93,7 @@ def _over_bonds(
         [
             *(f"    {line}" for line in [*begin, *names.pointers()]),
             f"    {OVER_SITES} {{",
-            *(f"        {line}" for line in [*names.of_pair()[1], sums_of(count), *added, *out]),
+            *(f"        {line}" for line in [*names.of_pair(code)[1], sums_of(count), *added, *out]),
             "    }\n",
         ]
     )
@@ -110,7 +110,7 @@ def added_up(
     """The loop over the bonds of a site i that adds up what they add there; ``one`` is the side that they are seen
     from."""
     loop, passed = bonds_of(ends, told=told)
-    other = names.of_pair()[0]
+    other = names.of_pair(code)[0]
     inner = [*passed, *["const ptrdiff_t j = row->s->other[k];"] * bool(other)]
     inner += [f"const double side = k < row->s->middle[i] ? {one} : -{one};"] * bool(opposite)
     inner += other
@@ -130,7 +130,7 @@ def _over_pairs(
     """A loop over all sites b, in it one over the sites a of a piece; statements with the values of the kernel."""
     name, code = program.name, lower(kernel)
     names = SiteNames(program, layout, kernel, code, set(), calls)
-    other, own = names.of_pair()
+    other, own = names.of_pair(code)
     lines = [*own, *(f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments)]
     lines += [text.format(*(names.show(s.value) for s in code.stores)) for text in body]
     return "\n".join(

@@ -52,7 +52,7 @@ def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str
     count = len(kernel.inputs["sums_bar"])
     seeds = {"sums_bar": [f"handed_{first + k}" for k in range(count)]}
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end)
-    other, own = names.of_pair()
+    other, own = names.of_pair(code)
     stores = [s for s in code.stores if not s.value.is_zero]
     bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array not in _SUMS}
     head = names.pointers()
