@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lattice.lattices import LATTICES, on_grid
+from support import WARNINGS, run, tool, write
 
 from phigen import resources
 from phigen.api import lattice_solver_of
@@ -19,6 +20,7 @@ from phigen.lattice.expansion import expand
 from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of
 from phigen.spec import load, loads
+from phigen.spec.model import Extras
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import total
 from phigen.symbolic.verdict import PROVED
@@ -44,8 +46,8 @@ def test_a_lattice_is_documented_proved_and_starts(path: Path) -> None:
     assert spec.title
     assert spec.references
     assert {s.name: s.verdict for s in examine(spec).statements if s.verdict != PROVED} == {}
-    for run in spec.runs.values():
-        start = start_of(spec, run)
+    for experiment in spec.runs.values():
+        start = start_of(spec, experiment)
         assert start.state.shape == (len(spec.coordinates), *start.sizes)
         assert np.all(np.isfinite(start.state))
 
@@ -54,6 +56,17 @@ def test_short_code_is_short_for_any_number_of_sites() -> None:
     found = {path.stem: emit(compile_spec(load(path), profile="small").program, "c", "phigen") for path in FILES}
     lines = {name: sum(len(text.splitlines()) for text in files.values()) for name, files in found.items()}
     assert {name: n for name, n in lines.items() if n > MOST_LINES} == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.stem)
+@pytest.mark.parametrize("profile", ["small", "fast"])
+def test_code_with_transposes_has_no_function_that_nothing_calls(path: Path, profile: str, tmp_path: Path) -> None:
+    spec = load(path)
+    program = compile_spec(spec, profile=profile, extras=Extras(adjoint=not spec.noise)).program
+    write(tmp_path, emit(program, "c", "phigen"))
+    # Only clang minds those that are inline.
+    run([tool("clang"), "-std=c99", *WARNINGS, "-fsyntax-only", f"{path.stem}.c"], tmp_path)
 
 
 def test_bonds_that_differ_in_direction_and_parameters_are_added_up_by_one_loop() -> None:

@@ -139,7 +139,9 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
         "UNDONE": can_be_undone(program, step),
-        "APART": program.profile == "small" or step.sites.colours > 1 or step.partners is not None,
+        "APART": program.profile == "small"
+        or step.sites.colours > 1
+        or bool(step.partners and not step.partners.graph),
         "GIVERS": step.adjoint is not None and givers(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
