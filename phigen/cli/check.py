@@ -115,12 +115,16 @@ def _compared(
 
 
 def _collect(examination: Examination, collector: Collector, console: Console) -> None:
+    from phigen.proofs.examination import hint_of
+
     counts = Counter(s.verdict for s in examination.statements)
     told = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
     console.note(f"{examination.spec.file}: {told or 'nothing was proved'}")
     mistakes = [s.name for _, s in examination.mistakes]
     if mistakes:
-        collector.errors.append(CheckError(f"{examination.spec.file}: refuted: {'; '.join(mistakes)}"))
+        hints = dict.fromkeys(hint_of(examination.spec, group) for group, _ in examination.mistakes)
+        hinted = "".join(f"\n  hint: {hint}" for hint in hints if hint)
+        collector.errors.append(CheckError(f"{examination.spec.file}: refuted: {'; '.join(mistakes)}{hinted}"))
     elif examination.obstacle:
         collector.errors.append(examination.obstacle)
     elif examination.compilation:

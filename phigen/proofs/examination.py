@@ -8,7 +8,7 @@ from phigen.compilation import Compilation
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.definedness import start_is_defined
 from phigen.proofs.statements import ATTITUDE, CASIMIRS, DEFINEDNESS, INVARIANTS, METHOD, MONITOR, SPLITTING, Groups
-from phigen.spec.model import Spec
+from phigen.spec.model import LieAlgebraForm, Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
 #: What rests on π: if that is no Poisson tensor, all of it may fail, and says nothing more.
@@ -64,8 +64,24 @@ def refuted(groups: Groups) -> list[Statement]:
 
 def refutation(found: Examination) -> str:
     """What is refuted, for a message, each with its place in the spec."""
-    hint = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
-    return "\n".join(str(found.spec.diagnostic(_place(found.spec, g, s), str(s), hint)) for g, s in found.mistakes)
+    rest = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
+    return "\n".join(
+        str(found.spec.diagnostic(_place(found.spec, group, s), str(s), rest or hint_of(found.spec, group)))
+        for group, s in found.mistakes
+    )
+
+
+def hint_of(spec: Spec, group: str) -> str:
+    """What is often the cause where a statement of a group is false, or nothing.
+
+    Of Casimirs it is that coordinates are in another order than the basis of the algebra that is named.
+    """
+    form = spec.poisson
+    if group != CASIMIRS or not isinstance(form, LieAlgebraForm) or not form.family:
+        return ""
+    return (
+        f"coordinates stand for the basis of {form.family}({form.size}) in its order; phigen show prints their brackets"
+    )
 
 
 def doubts(found: Examination) -> list[Diagnostic]:

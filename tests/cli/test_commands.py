@@ -56,6 +56,13 @@ def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen
     assert "Casimirs, invariants" in phigen("build", path).stderr
 
 
+def test_a_casimir_for_another_order_of_the_basis_is_told_of_it(phigen, write):
+    algebra = "coordinates: [p1, p2, p3, m1, m2, m3]\npoisson: {lie_algebra: {name: se(3)}}\nhamiltonian: m1**2\n"
+    done = phigen("check", write("a.yaml", f"phigen: 1\nname: a\n{algebra}casimirs: {{C: p1**2 + p2**2 + p3**2}}\n"))
+    assert done.exit_code == 5
+    assert "hint: coordinates stand for the basis of se(3) in its order" in done.stderr
+
+
 def test_wrong_birealisation_is_one_error_in_the_names_of_the_spec(phigen, write):
     head = "phigen: 1\nname: a\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
     maps = "alpha: [x - x*y*p_y/2, y + x*y*p_x/2], beta: [x + x*y*p_y/2, y - x*y*p_x/2]"
