@@ -188,7 +188,7 @@ def model(program: Program, step: Sweeps) -> str:
         "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
         "part_count": len(step.by_colour),
         "graph": layout.graph,
-        "allowed": [*_allowed(asked, arrays)],
+        "allowed": [*_allowed(asked, arrays, graph=layout.graph)],
         "stages": ", ".join(_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts)))
         if has["BY_HAND"]
         else "",
@@ -207,9 +207,10 @@ def _moments(step: Sweeps) -> list[float]:
     return _by_flow(step, step.schedule.moments, 0.0)
 
 
-def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]]) -> Iterator[str]:
+def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]], *, graph: bool) -> Iterator[str]:
     """The statements that return whether parameters are allowed."""
-    unused = ["params"] * (not asked and not arrays) + ["sites"] * all(at != "sites" for *_, at in arrays)
+    counts = ["sites", *["bonds"] * graph]
+    unused = ["params"] * (not asked and not arrays) + [c for c in counts if all(at != c for *_, at in arrays)]
     if unused:
         yield ", ".join(f"(void){u}" for u in unused) + ";"
     for member, positive, required, at in arrays:
