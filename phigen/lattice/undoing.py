@@ -1,8 +1,8 @@
 """Sweeps that are undone: the fields before a flow, found from those after it by the flow over the time −h.
 
 What a sweep computes is written for −h term by term: what is odd in h changes its sign, what is even stays, so that
-sines, exponentials and forces that the transpose of the sweep reads are computed once. Flows with forces are left out:
-what these damp cannot be found again. So are bonds and pairs, whose sums take most of the time.
+sines, exponentials and forces that the transpose of the sweep reads are computed once. What bonds or pairs add up is
+that too: it reads nothing that the sweep moves. Flows with forces are left out: what these damp cannot be found again.
 """
 
 from __future__ import annotations
@@ -27,11 +27,12 @@ ODD, NEITHER, EVEN = -1, 0, 1
 
 def can_be_undone(program: Program, step: Sweeps) -> bool:
     """Whether the transpose of a step finds the fields before its sweeps from those after them."""
-    if not step.adjoint or step.equation or step.partners or program.forced:
+    if not step.adjoint or step.equation or program.forced:
         return False
-    parities = _of_coefficients(step)
-    used = {s for part in step.parts for sweep in part for s in symbols_of(*sweep.kernel.roots)}
-    return all(parities.get(s, EVEN) for s in used)
+    parities, sweeps = _of_coefficients(step), [sweep for part in step.parts for sweep in part]
+    used = {s for sweep in sweeps for s in symbols_of(*sweep.kernel.roots)}
+    summed = {s for sweep in sweeps if sweep.gather for k in sweep.gather.kernels for s in symbols_of(*k.roots)}
+    return all(parities.get(s, EVEN) for s in used) and all(parities.get(s, EVEN) == EVEN for s in summed)
 
 
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:

@@ -70,7 +70,21 @@ poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: apart*p**2/2 + l*(q[i+1] - q)**2/2 + share0*whole*q**4 + j*cos(q)
 """
 LATTICES["named fast"] = {"l": 0.3 + np.arange(SITES) / 5, "whole": 1.2, "j": 0.4}
+#: Colours, disorder at bonds and sites, and coefficients of bonds that depend on the time.
+DRIVEN_GRAPH = """phigen: 1
+name: driven_graph
+time: t
+lattice: {graph: bonds}
+coordinates: [x, y, z]
+parameters: {J: {value: 1, at: bonds}, B: {value: 0.3, at: sites}, D: 0.4, w: 1.3}
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian:
+  sites: -(1 + D*sin(w*t))*B*z
+  bonds: -J*cos(w*t)*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]) - D*(x[a]*y[b] - y[a]*x[b])
+"""
+LATTICES["driven_graph"] = RING | {"J": 0.4 + np.arange(7) / 9, "B": 0.5 + np.arange(SITES) / 7, "w": 1.2}
 OWN = {
+    "driven_graph": DRIVEN_GRAPH,
     "driven": DRIVEN,
     "swung": SWUNG,
     "named": NAMED,
@@ -83,7 +97,7 @@ OWN = {
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
 #: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
-IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES}
+IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES, "driven_graph": SITES}
 IN_C |= {
     "membrane fast": (5, 6),
     "named fast": SITES,
@@ -271,12 +285,24 @@ hamiltonian: p**2/2 - k*q**2/2 + (q[i+1] - q)**2/8
 """
 
 
-def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast():
+#: The same along bonds.
+UNSTABLE_GRAPH = """phigen: 1
+name: unstable
+lattice: {graph: bonds}
+coordinates: [q, p]
+parameters: {k: 9}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: {sites: p**2/2 - k*q**2/2, bonds: "(q[a] - q[b])**2/8"}
+"""
+
+
+@pytest.mark.parametrize(("text", "given"), [(UNSTABLE, {}), (UNSTABLE_GRAPH, RING)], ids=["grid", "graph"])
+def test_sweeps_are_undone_over_single_steps_where_fields_grow_fast(text, given):
     """Over 40 steps by a factor of 1e15: of where they began nothing is left in the end, to its last digit."""
-    spec, random = phigen.spec.loads(UNSTABLE), np.random.default_rng(8)
+    spec, random = phigen.spec.loads(text), np.random.default_rng(8)
     in_c, numpy = (phigen.compile(spec, target=target, adjoint=True) for target in ("c", "numpy"))
     x, bar = random.normal(size=(2, 2, SITES))
-    found, expected = (solver.pullback(x, 0.3, 40, bar) for solver in (in_c, numpy))
+    found, expected = (solver.pullback(x, 0.3, 40, bar, parameters=given) for solver in (in_c, numpy))
     assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12)
     assert found.parameters_bar["k"] == pytest.approx(expected.parameters_bar["k"], rel=1e-12)
 
@@ -285,18 +311,20 @@ def same(a, b):
     return a.keys() == b.keys() and all(np.array_equal(a[name], b[name]) for name in a)
 
 
-@pytest.mark.parametrize(("name", "steps", "stride"), [("driven", 17, 7), ("heisenberg_plane small", 150, 60)])
+@pytest.mark.parametrize(
+    ("name", "steps", "stride"), [("driven", 17, 7), ("heisenberg_plane small", 150, 60), ("driven_graph", 70, 40)]
+)
 def test_c_has_the_same_bits_for_any_memory(monkeypatch, name, steps, stride):
     """Of steps that are made again from states that were kept, or where there is no room, from those before."""
     solver, random = made(name, "c"), np.random.default_rng(8)
     x = 0.3 * beginning(solver, IN_C[name])
-    bar = random.normal(size=(4, *x.shape))
-    whole = solver.pullback(x, H, steps, bar, stride)
+    bar, given = random.normal(size=(1 + -(-steps // stride), *x.shape)), LATTICES.get(name, {})
+    whole = solver.pullback(x, H, steps, bar, stride, parameters=given)
     for kept, states in ((0, 1), (0, 4), (1200, 1)):
         monkeypatch.setattr(c_lattice, "TWICE", 0)
         monkeypatch.setattr(c_lattice, "KEPT", kept)
         monkeypatch.setattr(c_lattice, "STATES", states)
-        part = solver.pullback(x, H, steps, bar, stride)
+        part = solver.pullback(x, H, steps, bar, stride, parameters=given)
         assert np.array_equal(part.x1, whole.x1)
         assert np.array_equal(part.x0_bar, whole.x0_bar)
         assert same(part.parameters_bar, whole.parameters_bar)
@@ -319,18 +347,22 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
 
 #: Sizes that several threads work at; of the last, too large for caches, they go back through several flows at once.
 LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 140_000}
+LARGE["driven_graph"] = 2000
 
 
 @pytest.mark.parametrize("name", LARGE)
 def test_c_has_the_same_bits_for_any_threads(name):
     solver, random = made(name, "c"), np.random.default_rng(8)
     x = 0.3 * beginning(solver, LARGE[name])
-    bar = random.normal(size=x.shape)
-    found = [*with_threads(lambda: solver.pullback(x, H, 1, bar))]
+    bar, given = random.normal(size=x.shape), {}
+    if solver.interface.at_bonds:
+        ends = [[i, (i + k) % LARGE[name]] for k in (1, 7) for i in range(LARGE[name])]
+        given = {"bonds": np.array(ends), "J": random.normal(size=len(ends))}
+    found = [*with_threads(lambda: solver.pullback(x, H, 1, bar, parameters=given))]
     for one in found:
         assert np.array_equal(one.x0_bar, found[0].x0_bar)
         assert same(one.parameters_bar, found[0].parameters_bar)
-    expected = made(name).pullback(x, H, 1, bar)
+    expected = made(name).pullback(x, H, 1, bar, parameters=given)
     assert np.allclose(found[0].x0_bar, expected.x0_bar, rtol=1e-12, atol=1e-12)
     for parameter, value in expected.parameters_bar.items():  # sums over rows of many pieces
         assert found[0].parameters_bar[parameter] == pytest.approx(value, rel=1e-11, abs=1e-11), parameter

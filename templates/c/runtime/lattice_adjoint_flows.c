@@ -8,6 +8,37 @@
 #include "lattice_trail.c"
 
 /* ---- The transpose of flows ---- */
+/* The sweep of that number in a flow; -1 if there are no more. */
+static int phi_sweep_of(const phi_solver *s, int flow, int number)
+{
+    const int part = phi_flow_parts[flow];
+#if PHI_BY_COLOUR
+#if PHI_TIMED
+    const int last = s->flows;
+#else
+    const int last = s->flows - 1;
+#endif
+    const int found = part == 0 ? 0 : part == 2 ? last : part == 1 ? 1 + number : last - 1 - number;
+    return (part == 0 || part == 2) && number > 0 ? -1 : part % 2 == 1 && (found < 1 || found >= last) ? -1 : found;
+#else
+    (void)s;
+    return number == 0 ? part : -1;
+#endif
+}
+
+/* The part of H that a sweep belongs to, from 0 on. */
+static int phi_part_of(const phi_solver *s, int sweep)
+{
+#if PHI_BY_COLOUR
+    int part = 0;
+    for (int own; sweep >= (own = phi_by_colour[part] ? s->colour_count : 1); ++part) sweep -= own;
+    return part;
+#else
+    (void)s;
+    return sweep - 1;
+#endif
+}
+
 #if PHI_UNDONE
 #include "lattice_undoing.c"
 #else
@@ -23,11 +54,10 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
 #if PHI_UNDONE
         if (PHI_FLOWS > 1) {
             phi_flow last;
-            phi_find_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last);
+            size_t count = 0;
+            phi_find_flow(s, steps - 1, PHI_FLOWS - 1, &last);
             phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* to be undone */
-            phi_go_all_back(s, &last, 1);
-            last.go = 2;
-            phi_go_all_back(s, &last, phi_hands[last.part - 1]);
+            phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last, &count, 1);
         }
 #else
         double *x[PHI_ARRAYS];

@@ -8,37 +8,6 @@
 #include "lattice_trail.c"
 
 /* ---- Fields that are kept ---- */
-/* The sweep of that number in a flow; -1 if there are no more. */
-static int phi_sweep_of(const phi_solver *s, int flow, int number)
-{
-    const int part = phi_flow_parts[flow];
-#if PHI_BY_COLOUR
-#if PHI_TIMED
-    const int last = s->flows;
-#else
-    const int last = s->flows - 1;
-#endif
-    const int found = part == 0 ? 0 : part == 2 ? last : part == 1 ? 1 + number : last - 1 - number;
-    return (part == 0 || part == 2) && number > 0 ? -1 : part % 2 == 1 && (found < 1 || found >= last) ? -1 : found;
-#else
-    (void)s;
-    return number == 0 ? part : -1;
-#endif
-}
-
-/* The part of H that a sweep belongs to, from 0 on. */
-static int phi_part_of(const phi_solver *s, int sweep)
-{
-#if PHI_BY_COLOUR
-    int part = 0;
-    for (int own; sweep >= (own = phi_by_colour[part] ? s->colour_count : 1); ++part) sweep -= own;
-    return part;
-#else
-    (void)s;
-    return sweep - 1;
-#endif
-}
-
 /* The numbers that a step keeps. */
 static size_t phi_numbers_kept(const phi_solver *s)
 {

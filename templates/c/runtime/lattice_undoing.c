@@ -13,7 +13,11 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
 {
     const phi_transpose *g = flow->g;
 #if PHI_HANDS
+#if PHI_GATHER
+    if (flow->go > 1) phi_hand_rows(s, flow->part, flow->coef, s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+#else
     if (flow->go > 1) phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
+#endif
     else phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
 #else
     phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
@@ -40,14 +44,27 @@ static void phi_go_all_back(const phi_solver *s, const phi_flow *flows, size_t c
 enum { PHI_DEEPEST = 1 }; /* flows at once */
 #endif
 
-/* The way back through a flow of the step after so many, by its number, for those cotangents. */
-static void phi_find_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar, phi_flow *flow)
+/* The way back through the sweeps of a flow, by its number, of the step after so many, for those cotangents: it joins the others that wait,
+   and all are made when they are as many as are made at once. */
+static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar,
+    phi_flow *flows, size_t *count, size_t depth)
 {
-    phi_find_flow(s, step, number, flow);
-    flow->go = 1;
-    flow->row = number;
-    flow->g = g;
-    flow->bar = bar;
+    int k = 0;
+    while (phi_sweep_of(s, number, k) >= 0) ++k;
+    while (k-- > 0)
+        for (int go = 1, last = 1; go <= last; ++go) {
+            phi_flow *next = flows + *count;
+            phi_find_flow(s, step, number, next);
+            next->part = phi_sweep_of(s, number, k);
+            next->go = go;
+            next->row = number;
+            next->g = g;
+            next->bar = bar;
+            last = 1 + phi_hands[phi_part_of(s, next->part)];
+            if (++*count < depth) continue;
+            phi_go_all_back(s, flows, *count);
+            *count = 0;
+        }
 }
 
 /* Pull cotangents back through so many steps, joined, after so many, and undo them: s->x becomes the fields before. */
@@ -63,15 +80,7 @@ static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t b
     for (size_t left = steps * PHI_OWN_FLOWS; left-- > 0;) {
         const size_t step = before + left / PHI_OWN_FLOWS;
         const int flow = (int)(left % PHI_OWN_FLOWS), number = flow == 0 && step > g->first_step ? PHI_FLOWS : flow;
-        for (int go = 1, last = 1; go <= last; ++go) {
-            phi_flow *next = flows + count++;
-            phi_find_back(s, g, step, number, g->bar, next);
-            next->go = go;
-            last = 1 + phi_hands[next->part - 1];
-            if (count < depth) continue;
-            phi_go_all_back(s, flows, count);
-            count = 0;
-        }
+        phi_flow_back(s, g, step, number, g->bar, flows, &count, depth);
     }
     phi_go_all_back(s, flows, count);
 }
