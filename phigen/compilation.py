@@ -83,6 +83,11 @@ class Compilation:
             return f"{self.sweeps.realisation.kind}, on a lattice"
         return "splitting of a lattice"
 
+    def told(self, method: str) -> str:
+        """A line that names the method, with why it is the series where nothing but sizes of runs forbids to split."""
+        since = getattr(self.sweeps, "since", "")
+        return f"{method}: the series, since {since}" if since else method
+
     @property
     def exact(self) -> bool:
         """Whether a step starts and ends at the ends of one p to round-off; see `poisson`."""

@@ -293,7 +293,7 @@ def _swept(
         raise SpecError([Diagnostic(message, spec.locations.get(("solver",)))])
     described = _described(spec, extras, profile) | {"lanes": spec.solver.lanes, "compensated": compensated}
     program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
-    expect_coloured(spec, cell.axes, plan.colouring.periods(cell.boundary))
+    expect_coloured(spec, cell, plan.colouring.periods(cell.boundary))
     nothing: Any = NoSystem(spec)
     return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
 

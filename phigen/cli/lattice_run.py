@@ -86,7 +86,8 @@ def run_lattice(
         told = {"name": spec.name, "run": run.name, **sizes, **method, "errors": largest}
         out_json(finite(told | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
-        _print(spec, run, start, f"{compilation.label}, order {solver.order}, target {solver.target}", made, largest)
+        told_method = compilation.told(f"{compilation.label}, order {solver.order}, target {solver.target}")
+        _print(spec, run, start, told_method, made, largest)
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
             out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")

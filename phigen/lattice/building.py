@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.forms import algebra_of_form, poisson_matrix
@@ -12,8 +13,26 @@ from phigen.symbolic.expression import ZERO, Expression, neg
 from phigen.symbolic.neighbours import Neighbours, minus
 
 
+@dataclass(frozen=True)
+class Misfit:
+    """A size of a run that is no multiple of the period of the colours along an axis; ``fitting`` is one near it."""
+
+    run: str
+    axis: str
+    size: int
+    period: int
+    fitting: int
+
+    def __str__(self) -> str:
+        return f"{self.size} along {self.axis} is no multiple of {self.period}"
+
+
 class MisfitError(SpecError):
-    """Sizes of runs are no multiples of the periods of colours."""
+    """Sizes of runs are no multiples of the periods of colours; ``since`` says it in one line, with what would be."""
+
+    def __init__(self, diagnostics: list[Diagnostic], since: str = "") -> None:
+        super().__init__(diagnostics)
+        self.since = since
 
 
 def cell_from_spec(spec: Spec) -> Cell:
@@ -55,24 +74,37 @@ def least_sizes(cell: Cell) -> tuple[int, ...]:
     return tuple(1 + max(h, p) for h, p in zip(cell.hamiltonian_reach, cell.poisson_reach, strict=True))
 
 
-def expect_coloured(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> None:
+def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
     """Raises `MisfitError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
-    if problems := misfits(spec, axes, periods):
-        raise MisfitError(problems)
+    if found := misfits(spec, cell, periods):
+        raise misfit_error(spec, found)
 
 
-def misfits(spec: Spec, axes: Sequence[str], periods: Sequence[int]) -> list[Diagnostic]:
-    """What `expect_coloured` has to say."""
-    problems = []
-    for run in spec.runs.values():
-        sizes = run.lattice.sizes if run.lattice else ()
-        for axis, size, period in zip(axes, sizes, periods, strict=False):
-            if size % period:
-                message = f"sizes: {size} along {axis} is no multiple of {period}, as the colours of the splitting need"
-                nearest = size - size % period or period
-                hint = f"for example {nearest}; scheme: series takes every size"
-                problems.append(spec.diagnostic(("runs", run.name, "sizes"), message, hint))
-    return problems
+def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
+    """The sizes of runs that are no multiples of the periods."""
+    return [
+        Misfit(run.name, axis, size, period, max(size // period, -(-least // period)) * period)
+        for run in spec.runs.values()
+        for axis, size, period, least in zip(
+            cell.axes, run.lattice.sizes if run.lattice else (), periods, least_sizes(cell), strict=False
+        )
+        if size % period
+    ]
+
+
+def misfit_error(spec: Spec, found: Sequence[Misfit]) -> MisfitError:
+    """The error that says where each of them is."""
+    problems = [
+        spec.diagnostic(
+            ("runs", m.run, "sizes"),
+            f"sizes: {m}, as the colours of the splitting need",
+            f"for example {m.fitting}; scheme: series takes every size",
+        )
+        for m in found
+    ]
+    distinct = {str(m): str(m.fitting) for m in found}
+    since = f"{' and '.join(distinct)}, as the colours of a splitting need"
+    return MisfitError(problems, f"{since}; {' and '.join(distinct.values())} would do")
 
 
 def _local(spec: Spec) -> dict[tuple[str, str], Expression]:

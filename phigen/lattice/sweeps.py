@@ -10,7 +10,7 @@ from typing import Any
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import MisfitError, least_sizes, misfits
+from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfit_error, misfits
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.damping import TogetherError
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
@@ -125,7 +125,7 @@ def plan_sweeps(
             raise
         try:
             found = plan_series(cell, host, order, composition, spec)
-            return replace(found, since=unsplit.diagnostics[0].message) if isinstance(unsplit, MisfitError) else found
+            return replace(found, since=unsplit.since) if isinstance(unsplit, MisfitError) else found
         except SpecError as error:
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
 
@@ -155,7 +155,7 @@ def _coloured(
     Where there are none, the scheme ``splitting`` has the fewest of all, with which the runs are refused.
     """
     best: tuple[CellSplitting, tuple[CellFlow, ...]] | None = None
-    misfit: list[Diagnostic] = []
+    misfit: list[Misfit] = []
     refused: SpecError | None = None
     for parts in splittings(cell, host.locations.get(("hamiltonian",)), search):
         try:
@@ -163,7 +163,7 @@ def _coloured(
         except TogetherError as error:
             refused = refused or error
             continue
-        wrong = misfits(spec, cell.axes, parts.colouring.periods(cell.boundary)) if spec else []
+        wrong = misfits(spec, cell, parts.colouring.periods(cell.boundary)) if spec else []
         if not wrong:
             return made
         best, misfit = best or made, misfit or wrong
@@ -171,7 +171,8 @@ def _coloured(
         assert refused is not None
         raise refused
     if scheme == "auto":
-        raise MisfitError(misfit)
+        assert spec is not None  # else nothing misfits
+        raise misfit_error(spec, misfit)
     return best
 
 
