@@ -69,6 +69,17 @@ parameters:
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: apart*p**2/2 + l*(q[i+1] - q)**2/2 + share0*whole*q**4 + j*cos(q)
 """
+#: Pairs whose sums at both sites differ by a sign, are the same, or are others; parameters called as what loops have.
+PAIRED = """phigen: 1
+name: paired
+lattice: {pairs: all}
+coordinates: [q, p, r, s]
+parameters: {own0: 0.7, first: {value: 1, at: sites}}
+poisson: {canonical: {q: [q, r], p: [p, s]}}
+hamiltonian:
+  sites: (p**2 + s**2)/2 + q**2
+  pairs: own0*(cos(q[a] - q[b]) + first[a]*first[b]*sin(r[a] + r[b]))/4
+"""
 LATTICES["named fast"] = {"l": 0.3 + np.arange(SITES) / 5, "whole": 1.2, "j": 0.4}
 #: Colours, disorder at bonds and sites, and coefficients of bonds that depend on the time.
 DRIVEN_GRAPH = """phigen: 1
@@ -89,6 +100,8 @@ OWN = {
     "swung": SWUNG,
     "named": NAMED,
     "membrane": MEMBRANE,
+    "paired": PAIRED,
+    "mixed": PAIRED.replace("paired", "mixed").replace("sin(r[a] + r[b])", "r[a]*r[b]"),
     "far_open": SPECS["far_open"],
     "spin_graph": SPECS["spin_graph"],
 }
@@ -107,6 +120,8 @@ IN_C |= {
     "far_open series": (4, 3),
     "spin_graph series": SITES,
     "point_vortices": SITES,
+    "paired fast": 11,
+    "mixed series": 11,
 }
 SLOW = ("volterra", "far_open series")
 
@@ -345,9 +360,9 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
         assert part.parameters_bar["A"] == pytest.approx(whole.parameters_bar["A"], rel=1e-13)
 
 
-#: Sizes that several threads work at; of the last, too large for caches, they go back through several flows at once.
+#: Sizes that several threads work at; of "fput", too large for caches, they go back through several flows at once.
 LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 140_000}
-LARGE["driven_graph"] = 2000
+LARGE |= {"driven_graph": 2000, "paired fast": 513}
 
 
 @pytest.mark.parametrize("name", LARGE)

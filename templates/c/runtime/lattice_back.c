@@ -16,11 +16,7 @@ static inline double phi_total(double lanes[8])
 }
 
 #if PHI_APART
-#if PHI_GATHER
-enum { PHI_ADDED = 2 * PHI_PIECE }; /* sites whose shares in a sum are kept apart before they are added */
-#else
 enum { PHI_ADDED = 64 }; /* sites whose shares in a sum are kept apart before they are added */
-#endif
 
 /* The sum of some values, in an order that lets loops vectorise. */
 static inline double phi_added(const double *values, ptrdiff_t count)
@@ -36,12 +32,16 @@ static inline double phi_added(const double *values, ptrdiff_t count)
 #endif
 #endif
 #if !PHI_UNDONE
-/* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. */
+/* Keep the values of some pieces of rows, with the copies beside rows, which another thread may be making of one row. Pairs read
+   numbers beyond the last site too, but leave what they find of them. */
 static void phi_keep_units(const phi_solver *s, const double *from, double *to, size_t first, size_t end)
 {
 #if PHI_ONE_ROW
     const ptrdiff_t begin = (ptrdiff_t)first * PHI_PIECE, stop = end == phi_units(s) ? s->length : (ptrdiff_t)end * PHI_PIECE;
     if (first < end) memcpy(PHI_FIRST_SITE(to) + begin, PHI_FIRST_SITE(from) + begin, (size_t)(stop - begin) * sizeof *to);
+#if PHI_PAIRS
+    if (stop == s->length) memset(to + stop, 0, (size_t)(s->width - stop) * sizeof *to);
+#endif
 #if PHI_HALO
     if (first < end) phi_ends(PHI_FIRST_SITE(to), s->length, begin, stop);
 #endif

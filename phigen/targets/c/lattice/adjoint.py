@@ -111,7 +111,7 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
             seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
             ends = tuple((e, kernels[e.kernel.name + BACK]) for e in (sweep.gather.ends if sweep.gather else ()))
-            before = tuple(_gathered(program, layout, sweep))
+            before = tuple(_gathered(program, layout, sweep)) if _reads_sums(kernel) else ()
             pulled.append(_Pulled(kernel, seeds, sweep.gather, ends, before, sweep.moved if undone else ()))
         found = _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
         written = {layout.bar(layout.step.sites.places[s][0]) for k in own for s, e in k.along("site") if not e.is_zero}
@@ -123,8 +123,9 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
 def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
     """The two goes of each kernel that a stage is gone back through by; in the first one what is gathered is found."""
     fields, gather = program.coordinates, layout.partners.field
-    for number, (name, own, wanted) in enumerate(KERNELS):
-        kernel = restricted(layout, fields, kernels[own + BACK], wanted, name)
+    found = [restricted(layout, fields, kernels[own + BACK], wanted, name) for name, own, wanted in KERNELS]
+    summed = any(map(_reads_sums, found))
+    for number, (kernel, (name, _, wanted)) in enumerate(zip(found, KERNELS, strict=True)):
         seed = next(array for array in kernel.inputs if array.endswith("_bar"))
         seeds = Seeds(seed, tuple(f"v_{k}" for k in range(len(fields))))
         read = gather if kernel.inputs["gathered"] else None
@@ -133,7 +134,7 @@ def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[
             for e in (gather.ends if read else ())
         )
         before = (f"{program.name}_{e.kernel.name}(&row);" for e in gather.ends)
-        pulled = _Pulled(kernel, seeds, read, ends, () if number else tuple(before))
+        pulled = _Pulled(kernel, seeds, read, ends, tuple(before) if summed and number == 0 else ())
         yield _back(program, layout, rows, name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
 
@@ -171,6 +172,11 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         loops.append(loop)
     undone = sorted({f for one in pulled for f in one.undone})
     return Back(tuple(loops), tuple(first), tuple(second), given, tuple(undone))
+
+
+def _reads_sums(kernel: Kernel) -> bool:
+    """Whether a kernel reads what bonds or pairs add up, and not only their cotangents."""
+    return not set(kernel.inputs["gathered"]).isdisjoint(symbols_of(*kernel.roots))
 
 
 def _gathered(program: Program, layout: Layout, sweep: Sweep) -> Iterator[str]:

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
 
 from phigen.lattice.collecting import AROUND
+from phigen.lattice.pairing import HERE, THERE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
@@ -19,7 +20,7 @@ from phigen.targets.reserved import C_RESERVED
 #: What the loops call their own.
 _OWN = frozenset(
     {"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole"}
-    | {"at_bonds", "sign", "across"}
+    | {"at_bonds", "sign", "across", "first"}
 )
 
 
@@ -56,6 +57,7 @@ class SiteNames:
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
         shares = {f"share{k}" for k in range(layout.step.row + len(program.parameters))}
         numbered = {f"{word}{k}" for word in ("change", "add", "sum") for k in range(3)} | shares
+        numbered |= {f"{word}{k}" for word in ("add", "own") for k in range(len(code.stores))}
         self.scope = Scope(C_RESERVED | _OWN | called | numbered)
         self.show = printer(self.scope, calls)
         self._here, self._inside = here, inside
@@ -86,7 +88,7 @@ class SiteNames:
             elif isinstance(s, Symbol) and s.kind == AROUND:
                 self._bind_around(s, seeds[AROUND][int(s.key[0])])
             elif isinstance(s, Symbol) and s.kind in seeds:
-                self._bind_seed(s, seeds[s.kind][int(s.key[0])], of_pair=s.kind == "sums_bar")
+                self._bind_seed(s, seeds[s.kind][int(s.key[0])], {HERE: "a", THERE: "b"}.get(s.kind))
             elif isinstance(s, Symbol) and s.kind == INCREMENT:
                 self._bind_site(s)
             elif isinstance(s, Symbol):
@@ -119,10 +121,10 @@ class SiteNames:
         else:
             self._other[s] = f"{text}[j]"
 
-    def _bind_seed(self, s: Symbol, text: str, *, of_pair: bool) -> None:
-        """A cotangent, of what is found at a site, or of the sums over its bonds or pairs."""
-        if of_pair:
-            self._bind_at(s, "a", f"{self.scope[s]} = {text}")
+    def _bind_seed(self, s: Symbol, text: str, end: str | None) -> None:
+        """A cotangent, of what is found at a site, or of the sums at an end of its bonds or pairs."""
+        if end:
+            self._bind_at(s, end, f"{self.scope[s]} = {text}")
         else:
             self._loaded.append(f"{self.scope[s]} = {text}[i]")
 

@@ -1,7 +1,7 @@
 """The transpose of what bonds, or pairs of sites, add up at a site, as loops in C.
 
-What sites get of the sums of others is found by each of them for itself: it goes over its bonds, or over all other
-sites, once as the site where a sum belongs, and once as the other one.
+What sites get of the sums of others is found by each of them for itself. It goes over its bonds, once as the site
+where a sum belongs, and once as the other one; over all other sites once, as both.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+from phigen.lattice.pairing import HERE, THERE, paired
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends
@@ -28,7 +29,12 @@ _SUMS = ("coef_bar", "params_bar")
 
 
 def gathering_back(program: Program, layout: Layout, ends: Ends, kernel: Kernel, first: int) -> Iterator[Loop]:
-    """The loops for the ends of bonds or pairs, where the cotangents of sums are in arrays from the first on."""
+    """The loops for pairs, or the ends of bonds, where the cotangents of sums are in arrays from the first on."""
+    if not layout.graph:
+        whole = paired(layout.step.sites.ends, ends.kernel, kernel)
+        if any(not e.is_zero for e in whole.roots):
+            yield _loop(program, layout, ends, whole, "a", first)
+        return
     for end, turned in (("a", ends), ("b", replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen]))):
         own = _at_end(layout, kernel, end)
         if any(not e.is_zero for e in own.roots):
@@ -49,15 +55,15 @@ def _at_end(layout: Layout, kernel: Kernel, end: str) -> Kernel:
 
 def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str, first: int) -> Loop:
     name, code = program.name, lower(kernel)
-    count = len(kernel.inputs["sums_bar"])
-    seeds = {"sums_bar": [f"handed_{first + k}" for k in range(count)]}
+    count = len(kernel.inputs[HERE])
+    seeds = {kind: [f"handed_{first + k}" for k in range(count)] for kind in (HERE, THERE)}
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end)
     other, own = names.of_pair(code)
     stores = [s for s in code.stores if not s.value.is_zero]
     bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array not in _SUMS}
     head = names.pointers()
-    used = [k for k, s in enumerate(kernel.inputs["sums_bar"]) if s in code.used]
-    head += [f"const double *handed_{first + k} = row->handed[{first + k}];" for k in used]
+    used = {k for kind in (HERE, THERE) for k, s in enumerate(kernel.inputs.get(kind, ())) if s in code.used}
+    head += [f"const double *handed_{first + k} = row->handed[{first + k}];" for k in sorted(used)]
     head += [f"double *bar_{k} = row->bar[{k}];" for k in sorted(set(bars.values()))]
     source = "params" if "params" in kernel.inputs else "coef"
     head += ["(void)sums;"] * all(s.array != f"{source}_bar" for s in stores)
@@ -69,6 +75,8 @@ def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str
     else:
         text = _over_pairs(name, stores, shown, bars, head, own, other, values)
     arguments = f"{told(program, source)}, double *sums"
+    if not layout.graph:
+        return Loop(kernel.name, "what a site gets of cotangents of sums, its own and those of others", arguments, text)
     said = "the site where the sum is" if end == "a" else "the other site"
     return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
 
@@ -115,14 +123,21 @@ def _over_pairs(
     other: Sequence[str],
     values: Sequence[str],
 ) -> str:
-    """A loop over all sites, in it one over those of a piece."""
+    """Loops over all sites for eight of a piece at a time, whose sums stay in registers.
+
+    What a pair adds is found for all sums before any of it is added, or gcc would not vectorise the loop."""
     shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
-    inner = [*own, *values]
-    for k, value in enumerate(shown):
-        inner.append(f"{f'share{k}[i - row->from]' if k in shares else f'bar_{bars[k]}[i]'} += i == j ? 0.0 : {value};")
-    lines = [*head, *(f"double share{k}[{name}_ADDED] = {{ 0.0 }};" for k in shares)]
-    lines += ["for (ptrdiff_t j = 0; j < row->s->length; ++j) {", *(f"    {line}" for line in other)]
-    lines += [f"    {name}_EACH_SITE", f"    {OVER_SITES} {{"]
-    lines += [*(f"        {line}" for line in inner), "    }", "}"]
-    lines += [f"sums[{stores[k].index}] += {name}_added(share{k}, row->to - row->from);" for k in shares]
+    inner = ["const ptrdiff_t i = first + l;", *own, *values]
+    inner += [f"const double add{k} = i == j ? 0.0 : {value};" for k, value in enumerate(shown)]
+    inner += [f"own{k}[l] += add{k};" for k in range(len(stores))]
+    lines = [*head, *(f"double share{k}[8] = {{ 0.0 }};" for k in shares)]
+    lines += ["for (ptrdiff_t first = row->from, to = row->to; first < to; first += 8) {"]
+    lines.append(f"    double {', '.join(f'own{k}[8] = {{ 0.0 }}' for k in range(len(stores)))};")
+    lines += ["    for (ptrdiff_t j = 0; j < row->s->length; ++j) {", *(f"        {line}" for line in other)]
+    lines += [f"        {name}_EACH_SITE", "        for (ptrdiff_t l = 0; l < 8; ++l) {"]
+    lines += [*(f"            {line}" for line in inner), "        }", "    }"]
+    lines.append("    for (ptrdiff_t l = 0; l < 8 && first + l < to; ++l) { /* beyond are numbers, but no sites */")
+    into = [f"share{k}[l]" if k in shares else f"bar_{bars[k]}[first + l]" for k in range(len(stores))]
+    lines += [f"        {place} += own{k}[l];" for k, place in enumerate(into)]
+    lines += ["    }", "}", *(f"sums[{stores[k].index}] += {name}_total(share{k});" for k in shares)]
     return "".join(f"    {line}\n" for line in lines)
