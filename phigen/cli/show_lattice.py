@@ -36,7 +36,9 @@ def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:
     """The cell for machines."""
     from phigen.notation.lattices import brackets, rates
     from phigen.symbolic.expression import text
+    from phigen.symbolic.readable import readable
 
+    slopes = dict(rates(cell))
     return {
         "name": spec.name,
         "title": spec.title,
@@ -51,6 +53,6 @@ def described_cell(spec: Spec, cell: Cell) -> dict[str, object]:
         },
         "casimirs": {name: {"value": text(e), "at": kind} for name, (e, kind) in cell.casimirs.items()},
         "invariants": {name: text(e) for name, e in cell.invariants.items()},
-        "rates": {name: text(e) for name, e in rates(cell)},
+        "rates": dict(zip(slopes, readable([*slopes.values()], None), strict=True)),
         "reach": {"poisson": list(cell.poisson_reach), "hamiltonian": list(cell.hamiltonian_reach)},
     }

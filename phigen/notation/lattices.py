@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from phigen.lattice.cell import GRID, Cell, bond_forces, forces, vector_field
 from phigen.notation import mathml
 from phigen.notation.latex import Equation, aligned
+from phigen.notation.parts import short
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.neighbours import Offset, steps
 from phigen.symbolic.readable import SHOWN, readable
@@ -122,7 +123,8 @@ def _integral(cell: Cell, name: str, density: Expression, kind: str) -> Equation
 
 
 def _equations(cell: Cell, formulas: Sequence[tuple[str, Expression]]) -> list[Equation]:
-    return [(left, mathml.pieces(_indexed(cell, e))) for left, e in formulas]
+    forms = short([_indexed(cell, e) for _, e in formulas])
+    return [(left, mathml.pieces(form)) for (left, _), form in zip(formulas, forms, strict=True)]
 
 
 def _indexed(cell: Cell, e: Expression) -> Expression:

@@ -89,6 +89,12 @@ def _met(listed: Sequence[tuple[str, str]], own: int) -> list[tuple[str, str]]:
     return [(numbers.get(name, name), _SHARED.sub(lambda found: numbers[found[0]], text)) for name, text in shown]
 
 
+def short(expressions: Sequence[Expression]) -> list[Formula | Expression]:
+    """The expressions as they stand, or expanded where that is shorter."""
+    forms = zip(expressions, expanded(expressions, None), strict=True)
+    return [form if form is not None and leaves(form) < leaves(e) else e for e, form in forms]
+
+
 def leaves(form: Formula | Expression) -> int:
     """The number of names and numbers in a formula as it is written."""
     if isinstance(form, Expression):

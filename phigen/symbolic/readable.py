@@ -167,13 +167,16 @@ def cut(text: str) -> str:
 
 
 def expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:
-    """The expressions multiplied out, with ``most`` terms shown; None for those that are too large to try."""
+    """The expressions multiplied out, common factors cancelled, with ``most`` terms shown.
+
+    None for those that are too large to try.
+    """
     for e in expressions:
         if len(topological([e])) > _LARGE:
             yield None
             continue
         tower = Tower(symbols_of(e), [e])
-        yield of_polynomial(tower, tower.convert(e), most)
+        yield of_polynomial(tower, tower.reduced(tower.convert(e)), most)
 
 
 def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:

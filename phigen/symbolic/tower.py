@@ -417,19 +417,30 @@ class Tower(Arithmetic[Poly]):
 
     def simplified(self, element: Poly) -> Poly:
         """The same function with fewer terms, by relations that keep its value: r·f = 1, w² = q, sin² + cos² = 1."""
+        return self._shortened(element, relations=True)
+
+    def reduced(self, element: Poly) -> Poly:
+        """The same function, common factors of what is above and below cancelled where fewer terms remain."""
+        return self._shortened(self.cancelled(element), relations=False)
+
+    def _shortened(self, element: Poly, *, relations: bool) -> Poly:
         degrees = element.degrees()
         for g in reversed(self.generators):
             if degrees[self._index[g.name]] <= 0:
                 continue
             if g.kind == "reciprocal" or (g.kind == "root" and g.inverse):
                 found = self._divided(element, g)
-            elif g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g)):
+            elif relations and self._is_related(g):
                 found = self._eliminate(element, g)
             else:
                 continue
             if len(found) < len(element):
                 element, degrees = found, found.degrees()
         return element
+
+    def _is_related(self, g: Generator) -> bool:
+        """Whether powers of a generator are polynomials in lower ones and in others: w² = q, sin² = 1 − cos²."""
+        return g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g))
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
         """The element with less powers of r, where multiples of f = 1/r, or of f = r^-n, are multiplied by them."""

@@ -51,6 +51,18 @@ def test_show_writes_latex_with_all_indices(phigen, lattice):
     assert r"H &= \sum_{a < b}" in phigen("show", lattice("vortices"), "--latex").stdout
 
 
+def test_show_cancels_common_factors(phigen, tmp_path):
+    spec = tmp_path / "growth.yaml"
+    spec.write_text(
+        "phigen: 1\nname: growth\nlattice: {axes: [i]}\ncoordinates: [u, v]\nparameters: {d: 2}\n"
+        "poisson: {brackets: {u: {v: u*v*(u + v)/d**2}}}\nhamiltonian: d*log(u + v)\n",
+        encoding="utf-8",
+    )
+    assert "  du/dt = u*v/d\n  dv/dt = -u*v/d\n" in phigen("show", spec).stdout
+    assert json.loads(phigen("show", spec, "--json").stdout)["rates"] == {"du/dt": "u*v/d", "dv/dt": "-u*v/d"}
+    assert r"\dot{u}_{i} &= \frac{u_{i} v_{i}}{d}" in phigen("show", spec, "--latex").stdout
+
+
 def test_show_describes_a_cell_for_machines(phigen, lattice):
     shown = json.loads(phigen("show", lattice("spin_graph"), "--json").stdout)
     assert (shown["lattice"]["relation"], shown["parameters"]["J"]["at"]) == ("graph", "bonds")
