@@ -1,4 +1,4 @@
-"""Transposes of what pairs add up, as a site gets them from each of its pairs: both as a and as b.
+"""Transposes of what bonds or pairs add up, as a site gets them from each of them: both as a and as b.
 
 Where the sums of b are those of a but for a sign, as forces are that act between two sites, the site gets as b what it
 gets as a, for the cotangents of the other one: a product of the Hessian of the pair's energy with one vector.
@@ -6,7 +6,7 @@ gets as a, for the cotangents of the other one: a product of the Hessian of the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -15,20 +15,22 @@ from phigen.symbolic.expression import ZERO, Expression, substitute, symbol
 from phigen.symbolic.symbols import Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: The inputs of a transpose that are cotangents of the sums of a site, and of those of the other one of a pair.
+#: The inputs of a transpose that are cotangents of the sums of a site, and of those of the other one.
 HERE, THERE = "sums_bar", "sums_bar_there"
 
 _OTHER = {"a": "b", "b": "a"}
 
 
-def paired(ends: Mapping[str, tuple[str, str]], kernel: Kernel, back: Kernel) -> Kernel:
-    """The transpose of a kernel of pairs that finds all that a site, as a, gets from a pair.
+def paired(ends: Mapping[str, tuple[str, str]], kernel: Kernel, back: Kernel, opposite: Collection[str] = ()) -> Kernel:
+    """The transpose of a kernel of bonds or pairs that finds all that a site, as a, gets from one of them.
 
-    ``ends`` tells of each symbol the field, or parameter, and the end of the pair. Of sums over all pairs it finds what
-    is to be added up over all sites and their pairs.
+    ``ends`` tells of each symbol the field, or parameter, and the end; parameters at bonds that are ``opposite`` have
+    the other sign seen from b. Of sums over all bonds or pairs, and of parameters at bonds, it finds what is to be
+    added up over all sites and their bonds or pairs.
     """
     names = {place: s for s, place in ends.items()}
     turned = {s: symbol(names[base, _OTHER[end]]) for s, (base, end) in ends.items()}
+    turned |= {p: -symbol(p) for p in opposite}
     there = {s: symbol(Symbol(THERE, k)) for k, s in enumerate(back.inputs[HERE])}
     along = dict(back.along("site"))
     fields = dict.fromkeys(ends[s][0] for s, e in along.items() if not e.is_zero)

@@ -8,7 +8,7 @@ So it is with the kernels of the equation of a stage, see `adjoint_stages`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from phigen.lanes.lowering import Rows
@@ -23,6 +23,7 @@ from phigen.symbolic.symbols import Symbol
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
+from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, givers, hands, layout_of, starts_are_read
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
@@ -46,12 +47,13 @@ class Back:
 @dataclass(frozen=True)
 class _Pulled:
     """A transposed kernel, where its cotangents are, what is gathered for it, and the transposes of the kernels of
-    that; what is called before it, for pieces of rows; the fields that it undoes."""
+    that, with the parameters that are opposite seen from b; what is called before it, for pieces of rows; the fields
+    that it undoes."""
 
     kernel: Kernel
     seeds: Seeds
     gather: Gather | None
-    ends: tuple[tuple[Ends, Kernel], ...]
+    ends: tuple[tuple[Ends, Set[str], Kernel], ...]
     before: tuple[str, ...] = ()
     undone: tuple[int, ...] = ()
 
@@ -110,7 +112,7 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
         for sweep, kernel in zip(part, own, strict=True):
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
             seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
-            ends = tuple((e, kernels[e.kernel.name + BACK]) for e in (sweep.gather.ends if sweep.gather else ()))
+            ends = tuple(_ends_back(sweep.gather, kernels))
             before = tuple(_gathered(program, layout, sweep)) if _reads_sums(kernel) else ()
             pulled.append(_Pulled(kernel, seeds, sweep.gather, ends, before, sweep.moved if undone else ()))
         found = _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
@@ -130,10 +132,10 @@ def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[
         seeds = Seeds(seed, tuple(f"v_{k}" for k in range(len(fields))))
         read = gather if kernel.inputs["gathered"] else None
         ends = tuple(
-            (e, restricted(layout, fields, kernels[e.kernel.name + BACK], wanted, f"{e.kernel.name}_{name}"))
-            for e in (gather.ends if read else ())
+            (e, opposite, restricted(layout, fields, back, wanted, f"{e.kernel.name}_{name}"))
+            for e, opposite, back in _ends_back(read, kernels)
         )
-        before = (f"{program.name}_{e.kernel.name}(&row);" for e in gather.ends)
+        before = (f"{program.name}_{e.kernel.name}(&row);" for e, _ in over_ends(gather))
         pulled = _Pulled(kernel, seeds, read, ends, tuple(before) if summed and number == 0 else ())
         yield _back(program, layout, rows, name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
@@ -160,7 +162,7 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
             lines[far] = [called(call.loop, call.sites) for call in calls_over_sites(own)]
             loops += own
         first += [*one.before, *either(lines)]
-        bonds = [loop for end, kernel in one.ends for loop in gathering_back(program, layout, end, kernel, given)]
+        bonds = [loop for ends in one.ends for loop in gathering_back(program, layout, *ends, given)]
         given += len(sums)
         second += map(called, bonds)
         loops += bonds
@@ -172,6 +174,14 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         loops.append(loop)
     undone = sorted({f for one in pulled for f in one.undone})
     return Back(tuple(loops), tuple(first), tuple(second), given, tuple(undone))
+
+
+def _ends_back(gather: Gather | None, kernels: Mapping[str, Kernel]) -> Iterator[tuple[Ends, Set[str], Kernel]]:
+    """The loops of what bonds or pairs add up, see `over_ends`, and their transposes."""
+    for (ends, opposite), first in zip(
+        over_ends(gather) if gather else (), gather.ends if gather else (), strict=False
+    ):
+        yield ends, opposite, replace(kernels[first.kernel.name + BACK], name=ends.kernel.name + BACK)
 
 
 def _reads_sums(kernel: Kernel) -> bool:

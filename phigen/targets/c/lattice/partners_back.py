@@ -1,12 +1,13 @@
 """The transpose of what bonds, or pairs of sites, add up at a site, as loops in C.
 
-What sites get of the sums of others is found by each of them for itself. It goes over its bonds, once as the site
-where a sum belongs, and once as the other one; over all other sites once, as both.
+What sites get of the sums of others is found by each of them for itself: it goes over its bonds, or over all other
+sites, once, as both the site where a sum belongs and the other one. Where bonds are between sites of a colour and
+others, or are not alike from both ends, it goes over them as the other one, and where need be as that of the sum.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 
 from phigen.lattice.pairing import HERE, THERE, paired
@@ -28,36 +29,41 @@ _CHOSEN = {"": "", "here": "there", "there": "here"}
 _SUMS = ("coef_bar", "params_bar")
 
 
-def gathering_back(program: Program, layout: Layout, ends: Ends, kernel: Kernel, first: int) -> Iterator[Loop]:
-    """The loops for pairs, or the ends of bonds, where the cotangents of sums are in arrays from the first on."""
-    if not layout.graph:
-        whole = paired(layout.step.sites.ends, ends.kernel, kernel)
-        if any(not e.is_zero for e in whole.roots):
-            yield _loop(program, layout, ends, whole, "a", first)
-        return
-    for end, turned in (("a", ends), ("b", replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen]))):
-        own = _at_end(layout, kernel, end)
+def gathering_back(
+    program: Program, layout: Layout, ends: Ends, opposite: Set[str], kernel: Kernel, first: int
+) -> Iterator[Loop]:
+    """The loops for bonds or pairs, where the cotangents of sums are in arrays from the first on.
+
+    Parameters at bonds that are ``opposite`` have the other sign seen from the end b."""
+    if not (ends.end or ends.chosen):
+        found = [("a", ends, paired(layout.step.sites.ends, ends.kernel, kernel, opposite))]
+    else:
+        turned = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
+        found = [("b", turned, _at_end(layout, kernel, "b")), ("a", ends, _at_end(layout, kernel, "a"))]
+    for end, seen, own in found:
         if any(not e.is_zero for e in own.roots):
-            yield _loop(program, layout, turned, own, end, first)
+            yield _loop(program, layout, seen, opposite, own, end, first)
 
 
 def _at_end(layout: Layout, kernel: Kernel, end: str) -> Kernel:
-    """What belongs to the site at an end; what belongs to the sum as a whole is left to its own site."""
+    """What belongs to the site at an end; what belongs to bonds, or to all of them, is left to b."""
     ends = layout.step.sites.ends
     outputs = []
     for o in kernel.outputs:
         names = kernel.inputs["site"] if o.name == "site_bar" else ()
-        kept = [ends[n][1] == end for n in names] if names else [end == "a"] * len(o.values)
+        kept = [ends[n][1] == end for n in names] if names else [end == "b"] * len(o.values)
         values = tuple(e if keep else ZERO for e, keep in zip(o.values, kept, strict=True))
         outputs.append(replace(o, values=values))
     return replace(kernel, outputs=tuple(outputs))
 
 
-def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str, first: int) -> Loop:
+def _loop(
+    program: Program, layout: Layout, ends: Ends, opposite: Set[str], kernel: Kernel, end: str, first: int
+) -> Loop:
     name, code = program.name, lower(kernel)
     count = len(kernel.inputs[HERE])
     seeds = {kind: [f"handed_{first + k}" for k in range(count)] for kind in (HERE, THERE)}
-    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end)
+    names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end, opposite=opposite)
     other, own = names.of_pair(code)
     stores = [s for s in code.stores if not s.value.is_zero]
     bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array not in _SUMS}
@@ -71,11 +77,17 @@ def _loop(program: Program, layout: Layout, ends: Ends, kernel: Kernel, end: str
     values = [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
     shown = [names.show(s.value) for s in stores]
     if layout.graph:
+        sides = [f"const double side = k < row->s->middle[i] ? {'1.0 : -1.0' if end == 'a' else '-1.0 : 1.0'};"]
+        turned = {
+            k for k, s in enumerate(stores) if s.array == "bonds_bar" and _array_of(layout, kernel, s) in opposite
+        }
+        shown = [f"side * ({value})" if k in turned else value for k, value in enumerate(shown)]
+        other = [*sides * bool(turned or not code.used.isdisjoint(opposite)), *other]
         text = _over_bonds(layout, ends, stores, shown, bars, head, own, [*other, *values])
     else:
         text = _over_pairs(name, stores, shown, bars, head, own, other, values)
     arguments = f"{told(program, source)}, double *sums"
-    if not layout.graph:
+    if not (ends.end or ends.chosen):
         return Loop(kernel.name, "what a site gets of cotangents of sums, its own and those of others", arguments, text)
     said = "the site where the sum is" if end == "a" else "the other site"
     return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
@@ -97,19 +109,19 @@ def _over_bonds(
     own: Sequence[str],
     values: Sequence[str],
 ) -> str:
-    """A loop over sites, in it one over their bonds."""
+    """A loop over sites, in it one over their bonds. What these give to a sum over all is added up at each site before,
+    so that few additions wait for one another."""
     loop, passed = bonds_of(ends)
     shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
-    sites = [k for k, s in enumerate(stores) if s.array == "site_bar"]
+    summed = [k for k, s in enumerate(stores) if s.array != "bonds_bar"]
     inner = [*passed, "const ptrdiff_t j = row->s->other[k];" * any("[j]" in v for v in values), *values]
-    for k, (store, value) in enumerate(zip(stores, shown, strict=True)):
-        kept = {**dict.fromkeys(_SUMS, f"share{k}"), "site_bar": f"own{k}"}
-        inner.append(f"{kept.get(store.array, f'bar_{bars.get(k)}[k]')} += {value};")
+    for k, value in enumerate(shown):
+        inner.append(f"{f'own{k}' if k in summed else f'bar_{bars[k]}[k]'} += {value};")
     lines = [*head, *(f"double share{k} = 0.0;" for k in shares), f"{OVER_SITES} {{"]
-    lines += [f"    {line}" for line in [*own, *(f"double own{k} = 0.0;" for k in sites), loop]]
+    lines += [f"    {line}" for line in [*own, *(f"double own{k} = 0.0;" for k in summed), loop]]
     lines += [*(f"        {line}" for line in inner if line), "    }"]
-    lines += [*(f"    bar_{bars[k]}[i] += own{k};" for k in sites), "}"]
-    lines += [f"sums[{stores[k].index}] += share{k};" for k in shares]
+    lines += [f"    {f'share{k}' if k in shares else f'bar_{bars[k]}[i]'} += own{k};" for k in summed]
+    lines += ["}", *(f"sums[{stores[k].index}] += share{k};" for k in shares)]
     return "".join(f"    {line}\n" for line in lines)
 
 
