@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 class Experiment:
     """A run with the values of the command line put in.
 
-    ``end`` is where it ends between two steps, ``times`` those of the states that are stored in place of a stride.
+    ``end`` is where it ends between two steps, ``times`` those of the states that are stored in place of a stride,
+    beside the first and the last.
     ``past`` is a finished run that it goes on with, ``first`` an attitude at its start.
     """
 
@@ -35,7 +36,7 @@ class Experiment:
     initial: tuple[float, ...]
     parameters: dict[str, float]
     end: End | None = None
-    times: tuple[float, ...] = ()
+    times: tuple[float, ...] | None = None
     past: Past | None = None
     first: Floats | None = None
 
@@ -55,9 +56,15 @@ class Experiment:
         return self.past.t if self.past else self.t0
 
     @property
+    def made(self) -> int:
+        """How many steps of the noise the past has used up: a part of one counts as one."""
+        steps = (self.begin - self.t0) / self.h
+        return math.ceil(steps - 1e-9 * max(1.0, steps))
+
+    @property
     def spans(self) -> tuple[float, ...]:
         """The times of states that are stored, from where steps begin."""
-        return tuple(time - self.begin for time in self.times)
+        return tuple(time - self.begin for time in self.times or ())
 
     @property
     def until(self) -> float:
@@ -68,8 +75,9 @@ class Experiment:
     def rows(self) -> int:
         """How many states are stored: those of every stride-th step or at given times, and the last."""
         begun = len(self.past.rows) if self.past else 1
-        if self.times:
-            return begun + len(self.times) + (abs(self.until - self.times[-1]) > 1e-9 * abs(self.until - self.begin))
+        if self.times is not None:
+            last = self.times[-1] if self.times else self.begin
+            return begun + len(self.times) + (abs(self.until - last) > 1e-9 * abs(self.until - self.begin))
         part = bool(self.end and self.end.part)
         return begun + self.run.steps // self.run.stride + (self.run.steps % self.run.stride > 0) + part
 

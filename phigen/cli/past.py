@@ -25,6 +25,8 @@ from phigen.study.sections import function_of
 
 #: How many times may be asked for.
 _MOST_TIMES = 10_000_000
+#: Times apart by less of all that has passed are one.
+_EQUAL = 1e-9
 
 
 @dataclass(frozen=True)
@@ -94,8 +96,8 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
     One that goes on with a finished run holds the gauge of its start, or its e.
     """
     backend, past, names = solver.backend, experiment.past, solver.interface
-    initial, made = np.array(experiment.initial), round((past.t - experiment.t0) / experiment.h) if past else 0
-    draws = Draws(experiment.run.seed, step=made if names.noise else 0)
+    initial = np.array(experiment.initial)
+    draws = Draws(experiment.run.seed, step=experiment.made if names.noise else 0)
     try:
         if past is None:
             return backend.start(initial, experiment.parameters, experiment.t0, experiment.first, draws)
@@ -119,7 +121,12 @@ def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     if list(past.columns) != wanted or begin != [experiment.t0, *[0.0] * names.monitored, *experiment.initial]:
         message = f"{path} is of another run: its first row is {', '.join(map(repr, begin))}"
         raise click.BadParameter(message, param_hint="--extend")
-    return replace(experiment, past=past)
+    found = replace(experiment, past=past)
+    missed = past.t - found.t0 - found.made * found.h
+    if found.run.members > 1 and abs(missed) > _EQUAL * found.made * abs(found.h):
+        message = f"{path} ends with a part of a step, at t = {past.t!r}, which the means of members are not told of"
+        raise click.BadParameter(f"{message}: make the run anew, to its new end", param_hint="--extend")
+    return found
 
 
 def ended(experiment: Experiment, solver: Solver, console: Console) -> Experiment:
@@ -169,10 +176,12 @@ def timed(experiment: Experiment, solver: Solver, every: float | None, at: str |
     end = experiment.until
     if at is not None:
         times = _listed(at)
-        beyond = [t for t in times if (t - begin) * sign < 0 or (t - end) * sign > 1e-9 * abs(end - begin)]
-        if beyond:
-            raise click.BadParameter(f"{beyond[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
-        times = sorted({t for t in times if t != begin}, reverse=sign < 0)
+        beyond = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
+        stopped = experiment.end is not None and experiment.end.stopped
+        outside = [t for t in times if (t - begin) * sign < 0] + ([] if stopped else beyond)
+        if outside:
+            raise click.BadParameter(f"{outside[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
+        times = sorted({*times} - {begin, *beyond}, reverse=sign < 0)
         _expect_whole(experiment, solver, times, "--at")
         return replace(experiment, times=tuple(times))
     assert every is not None

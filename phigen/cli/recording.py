@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -68,7 +69,7 @@ class Recorder:
         if run.section is not None:
             section = function_of(run.section, names.coordinates, parameters, names.time)
             clock: dict[str, Any] = {"timed": bool(names.time), "direction": run.direction}
-            self.finder = CrossingFinder[Session](section, experiment.h, experiment.t0, **clock)
+            self.finder = CrossingFinder[Session](section, experiment.h, experiment.begin, **clock)
         self.identity = {
             "phigen": __version__,
             "spec": compilation.spec.source_sha256,
@@ -79,7 +80,7 @@ class Recorder:
             "step": experiment.h,
             "steps": run.steps,
             "stride": run.stride,
-            "times": [*experiment.times[-1:], len(experiment.times)],
+            "times": None if experiment.times is None else [*experiment.times[-1:], len(experiment.times)],
             "end": experiment.end.span if experiment.end else None,
             "past": len(experiment.past.rows) if experiment.past else 0,
             "initial": list(experiment.initial),
@@ -122,7 +123,7 @@ class Recorder:
     @property
     def spectrum(self) -> Spectrum | None:
         """The Lyapunov exponents so far, if they were asked for and a step was made."""
-        return self.growth.spectrum() if self.growth and self.session.steps else None
+        return self.growth.spectrum() if self.growth and self.steps else None
 
     def start(self) -> None:
         """Stand at the initial state, with new files."""
@@ -160,18 +161,26 @@ class Recorder:
         rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned])
         worked = self.watch.see(t, piece.x)
         self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
-        crossings = np.array([[t, *x] for t, x in piece.crossings]).reshape(-1, 1 + piece.x.shape[1])
+        if "output" in self._tables:
+            self._tables["output"].append(rows)
+        self._cross(piece.crossings)
+
+    def _cross(self, found: Sequence[tuple[float, Floats]]) -> None:
+        """Take in crossings, times and states."""
+        crossings = np.array([[t, *x] for t, x in found]).reshape(-1, 1 + self.solver.interface.dimension)
         self.points.see(crossings)
-        for name, found in (("output", rows), ("section", crossings)):
-            if name in self._tables:
-                self._tables[name].append(found)
+        if "section" in self._tables:
+            self._tables["section"].append(crossings)
 
     def complete(self) -> None:
         """Make the part of a step at the end; the last row is the last state, whatever rows are stored."""
         end, number = self.experiment.end, float(self.session.steps)
         if end is not None:
-            self._whole = self.session.steps
-            self.session, number = end.finish(self.session)
+            whole = self.session
+            self._whole = whole.steps
+            self.session, number = end.finish(whole)
+            if self.finder and number > whole.steps:
+                self._cross(self.finder.within(whole, number - whole.steps))
         if number > self.number + 1e-9 * (1 + number):
             self.see(standing(self.session, number))
         self.number = number
@@ -214,15 +223,18 @@ class Recorder:
         self._saved = time.monotonic()
 
     def means(self) -> dict[str, tuple[float, float]]:
-        """The means of coordinates and energy over all members after the steps made, with their statistical errors.
+        """The means of coordinates and energy over all members where the run ended, with their statistical errors.
 
         The first member is the trajectory of the session itself. Raises `StepError`.
         """
-        run, parameters, names = self.experiment.run, self.experiment.parameters, self.solver.interface
-        t0 = self.experiment.t0 if names.time else None
-        starts = np.tile(np.array(self.experiment.initial), (run.members, 1))
-        steps = self.session.steps
-        x = self.solver.ensemble(starts, self.experiment.h, steps, t0=t0, seed=run.seed, parameters=parameters)
+        about, names = self.experiment, self.solver.interface
+        run, parameters, steps = about.run, about.parameters, about.made + self.steps
+        part = about.h * (self.number - self.steps) if self._whole is not None else 0.0
+        x = np.tile(np.array(about.initial), (run.members, 1))
+        for h, before, count in ((about.h, 0, steps), (part, steps, 1)):
+            if count and h:
+                clock: dict[str, Any] = {"t0": about.t0 + about.h * before} if names.time else {}
+                x = self.solver.ensemble(x, h, count, seed=run.seed, step0=before, parameters=parameters, **clock)
         energy = self.solver.energies(x, np.full(len(x), self.time), parameters)
         columns = np.column_stack([x, energy])
         errors = columns.std(axis=0, ddof=1) / np.sqrt(len(x))
@@ -331,8 +343,8 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
         pieces = march(
             session, experiment.h, run.steps, run.stride, recorder.finder, see_tangent, begun=recorder.watch.begun
         )
-        if experiment.times:
-            pieces = _at_times(recorder, session)
+        if experiment.times is not None:
+            pieces = _at_times(recorder, session, see_tangent)
         done = False
         try:
             for piece in pieces:
@@ -344,7 +356,7 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
                 recorder.save(CHECKPOINT_SECONDS)
             else:
                 done = True
-            done = done or (session.steps == run.steps and not experiment.times)
+            done = done or (session.steps == run.steps and experiment.times is None)
             if done:
                 recorder.complete()
         except BackendError as error:
@@ -359,13 +371,33 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
     return failure, interrupted
 
 
-def _at_times(recorder: Recorder, session: Session) -> Iterator[Piece]:
+def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Floats], None] | None) -> Iterator[Piece]:
     """What is stored at given times, from where a session stands."""
     about = recorder.experiment
     if not recorder.watch.begun:
         yield standing(session, 0.0)
     seen = recorder.watch.good - (len(about.past.rows) if about.past else 1)
-    yield from march_at(session, about.h, about.run.steps, about.spans[seen:])
+    yield from march_at(session, about.h, about.run.steps, about.spans[seen:], recorder.finder, see_tangent)
+
+
+@dataclass(frozen=True)
+class _Rows:
+    """Which states of a method to compare with are looked at: their numbers of steps, with a fraction between two."""
+
+    numbers: Iterable[float]
+    count: int
+
+
+def _compared_rows(experiment: Experiment, h: float) -> _Rows:
+    """Those of the run itself, by steps of size h, which are equal in t."""
+    run, end = experiment.run, experiment.end
+    last = end.span / h if end else float(run.steps)
+    if experiment.times is not None:
+        numbers = [0.0, *(span / h for span in experiment.spans)]
+        return _Rows([*numbers, *([last] if experiment.rows > len(numbers) else [])], experiment.rows)
+    whole = range(0, run.steps + 1, run.stride)
+    ends = [float(run.steps)] * (run.steps % run.stride > 0) + [last] * (last > run.steps * (1 + 1e-9))
+    return _Rows(chain(whole, ends), len(whole) + len(ends))
 
 
 def compared(
@@ -373,29 +405,31 @@ def compared(
 ) -> tuple[Watch, Trajectory]:
     """A classical method on the same experiment: its errors, and its trajectory as far as a figure can show it.
 
-    It makes as many steps; with a monitor they are equal in t, and end at the same time.
+    It makes as many steps, and parts of them to times between two; with a monitor they are equal in t, and end at the
+    same time.
     """
     from phigen.study import classical
     from phigen.study.methods import extended, field_of
 
     run, parameters, names = experiment.run, experiment.parameters, solver.interface
     start, backend = time.perf_counter(), solver.backend
-    h = end / run.steps if solver.interface.monitored else experiment.h
-    watch = Watch(method, compilation.system, run, parameters, experiment.rows)
-    sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows)
+    h = end / max(1, run.steps) if solver.interface.monitored else experiment.h
+    rows = _compared_rows(experiment, h)
+    watch = Watch(method, compilation.system, run, parameters, rows.count)
+    sketch = Sketch(names.dimension, len(names.casimirs), rows.count)
 
     with console.progress(method, run.steps) as progress:
         x0 = np.array(experiment.initial)
         for numbers, found in classical.pieces_of(
-            method, field_of(solver, parameters), extended(solver, x0, experiment.t0), h, run.steps, run.stride
+            method, field_of(solver, parameters), extended(solver, x0, experiment.t0), h, rows.numbers
         ):
             x = found[:, : len(x0)]
-            t = experiment.t0 + h * numbers.astype(np.float64)
+            t = experiment.t0 + h * numbers
             worked = watch.see(t, x)
             energy, casimirs = solver.energies(x, t, parameters), backend.casimirs(x, parameters)
             sketch.see(np.column_stack([t, x, energy - worked, casimirs]))
             if progress and len(numbers):
                 progress(int(numbers[-1]))
     console.detail(f"{method}: {time.perf_counter() - start:.3f} s")
-    broken = int(watch.state["good"]) < experiment.rows
+    broken = int(watch.state["good"]) < rows.count
     return watch, sketch.trajectory(names.coordinates, names.casimirs, h, parameters, broken)

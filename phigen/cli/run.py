@@ -142,7 +142,7 @@ def command(
         if file:
             console.note(f"wrote {file}" + (", as far as the run came" if failure or interrupted else ""))
     summaries, drawn = [recorder.watch.summary()], {recorder.label: recorder.trajectory(failure is not None)}
-    comparable = not (failure or interrupted or extend) and experiment.run.steps
+    comparable = not (failure or interrupted or extend)
     for method in experiment.run.compare if comparable else ():
         watch, drawn[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
@@ -161,7 +161,7 @@ def command(
 
 #: Options that say different things of one matter, or that nothing is made for.
 _APART = [("--until", "--steps"), ("--every", "--at"), ("--extend", "--from")]
-_APART += [(a, b) for a in ("--every", "--at", "--extend") for b in ("--section", "--lyapunov")]
+_APART += [("--extend", "--section"), ("--extend", "--lyapunov")]
 
 
 def _expect_together(*options: dict[str, object]) -> None:

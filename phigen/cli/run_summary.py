@@ -44,7 +44,8 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         out(f"\n  {count} of the section {recorder.section_text} = 0")
     if spectrum := recorder.spectrum:
         changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
-        out(f"\n  Lyapunov exponents after t = {spectrum.t:.9g}; {changed}")
+        clock = "τ" if solver.interface.monitored else "t"
+        out(f"\n  Lyapunov exponents after {clock} = {spectrum.t:.9g}, per unit of {clock}; {changed}")
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
 
 

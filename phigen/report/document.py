@@ -78,7 +78,7 @@ def _run(material: Material) -> Iterator[Markup]:
     yield page.facts(pairs)
     yield evidence.summary_table(material.summaries)
     if material.spectrum:
-        yield evidence.lyapunov_paragraph(material.spectrum)
+        yield evidence.lyapunov_paragraph(material.spectrum, "τ" if material.compilation.monitor is not None else "t")
     if not drawable():
         yield page.paragraph(NO_FIGURES, "note")
         yield viewer(material.methods, material.opening, material.compilation.system.casimirs)

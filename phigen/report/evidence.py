@@ -111,14 +111,16 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
     return page.joined([listed, page.paragraph(page.typeset(stated(first.units)), "note")])
 
 
-def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
-    """The exponents, and how well they are known."""
+def lyapunov_paragraph(spectrum: Spectrum, clock: str = "t") -> Markup:
+    """The exponents, and how well they are known; ``clock`` is what their steps are equal in."""
     found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     late = page.scientific(spectrum.uncertainty)
     if len(spectrum.exponents) == 1:
         said = f"The largest Lyapunov exponent after t = {spectrum.t:.9g} is {found}."
         return page.paragraph(f"{said} The second half of the time changed it by {late}.")
-    said = f"Lyapunov exponents after t = {spectrum.t:.9g}: {found}; their sum is {page.scientific(spectrum.total)}."
+    said = (
+        f"Lyapunov exponents after {clock} = {spectrum.t:.9g}: {found}; their sum is {page.scientific(spectrum.total)}."
+    )
     known = f"The second half of the time changed them by {late}, at most."
     return page.paragraph(f"{said} {known}")
 

@@ -116,6 +116,19 @@ class CrossingFinder(Generic[C]):
             if failure:
                 raise failure
 
+    def within(self, session: C, part: float) -> list[tuple[float, Floats]]:
+        """The crossings (t, x) in the first ``part`` of the step that a followed session would make next.
+
+        A step that cannot be made as a whole has none.
+        """
+        copy, end = session.branch(), session.steps + part * (1 + 1e-12)
+        try:
+            for _ in self.follow(copy, 1, lambda: copy.advance(self.h, 1)):
+                inside = [place for place in self.places if place[0] <= end]
+        except BackendError:
+            return []
+        return [(self._clock(there, self._time(at - self.first)), there.state()) for at, there in inside]
+
     def _time(self, j: Any, fraction: float = 0.0) -> Any:
         """The time in interval j, counted from the first of the values."""
         return self.t0 + (self.first + j + fraction) * self.h

@@ -21,13 +21,14 @@ Finish = Callable[[Session], tuple[Session, float]]
 class End:
     """An end after so many whole ``steps``, and a ``part`` of one, which ``finish`` makes.
 
-    ``span`` is the time from the start.
+    ``span`` is the time from the start. It was ``stopped`` where a function vanishes, not at a time.
     """
 
     steps: int
     finish: Finish
     span: float
     part: bool
+    stopped: bool = False
 
 
 def at_time(session: Session, h: float, span: float) -> End:
@@ -56,7 +57,7 @@ def where_zero(session: Session, h: float, most: int, g: Function, t0: float, *,
                 if at > 0:
                     own = there.time()
                     span, steps = at * h if math.isnan(own) else own, int(np.floor(at))
-                    return End(steps, _given((there, at)), span, at > steps)
+                    return End(steps, _given((there, at)), span, at > steps, stopped=True)
     except BackendError:  # which the run itself will tell
         pass
     return None

@@ -88,45 +88,78 @@ def standing(session: Session, number: float) -> Piece:
     return _piece([(session, number)], len(session.state()), len(session.element()))
 
 
-def _piece(rows: Sequence[tuple[Session, float]], width: int, element: int) -> Piece:
+def _piece(
+    rows: Sequence[tuple[Session, float]], width: int, element: int, crossings: Sequence[tuple[float, Floats]] = ()
+) -> Piece:
     x = np.array([here.state() for here, _ in rows]).reshape(-1, width)
     turned = np.array([here.element() for here, _ in rows]).reshape(len(rows), element)
-    return Piece(np.array([n for _, n in rows]), x, [], np.array([here.time() for here, _ in rows]), turned)
+    passed = np.array([here.time() for here, _ in rows])
+    return Piece(np.array([n for _, n in rows]), x, list(crossings), passed, turned)
 
 
-def march_at(session: Session, h: float, steps: int, spans: Sequence[float]) -> Iterator[Piece]:
+def march_at(
+    session: Session,
+    h: float,
+    steps: int,
+    spans: Sequence[float],
+    finder: CrossingFinder[Session] | None = None,
+    see_tangent: Callable[[Floats], None] | None = None,
+) -> Iterator[Piece]:
     """Go on with a session, storing the states at given times after the start in place of every ``stride``-th.
 
-    Each is one further step, part of a whole one, from the session, which makes whole steps only. ``spans`` are those
-    still to come; whole steps beyond the last are made without a row. Raises `BackendError` after a piece.
+    Each is one further step, part of a whole one, from the session, which makes whole steps only; ``see_tangent`` is
+    told the derivatives of these. ``spans`` are those still to come; whole steps beyond the last are made without a
+    row. Raises `BackendError` after a piece.
     """
     sizes = len(session.state()), len(session.element())
     rows: list[tuple[Session, float]] = []
+    crossings: list[tuple[float, Floats]] = []
+
+    def move() -> None:
+        if see_tangent:
+            see_tangent(session.advance_tangent(h))
+        else:
+            session.advance(h, 1)
+
+    def advance(count: int) -> None:
+        if finder:
+            for _, found in finder.follow(session, count, move):
+                crossings.extend(found)
+        elif see_tangent:
+            for _ in range(count):
+                move()
+        else:
+            session.advance(h, count)
+
     begun, failure = time.perf_counter(), None
     for span in spans:
         try:
-            here, number = _there(session, h, steps, span)
+            here, number = _there(session, h, steps, span, advance)
         except BackendError as error:
             failure = error
             break
         rows.append((here.branch(), number))
         if time.perf_counter() - begun > _SECONDS or len(rows) == _MOST_ROWS:
-            yield _piece(rows, *sizes)
+            yield _piece(rows, *sizes, crossings)
             begun, rows = time.perf_counter(), []
-    yield _piece(rows, *sizes)
+            crossings.clear()
+    yield _piece(rows, *sizes, crossings)
     if failure:
         raise failure
     while session.steps < steps:
-        session.advance(h, min(_MOST_STEPS, steps - session.steps))
-        yield _piece([], *sizes)
+        crossings.clear()
+        advance(min(_MOST_STEPS, steps - session.steps))
+        yield _piece([], *sizes, crossings)
 
 
-def _there(session: Session, h: float, steps: int, span: float) -> tuple[Session, float]:
+def _there(
+    session: Session, h: float, steps: int, span: float, advance: Callable[[int], object]
+) -> tuple[Session, float]:
     """A session at a time after the start, and how many steps that is; the given one makes the whole steps before."""
     own = session.time()
     passed = session.steps * h if np.isnan(own) else own
     count, _ = steps_until(session, h, span - passed)
-    session.advance(h, min(count, steps - session.steps))
+    advance(min(count, steps - session.steps))
     left = span - (session.steps * h if np.isnan(own) else session.time())
     if abs(left) <= EQUAL * abs(span):
         return session, float(session.steps)

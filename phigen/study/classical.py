@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,37 +80,46 @@ METHODS: Mapping[str, tuple[Step, int]] = {
 
 def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1) -> Floats:
     """States (rows, DIM) of the steps 0, stride, 2·stride, … and the last; rows after a failure are NaN."""
-    pieces = [x for _, x in pieces_of(method, field, x0, h, steps, stride)]
-    states = np.full((len(row_steps(steps, stride)), len(x0)), np.nan)
+    rows = row_steps(steps, stride)
+    pieces = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
+    states = np.full((len(rows), len(x0)), np.nan)
     found = np.concatenate(pieces)
     states[: len(found)] = found
     return states
 
 
 def pieces_of(
-    method: str, field: Field, x0: Floats, h: float, steps: int, stride: int = 1
-) -> Iterator[tuple[NDArray[np.int64], Floats]]:
-    """Numbers (rows,) and states (rows, DIM) of the steps 0, stride, 2·stride, … and the last, in pieces.
+    method: str, field: Field, x0: Floats, h: float, rows: Iterable[float]
+) -> Iterator[tuple[Floats, Floats]]:
+    """Numbers (rows,) of steps, from 0 on and increasing, and the states (rows, DIM) after these, in pieces.
 
-    Ends with the last finite row if the method fails.
+    Those between two steps are reached by part of one, which the steps after it do not go on from. Ends with the last
+    finite row if the method fails.
     """
     step, _ = METHODS[method]
     x = np.array(x0, dtype=np.float64)
     carry = np.zeros_like(x)
-    numbers, states = [0], [x]
-    for done in range(1, steps + 1):
+    numbers: list[float] = []
+    states: list[Floats] = []
+    done = 0
+    for number in rows:
+        whole = round(number) if abs(number - round(number)) <= 1e-12 * max(1.0, number) else int(number)
+        while done < whole:
+            with np.errstate(all="ignore"):
+                # Compensated, as phigen's solvers are: the comparison is about the methods.
+                change = (step(field, x, h) - x) + carry
+                following = x + change
+                carry = change - (following - x)
+                x = following
+            done += 1
+            if done % _PIECE == 0 and states:
+                yield np.array(numbers), np.array(states)
+                numbers, states = [], []
         with np.errstate(all="ignore"):
-            # Compensated, as phigen's solvers are: the comparison is about the methods.
-            change = (step(field, x, h) - x) + carry
-            following = x + change
-            carry = change - (following - x)
-            x = following
-        if done % stride == 0 or done == steps:
-            if not np.isfinite(x).all():
-                break
-            numbers.append(done)
-            states.append(x)
-        if done % _PIECE == 0:
-            yield np.array(numbers, dtype=np.int64), np.array(states).reshape(-1, len(x))
-            numbers, states = [], []
-    yield np.array(numbers, dtype=np.int64), np.array(states).reshape(-1, len(x))
+            here = x if number <= whole else step(field, x, (number - whole) * h)
+        if not np.isfinite(here).all():
+            break
+        numbers.append(float(number))
+        states.append(here)
+    if states:
+        yield np.array(numbers), np.array(states)

@@ -143,6 +143,86 @@ def test_a_run_starts_where_another_ended(phigen, write):
         assert second[-4:] == pytest.approx(first["attitude"][-1], abs=1e-15)
 
 
+def test_times_beyond_a_stop_are_left_out_and_a_long_time_between_rows_leaves_both_ends(phigen, swing):
+    ran(phigen, swing, "--run", "stopped", "--at", "0.5,7", "-o", "a.csv")
+    assert table("a.csv")[:, 0] == pytest.approx([0, 0.5, np.pi / 3], abs=1e-11)
+    ran(phigen, swing, "--run", "steps", "--every", 9, "-o", "a.csv")
+    assert table("a.csv")[:, 0] == pytest.approx([0, 6], abs=1e-14)
+
+
+@pytest.mark.parametrize("rows", [(), ("--every", 0.37), ("--at", "4.72")])
+def test_crossings_do_not_depend_on_which_rows_are_stored_and_parts_of_steps_have_them_too(phigen, swing, rows):
+    ran(phigen, swing, "--run", "both", "--until", 4.72, *rows, "--section", "s.csv")  # steps end at 4.7
+    assert table("s.csv")[:, 0] == pytest.approx([np.pi / 2, 3 * np.pi / 2], abs=1e-9)
+
+
+def test_an_extension_looks_for_a_section_that_depends_on_the_time_at_its_own_times(phigen, write):
+    clock = SWING.replace("order: 8", "time: t\norder: 2").replace("section: q", "section: t - 5")
+    spec = write("spec.yaml", clock)
+    ran(phigen, spec, "--run", "both", "--until", 4, "-o", "a.csv")
+    told = json.loads(ran(phigen, spec, "--run", "both", "--until", 6, "--extend", "-o", "a.csv", "--json").stdout)
+    assert told["section"]["crossings"] == 1
+
+
+def test_exponents_do_not_depend_on_which_rows_are_stored(phigen, swing):
+    every, whole = (
+        json.loads(ran(phigen, swing, "--until", 2.05, *rows, "--lyapunov", "--json").stdout)["lyapunov"]
+        for rows in (("--every", 0.37), ())
+    )
+    assert every == whole
+    short = json.loads(ran(phigen, swing, "--until", 0.05, "--lyapunov", "--json").stdout)
+    assert "lyapunov" not in short  # which has no whole step
+
+
+@pytest.mark.parametrize(
+    "rows", [("--until", 2.03), ("--until", 2.03, "--every", 0.5), ("--until", 0.05), ("--steps", 7)]
+)
+@pytest.mark.parametrize("text", [SWING, BODY], ids=["time", "monitor"])
+def test_methods_beside_it_have_the_same_times(phigen, write, text, rows):
+    spec = write("spec.yaml", text.replace("stride: 5}", "stride: 5, compare: [dop853]}").replace(
+        "steps: 60}", "steps: 60, stride: 3, compare: [dop853]}"))  # fmt: skip
+    own, other = json.loads(ran(phigen, spec, *rows, "--json").stdout)["methods"]
+    assert other["rows"] == other["good"] > 1
+    assert text == BODY or other["rows"] == own["rows"]
+    assert other["energy"]["error"] < 1e-9
+
+
+NOISY = SWING.replace("order: 8", "order: 2\nnoise: {kick: {hamiltonian: q, amplitude: 0.1}}").split("  until:")[0]
+
+
+@pytest.mark.parametrize("scheme", ["series", "splitting"])
+def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, scheme):
+    """Of two members the run is the first: it is as far from the mean as the error says."""
+    spec = write("spec.yaml", NOISY.replace("steps: 60}", "steps: 60, seed: 5, members: 2}") + f"scheme: {scheme}\n")
+
+    def told(*args):
+        found = json.loads(ran(phigen, spec, *args, "--json").stdout)
+        for name, mean in found["means"].items():
+            value = found["final"].get(name, mean["mean"] + mean["error"])
+            assert abs(value - mean["mean"]) == pytest.approx(mean["error"], abs=1e-13)
+        return found["means"]
+
+    told("--until", 2.05)
+    whole = told("--until", 3)
+    told("--until", 2, "-o", "a.csv")
+    extended = told("--until", 3, "--extend", "-o", "a.csv")
+    assert all(extended[name]["mean"] == pytest.approx(whole[name]["mean"], abs=1e-13) for name in whole)
+    told("--until", 2.05, "-o", "b.csv")
+    refused = phigen("run", spec, "--until", 3, "--extend", "-o", "b.csv", "-t", "numpy")
+    assert (refused.exit_code, "ends with a part of a step" in refused.stderr) == (2, True)
+
+
+def test_noise_after_a_part_of_a_step_is_new(phigen, write):
+    """The part has used up the numbers of its step, whatever its size."""
+    still = NOISY.replace("(p**2 + q**2)/2", "p - p").replace("hamiltonian: p - p", "hamiltonian: 0")
+    spec = write("spec.yaml", still)
+    ran(phigen, spec, "--until", 0.22, "-o", "a.csv")
+    ran(phigen, spec, "--steps", 1, "--extend", "-o", "a.csv")
+    t, _, p = table("a.csv")[:, :3].T
+    drawn = np.diff(p) / np.sqrt(np.diff(t))
+    assert abs(drawn[-1] - drawn[-2]) > 1e-6
+
+
 def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, swing):
     run = ("run", swing, "--run", "steps", "-t", "numpy", "--every", 0.07, "--until", 5.03, "-q")
     assert phigen(*run, "-o", "a.csv").exit_code == 0
@@ -163,7 +243,7 @@ def test_what_does_not_fit_is_told(phigen, write):
     np.savez("other.npz", x=np.ones((2, 2)))
     for args, said in (
         ((swing, "--until", 3, "--steps", 5), "--until and --steps do not go together"),
-        ((swing, "--every", 1, "--lyapunov"), "--every and --lyapunov"),
+        ((swing, "--extend", "--lyapunov"), "--extend and --lyapunov"),
         ((swing, "--until", -3), "never reached"),
         ((swing, "--at", "7"), "not between 0.0 and 6.0"),
         ((swing, "--at", "soon"), "times are numbers"),
