@@ -218,6 +218,7 @@ def interface_of(program: Program) -> Interface:
         graph=bool(program.step.partners and program.step.partners.graph),
         compensated=program.compensated,
         at_bonds=sites.at_bonds,
+        dear=bool(program.step.equation or (program.step.partners and not program.step.partners.graph)),
     )
 
 

@@ -80,7 +80,7 @@ STATES = 8
 #: Steps in whose number the trail is measured, since several may keep one state.
 LEGS = 64
 
-#: Bytes of the trail of a run whose segments are all made once more, at most.
+#: Bytes of the trail of a run that is kept as a whole, or whose segments are all made once more, at most.
 TWICE = 1 << 26
 
 #: Site updates between two calls: Python can deliver a keyboard interrupt then.
@@ -118,6 +118,7 @@ class CLatticeSession:
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
         self._kept = 2 if interface.compensated else 1
+        self._dear = interface.dear
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
         self._struct = np.zeros(functions.solver_size(), dtype=np.uint8)
         bonds = np.ascontiguousarray(parameters.get("bonds", ()), dtype=np.uintp).reshape(-1, 2)
@@ -183,7 +184,7 @@ class CLatticeSession:
         most, least = (int(self._c.trail_size(self._address, n)) for n in (steps, 1))
         state, of_step = x0_bar.nbytes, (int(self._c.trail_size(self._address, 1 + LEGS)) - least) // LEGS
         twice = least + 3 * math.isqrt(steps * state * of_step)  # segments that are made once more have room by this
-        wanted = most if of_step < state else twice  # where sweeps are undone, all is worth its room
+        wanted = most if self._dear or of_step < state else twice  # where sweeps are undone, all is worth its room
         room = max(KEPT * x0_bar.itemsize, least + STATES * 2 * state, min(TWICE, wanted))
         size = max(least, min(most or least, room))
         expect_room("what is kept of steps to go back", size)

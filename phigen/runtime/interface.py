@@ -88,6 +88,7 @@ class LatticeInterface(Interface):
     graph: bool = False
     compensated: bool = False  # whether the C saves what rounding has left out of the fields
     at_bonds: tuple[str, ...] = ()
+    dear: bool = False  # whether steps take longer than what is kept of them, to go back, takes to be written and read
 
 
 @dataclass

@@ -360,6 +360,23 @@ def test_segments_of_the_series_in_c_are_made_again_to_round_off(monkeypatch):
         assert part.parameters_bar["A"] == pytest.approx(whole.parameters_bar["A"], rel=1e-13)
 
 
+def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
+    """As those of the series are; of a longer run as much as there is room for."""
+    solver, kept = made("driven composed", "c"), []
+    x = 0.3 * beginning(solver)
+    monkeypatch.setattr(c_lattice, "KEPT", 0)
+    monkeypatch.setattr(c_lattice, "expect_room", lambda what, size: kept.append(size))
+
+    def room(steps):
+        solver.pullback(x, H, steps, x)
+        return kept[-1]
+
+    whole, half = room(1000), room(500)
+    assert whole - half == pytest.approx(half - room(1), rel=0.01)
+    monkeypatch.setattr(c_lattice, "TWICE", half)
+    assert room(1000) == half
+
+
 #: Sizes that several threads work at; of "fput", too large for caches, they go back through several flows at once.
 LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 140_000}
 LARGE |= {"driven_graph": 2000, "paired fast": 513}

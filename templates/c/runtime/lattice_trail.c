@@ -119,10 +119,23 @@ size_t phi_trail_size(const phi_solver *s, size_t steps)
 }
 #endif
 
+#if !PHI_SERIES
 enum { PHI_BESIDE_CORE = 1 << 19 }; /* bytes that the caches of a core hold beside the state */
 
+#endif
+/* Whether the states of all segments fit beside what the steps of one keep. */
+static int phi_fits(size_t room, size_t longest, size_t of_step, size_t of_state, size_t steps)
+{
+    return (room - longest * of_step) / of_state > steps / longest;
+}
+
+#if PHI_SERIES
+/* Share memory out, all that is not taken in any case between what the steps of a segment keep and the states that segments
+   begin with: the longest segments that are made twice only, since the last is made but once; or half and half. */
+#else
 /* Share memory out, all that is not taken in any case between what the steps of a segment keep and the states that segments
    begin with: the shortest segments that are made twice only, if caches hold them, or half and half where all that is too little. */
+#endif
 static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t steps, void *memory, size_t size)
 {
     double *next = (double *)(void *)((char *)memory + (64 - (uintptr_t)memory % 64) % 64);
@@ -140,10 +153,15 @@ static void phi_place_transpose(const phi_solver *s, phi_transpose *g, size_t st
     const size_t fit = (room - of_state) / of_step;
     g->longest = steps > 0 ? steps : 1;
     if (fit < steps) {
+#if PHI_SERIES
+        g->longest = fit;
+        while (g->longest > 1 && !phi_fits(room, g->longest, of_step, of_state, steps)) --g->longest;
+#else
         g->longest = of_step < PHI_BESIDE_CORE ? PHI_BESIDE_CORE / of_step : 1;
         if (g->longest > fit) g->longest = fit;
-        while (g->longest < fit && (room - g->longest * of_step) / of_state < steps / g->longest + 1) ++g->longest;
-        if ((room - g->longest * of_step) / of_state < steps / g->longest + 1) g->longest = fit > 2 ? fit / 2 : 1;
+        while (g->longest < fit && !phi_fits(room, g->longest, of_step, of_state, steps)) ++g->longest;
+#endif
+        if (!phi_fits(room, g->longest, of_step, of_state, steps)) g->longest = fit > 2 ? fit / 2 : 1;
     }
     g->most = (room - g->longest * of_step) / of_state;
     for (int f = 0; f < PHI_ARRAYS; ++f, next += block) g->bar[f] = g->row_bar[f] = PHI_FIRST_SITE(next);
