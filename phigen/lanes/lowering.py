@@ -82,7 +82,7 @@ class Packs:
     """Members with explicit steps, one in each lane.
 
     ``kernels`` are those of a step, or of the flows of a splitting. ``near`` are the functions that are polynomials
-    near 0: where these do not reach, there is a longer way. ``back`` are the transposes of the flows, if members are
+    near 0: where these do not reach, there is a longer way. ``back`` are the transposes of the kernels, if members are
     pulled back in packs too, so many ``abreast``.
     """
 
@@ -145,11 +145,12 @@ def _of_steps(program: Program) -> Blocks | Packs | None:
         case Path() as step if step.lanes and (program.offers("recurrences") or not step.adjoint):
             return _paths(program, step, step.lanes)
         case Explicit() as step:
-            return _packs(program, (step.increment,), ())
+            return _with_back(_packs(program, (step.increment,), ()), step, 0)
         case Splitting() as step:
             used = operations(step.flows)
             packs = _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
-            return packs and _with_back(program, packs, step)
+            kept = 2 * _DOUBLE * LANES**2 * program.dimension  # bytes of a segment of one pack
+            return _with_back(packs, step, kept)
     return None
 
 
@@ -258,13 +259,13 @@ def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -
     return Packs(tuple(kernels), with_formulas(ops), near)
 
 
-def _with_back(program: Program, packs: Packs, step: Splitting) -> Packs:
-    """Packs that members are pulled back in, if the transposes of the flows can be computed in lanes too."""
+def _with_back(packs: Packs | None, step: Explicit | Splitting, kept: int) -> Packs | None:
+    """Packs that members are pulled back in, if the transposes of the kernels can be computed in lanes too: as many as
+    may keep so many bytes on the stack, which grow with the square of their number."""
     back = step.adjoint.steps if step.adjoint else ()
     ops = operations(back)
-    kept = 2 * _DOUBLE * LANES**2 * program.dimension  # bytes of a segment of one pack; they grow with the square
     abreast = next((k for k in (PACKS, 2, 1) if 2 * k**2 * kept <= MOST_STACK), 0)
-    if not abreast or library_calls(ops) or library_powers(back):
+    if packs is None or not abreast or library_calls(ops) or library_powers(back):
         return packs
     return replace(packs, calls=packs.calls | with_formulas(ops), back=back, abreast=abreast)
 

@@ -43,6 +43,7 @@ _EXTRAS = {
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER, _POINTER, _POINTER, _POINTER)),
     "trail_size": (_SIZE, ()),
+    "trail_size_each": (_SIZE, ()),
     "pullback_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, *(_POINTER,) * 6)),
     "level_bar": (None, (_POINTER, _POINTER, _DOUBLE, _POINTER, _POINTER)),
     "init_gauge": (_INT, (_POINTER, _POINTER, _POINTER, _POINTER)),

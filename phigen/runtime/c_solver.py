@@ -231,12 +231,14 @@ class CSolver:
         of_step, count = int(self._c.trail_size()), len(members)
         pieces = segments(members.steps, members.stride, max(1, KEPT // of_step))
         room = of_step * max((s.count for s in pieces), default=1)
+        of_all = int(self._c.trail_size_each()) * members.steps if hasattr(self._c, "pullback_each") else KEPT + 1
+        together = of_all <= KEPT and (count > 1 or len(pieces) <= 1)
         rows, x0_bar, found = np.empty_like(bars), np.empty_like(members.x0), np.zeros((len(members.parameters), count))
         status = np.zeros(count, dtype=np.uint8)
 
         def make(part: slice) -> None:
-            trail = np.empty(room, self._real)
-            if hasattr(self._c, "pullback_each") and len(pieces) <= 1:
+            trail = np.empty(max(1, of_all) if together else room, self._real)
+            if together:
                 own = self._all_pulled(members.part(part), bars[:, part], trail, status[part])
                 rows[:, part], x0_bar[part], found[:, part] = own
                 return

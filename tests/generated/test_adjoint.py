@@ -192,7 +192,7 @@ def test_gradient_agrees_with_many_digits(kind):
 
 
 def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
-    """Their zeros are not stored: a chain of seven species."""
+    """Their zeros are not stored: a chain of seven species. The lanes are steps of one run, or members."""
     rows = [[(j - i) if abs(i - j) == 1 else 0 for j in range(7)] for i in range(7)]
     names = [f"x{k}" for k in range(7)]
     text = f"coordinates: [{', '.join(names)}]\nparameters: {{r: 1.1}}\npoisson: {{log_canonical: {rows}}}\n"
@@ -203,6 +203,8 @@ def test_sparse_newton_matrices_are_gone_back_through_in_lanes():
     ours, theirs = (solver(made, target).pullback(x, 0.1, 21, bar, r=1.2) for target in ("c", "numpy"))
     assert ours.x0_bar == pytest.approx(theirs.x0_bar, rel=1e-13)
     assert ours.parameters_bar["r"] == pytest.approx(theirs.parameters_bar["r"], rel=1e-12)
+    members = solver(made, "c").pullback(np.tile(x, (3, 1)), 0.1, 21, np.tile(bar, (3, 1)), r=1.2)
+    assert members.x0_bar == pytest.approx(np.tile(ours.x0_bar, (3, 1)), rel=1e-13)
 
 
 @pytest.mark.parametrize("target", TARGETS)
@@ -255,9 +257,9 @@ def test_members_and_their_parameters_have_cotangents(target):
     assert together.parameters_bar["I2"] == pytest.approx(sum(e.parameters_bar["I2"] for e in apart), abs=1e-14)
 
 
-@pytest.mark.parametrize("kind", ["newton, gauge", "newton, monitor", "newton, time", "path", "kicks, time"])
+@pytest.mark.parametrize("kind", ["newton, time", "splitting, monitor", "path, time, composed", "kicks, time"])
 def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypatch):
-    """Steps, parameters and times of their own; long runs are those of segments."""
+    """Those that are not in lanes. Steps, parameters and times of their own; long runs are those of segments."""
     made, rng = solver(compilation(kind), "c"), np.random.default_rng(2)
     monkeypatch.setattr(runs, "LEAST", 2)
     monkeypatch.setattr(runs, "_REPAID", 1)
@@ -281,22 +283,49 @@ def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypat
         assert bars == pytest.approx(together.parameters_bar[name], rel=1e-10, abs=1e-13)
 
 
-def test_members_of_splittings_are_pulled_back_in_packs(monkeypatch):
-    """As each is alone: in segments, with rows, and numbers of its own; one whose angles are too large for the short
-    ways of lanes to the last bit, since it is done by itself. The second group is not full."""
-    compiled = compile_spec(spec.loads(f"phigen: 1\nname: t\n{TOP}order: 4\nadjoint: true\n"), scheme="splitting")
+#: Members that are pulled back in lanes, which cannot do a state, or a step, that is so many times as large: arguments
+#: of functions are beyond the short ways, Newton's method or expansions fail.
+OUT_OF_REACH = {
+    "splitting": (40, 1),
+    "explicit": (1e7, 1),
+    "newton, gauge": (1, 35),
+    "path": (1, 15),
+    "newton, composed": (1, 1),  # all are in reach
+    "newton, monitor": (1, 1),
+}
+
+#: Specs of those that are not in `KINDS`.
+FURTHER = {
+    "splitting": f"{TOP}order: 4\n",
+    "explicit": f"{SWING}birealisation: {{kind: canonical-euler, side: q}}\norder: 1\n",
+}
+
+
+@pytest.mark.parametrize("kind", OUT_OF_REACH)
+def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
+    """As each is alone: with rows, and numbers of its own, splittings in segments; one that lanes cannot do to the last
+    bit, since it is done by itself. The last group is not full."""
+    text, scheme = FURTHER.get(kind), "splitting" if kind == "splitting" else None
+    head = "phigen: 1\nname: t\nadjoint: true\n"
+    compiled = compile_spec(spec.loads(head + text), scheme=scheme) if text else compilation(kind)
     assert "t_pull_group(" in files(compiled, "c")["t.c"]
     monkeypatch.setattr(runs, "_REPAID", 1)
-    made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 42, 5
-    many, h = np.array([0.4, 0.9, 0.3]) + 0.1 * rng.random((count, 3)), H * (1 + 0.1 * rng.random(count))
-    many[far] *= 40
+    made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 43, 5
+    first = np.array([0.4, 0.9, 0.3][: compiled.program.dimension])
+    many, h = first + 0.1 * rng.random((count, len(first))), H * (1 + 0.1 * rng.random(count))
+    many[far] *= OUT_OF_REACH[kind][0]
+    h[far] *= OUT_OF_REACH[kind][1]
     own = {name: value * (1 + 0.1 * rng.random(count)) for name, value in made.interface.parameters.items()}
     bar = rng.normal(size=(4, *many.shape))
     one, two = (made.pullback(many, h, 23, bar, 9, threads=n, parameters=own) for n in (1, 2))
     assert np.array_equal(one.x0_bar, two.x0_bar)
     for m in range(count):
         alone = made.pullback(many[m], h[m], 23, bar[:, m], 9, parameters={k: v[m] for k, v in own.items()})
-        near = 0 if m == far else 1e-13 * np.max(np.abs(alone.x0_bar))
+        near = (
+            0
+            if m == far and OUT_OF_REACH[kind] != (1, 1)
+            else 1e-13 * np.max(np.abs([*alone.x0_bar, *alone.parameters_bar.values()]))
+        )
         assert np.max(np.abs(one.x1[:, m] - alone.x1)) <= near
         assert np.max(np.abs(one.x0_bar[m] - alone.x0_bar)) <= near
         assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in own) <= near
@@ -335,7 +364,7 @@ def test_what_cannot_be_pulled_back_is_told(target):
     assert failed.value.step == 0
     assert failed.value.members == ()  # one state is no ensemble
     with pytest.raises(StepError) as failed:
-        made.pullback(np.array([x, 1e3 * x]), 0.5, 10, np.array([x, x]))
+        made.pullback(np.array([x, 1e3 * x, x, x]), 0.5, 10, np.array([x, x, x, x]))
     assert failed.value.members == (1,)
     for shape in ((2,), (3, 3)):
         with pytest.raises(ValueError, match=r"cotangent must have shape \(3,\)"):

@@ -33,7 +33,7 @@ IMPLICIT = [
 IMPLICIT += [("PATH", *more) for _, *more in IMPLICIT]
 IMPLICIT += [("NEWTON", "GAUGE"), ("NEWTON", "GAUGE", "FAST", "ADJOINT")]
 EXPLICIT = [(kind, *more) for kind in ("EXPLICIT", "SPLITTING") for more in ((), ("FAST",), ("TANGENT",), ("ADJOINT",))]
-EXPLICIT += [("SPLITTING", "FAST", "ADJOINT")]
+EXPLICIT += [(kind, "FAST", "ADJOINT") for kind in ("EXPLICIT", "SPLITTING")]
 
 
 def defined(switches):
@@ -44,8 +44,8 @@ def defined(switches):
 #: Each switch with one kind of step that has code for it, and all that go together; tests/generated/test_compilers.py
 #: has the fast code of implicit steps looked at.
 FEW = [(kind, *more) for kind in ("NEWTON", "PATH") for more in ((), ("COMPOSED", "ADJOINT", "TANGENT"))]
-FEW += [("NEWTON", "GAUGE"), ("EXPLICIT",), ("EXPLICIT", "FAST"), ("EXPLICIT", "ADJOINT")]
-FEW += [("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING", "TANGENT")]
+FEW += [("NEWTON", "GAUGE"), ("NEWTON", "FAST", "ADJOINT"), ("EXPLICIT",), ("EXPLICIT", "FAST", "ADJOINT")]
+FEW += [("EXPLICIT", "ADJOINT"), ("SPLITTING", "FAST", "ADJOINT"), ("SPLITTING", "TANGENT")]
 
 
 @pytest.mark.parametrize(
@@ -111,7 +111,7 @@ def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
     ids=lambda p: p.name,
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):
-    kinds = {"packs.c": "SPLITTING", "adjoint_packs.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
+    kinds = {"packs.c": "SPLITTING", "adjoint_segments.c": "SPLITTING", "explicit.c": "EXPLICIT", "path.c": "PATH"}
     kinds |= dict.fromkeys(("path_lanes.c", "expansion_lanes.c", "adjoint_lanes.c"), "PATH")
     own = {
         "gauge.c": ["GAUGE"],

@@ -10,7 +10,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from phigen.lanes.lowering import Blocks, Lanes, Packs, Rows, Traces, in_lanes
+from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
@@ -127,7 +127,7 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
         found["adjoint_flows.h"] = splitting.adjoint(program, step, step.adjoint) if step.adjoint else ""
     if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"]):
         found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
-    if has["ABREAST"] and isinstance(lanes, Packs):
+    if has["ABREAST"] and isinstance(lanes, Packs) and isinstance(step, Splitting):
         found["adjoint_flows_lanes.h"] = printed_back(program, lanes)
     declarations = render("c", "declarations.h", _declarations(program, lanes, has))
     return {"declarations.h": declarations, "model.h": _model(program, lanes, has, found.values()), **found}
@@ -145,7 +145,11 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
     sizes += _of_attitude(program.attitude) if program.attitude else []
     if has["ADJOINT"]:
         points = program.step.schedule.flows if isinstance(program.step, Splitting) else program.fractions
-        sizes.append(("TRAIL", program.dimension * len(points), "numbers of a step that its transpose needs"))
+        trail = program.dimension * len(points)
+        sizes.append(("TRAIL", trail, "numbers of a step that its transpose needs"))
+        if has["EACH"]:
+            kept = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
+            sizes.append(("TRAIL_EACH", trail * max(1, kept), "the same for members that go back together"))
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
@@ -267,9 +271,16 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         sizes += paths.sizes(lanes.path, lanes.slope_terms)
     if has["ALONG"] and isinstance(step, Path) and step.back:
         sizes.append(("USED", len(step.back.used), "coefficients that the slope of a path depends on"))
-    if has["ABREAST"] and isinstance(lanes, Packs):
-        sizes.append(("BACK_PACKS", lanes.abreast, "packs of members that are pulled back together"))
+    if has["ABREAST"]:
+        sizes.append(("BACK_PACKS", _packs_back(lanes, has), "packs of members that are pulled back together"))
     return sizes + (splitting.sizes(step) if isinstance(step, Splitting) else [])
+
+
+def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
+    """How many members, in packs of lanes, are pulled back together; 0 where each is by itself."""
+    if not has["ABREAST"]:
+        return 0
+    return lanes.abreast if isinstance(lanes, Packs) else 1
 
 
 def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:
@@ -320,7 +331,7 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         "path_slopes": ", ".join(map(str, step.recurrences.slopes))
         if isinstance(step, Path) and (has["BLOCKS"] or has["TRACED"])
         else "",
-        "apart": has["PACKS"] or any("_APART" in part for part in [text, *others]),
+        "apart": has["PACKS"] or has["ABREAST"] or any("_APART" in part for part in [text, *others]),
     }
     values["middles"] = ", ".join(map(repr, program.midpoints))
     values["moments"] = ", ".join(map(repr, schedule.moments)) if schedule else ""

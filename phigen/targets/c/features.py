@@ -42,8 +42,9 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")
     yield Feature("FAR", lambda p: packs and packs.near, ("PACKS",))
-    yield Feature("ABREAST", lambda p: packs and packs.back, ("PACKS", "ADJOINT", "EACH"))
     yield Feature("GROUPS", lambda p: not p.time and grouped(p, lanes), ("BLOCKS", "ENSEMBLE"))
+    together = "PACKS" if packs else "GROUPS"
+    yield Feature("ABREAST", lambda p: packs.back if packs else True, (together, "ADJOINT", "EACH"))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
     full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not kept as factors
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))

@@ -84,7 +84,8 @@ def _short(program: Program) -> dict[str, str]:
 
 def _packs(program: Program, packs: Packs) -> list[str]:
     if not isinstance(program.step, Splitting):
-        return [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
+        found = [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
+        return found + [function(program, kernel, lanes=True) for kernel in packs.back]
     called = operations([*packs.kernels, *packs.back])
     found = functions.near(program, [f for f in NEAR_FUNCTIONS if f in called])
     found += splitting.in_lanes(program, program.step, "", _short(program))

@@ -37,9 +37,10 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
     phi_kept *trail, phi_cotangent *bar)
 {
     phi_traced g;
-    phi_lanes slopes[PHI_COEFFICIENTS];
+    phi_lanes coef[PHI_COEFFICIENTS], slopes[PHI_COEFFICIENTS];
     phi_status status = PHI_OK;
     size_t at = steps; /* the step that s is before */
+    g.coef = coef;
     memset(g.after, 0, sizeof g.after);
     memset(g.change, 0, sizeof g.change);
     for (size_t left = PHI_ALL_STAGES(steps); left > 0 && status == PHI_OK;) {
@@ -56,6 +57,7 @@ static phi_status phi_back(phi_solver *s, size_t steps, size_t stride, const dou
 #endif
         }
         phi_linearise_back(&g);
+        phi_solve_lanes(g.jacobian, g.gain, PHI_DIM, g.wrong); /* for any cotangents, which are not known yet */
         for (int lane = count - 1; lane >= 0 && status == PHI_OK; --lane) {
             const size_t k = left - (size_t)count + (size_t)lane;
 #if PHI_COMPOSED
@@ -301,6 +303,9 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 }
 
 size_t phi_trail_size(void) { return PHI_TRAIL; }
+#if PHI_EACH
+size_t phi_trail_size_each(void) { return PHI_TRAIL_EACH; }
+#endif
 
 phi_status phi_step_adjoint(phi_solver *s, double h, const double x1_bar[PHI_DIM], double x0_bar[PHI_DIM],
     phi_params *params_bar)

@@ -1,7 +1,8 @@
 #ifndef PHI_FILE_ADJOINT_EACH
 #define PHI_FILE_ADJOINT_EACH
+#include "model.h"
 #if PHI_ABREAST
-#include "adjoint_packs.c"
+#include "adjoint_groups.c"
 #else
 #include "adjoint_members.c"
 #endif

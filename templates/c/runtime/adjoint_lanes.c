@@ -19,10 +19,11 @@
 #define PHI_BACK_ACCURACY 1e-17 /* of the derivatives of paths */
 #endif
 
-/* Stages that are gone back through at once. A cotangent after of the end of one becomes after + change, where change is
-   gain after; wrong is infinite where lanes do not suffice. */
+/* Stages that are gone back through at once, linearised: jacobian and gain are the transposes of the derivatives of alpha(y)
+   and of the increment. A cotangent after of the end of one becomes after + change, where jacobian change = gain after;
+   wrong is infinite where lanes do not suffice. */
 typedef struct {
-    phi_lanes coef[PHI_COEFFICIENTS], y[PHI_DIM], gain[PHI_DIM * PHI_DIM];
+    phi_lanes *coef, y[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], gain[PHI_DIM * PHI_DIM];
     phi_lanes after[PHI_DIM], change[PHI_DIM], wrong;
 #if PHI_PATH
     phi_lanes start[PHI_DIM];
@@ -70,10 +71,10 @@ static void phi_solve_lanes(phi_lanes *matrix, phi_lanes *sides, int count, phi_
 }
 
 #if PHI_NEWTON
-/* Linearise the stages: gain is (D J^-1) transposed, where J is the Jacobian of alpha(y) and D that of the increment. */
+/* Linearise the stages. */
 static void phi_linearise_back(phi_traced *g)
 {
-    phi_lanes displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], transposed[PHI_DIM * PHI_DIM];
+    phi_lanes displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM];
 #if PHI_CENTRED
     phi_linearise_lanes(g->coef, g->y, displacement, increment, jacobian);
 #else
@@ -90,7 +91,7 @@ static void phi_linearise_back(phi_traced *g)
             const int to = i * PHI_DIM + j, from = j * PHI_DIM + i;
             PHI_EACH_LANE
             for (int lane = 0; lane < PHI_LANES; ++lane) {
-                transposed[to][lane] = jacobian[from][lane];
+                g->jacobian[to][lane] = jacobian[from][lane];
 #if PHI_CENTRED
                 g->gain[to][lane] = 2.0 * ((i == j ? 1.0 : 0.0) - jacobian[from][lane]); /* y is the mean of the ends */
 #else
@@ -98,7 +99,6 @@ static void phi_linearise_back(phi_traced *g)
 #endif
             }
         }
-    phi_solve_lanes(transposed, g->gain, PHI_DIM, g->wrong);
 }
 
 /* The cotangents of coefficients, from those of ends and of residuals. */
@@ -179,11 +179,10 @@ static void phi_trace(phi_traced *g, phi_lanes hessian[restrict PHI_DIM * PHI_DI
 }
 
 /* Linearise the stages. With M and N the derivatives of the mean along middle and p = grad S_h(y), and H the Hessian of
-   S_h, the middle follows y by M^-1 (1 - N H). So the Jacobians J of the start and D of the change along y are known, and
-   gain is (D J^-1) transposed. */
+   S_h, the middle follows y by M^-1 (1 - N H). So the derivatives of the start and of the change along y are known. */
 static void phi_linearise_back(phi_traced *g)
 {
-    phi_lanes hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], follows[PHI_DIM * PHI_DIM], jacobian[PHI_DIM * PHI_DIM];
+    phi_lanes hessian[PHI_DIM * PHI_DIM], matrix[PHI_DIM * PHI_DIM], follows[PHI_DIM * PHI_DIM];
     const phi_expansion *e = &g->e;
     phi_trace(g, hessian);
     for (int i = 0; i < PHI_DIM; ++i)
@@ -209,10 +208,9 @@ static void phi_linearise_back(phi_traced *g)
                     change[lane] += e->v_odd[m][lane] * follows[from][lane] + e->v_odd[p][lane] * hessian[from][lane];
                 }
             }
-            memcpy(jacobian[j * PHI_DIM + i], start, sizeof start);
+            memcpy(g->jacobian[j * PHI_DIM + i], start, sizeof start);
             memcpy(g->gain[j * PHI_DIM + i], change, sizeof change);
         }
-    phi_solve_lanes(jacobian, g->gain, PHI_DIM, g->wrong);
 }
 
 /* The cotangents of coefficients, from those of ends and starts: of p first, then by p and by the paths. */

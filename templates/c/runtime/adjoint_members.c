@@ -33,6 +33,16 @@ static phi_status phi_pull_begin(const phi_pulled *all, size_t m, phi_solver *s)
 #endif
 }
 
+#if PHI_MONITOR
+/* Add to what was found for a member what the derivative along e adds, where e follows its start. */
+static void phi_pull_level(const phi_pulled *all, size_t m, double e_bar)
+{
+    const phi_params *params = all->params != NULL ? all->params + m : NULL;
+    phi_params unused = phi_default_params, *own_bar = all->params_bar != NULL ? all->params_bar + m : &unused;
+    if (all->gauge == NULL) phi_level_bar(params, all->x0 + m * PHI_DIM, e_bar, all->x0_bar + m * PHI_DIM, own_bar);
+}
+
+#endif
 /* Pull a member back by itself. */
 static phi_status phi_pull_member(const phi_pulled *all, size_t m)
 {
@@ -43,11 +53,9 @@ static phi_status phi_pull_member(const phi_pulled *all, size_t m)
     phi_status status = phi_pull_begin(all, m, &s);
 #if PHI_MONITOR
     double e_bar = 0.0;
-    phi_params unused = phi_default_params;
     if (status == PHI_OK)
         status = phi_pullback(&s, all->h[m], all->steps, all->stride, rows, rows_bar, bar, own_bar, &e_bar, all->trail);
-    if (status == PHI_OK && all->gauge == NULL)
-        phi_level_bar(&s.params, all->x0 + m * PHI_DIM, e_bar, bar, own_bar != NULL ? own_bar : &unused);
+    if (status == PHI_OK) phi_pull_level(all, m, e_bar);
 #else
     if (status == PHI_OK)
         status = phi_pullback(&s, all->h[m], all->steps, all->stride, rows, rows_bar, bar, own_bar, all->trail);

@@ -122,6 +122,9 @@ void phi_attitude(const phi_solver *s, double out[PHI_ELEMENT]);
 #endif
 #if PHI_ADJOINT
 size_t phi_trail_size(void);
+#if PHI_EACH
+size_t phi_trail_size_each(void);
+#endif
 #endif
 
 /* Start at x0. params may be NULL for the defaults. PHI_BAD_ARGUMENT, and *s as before, if x0, a parameter or what
@@ -302,9 +305,9 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
 #if PHI_EACH
 /* phi_pullback for members, of which member m begins at x0 + m * PHI_DIM, with params[m] and h[m]; params may be NULL for
    the defaults. rows and rows_bar have all rows of the first member, then those of the next, and so on; x0_bar is laid out
-   as x0, and params_bar[m] gains what is its own. trail is room for one member, status (or NULL) receives a status for
-   each. Threads may share members out, each with a trail; that changes no bit where shares begin at multiples of 32. The
-   first status that is not OK. */
+   as x0, and params_bar[m] gains what is its own. trail is room for PHI_TRAIL_EACH numbers for each step, whatever the
+   number of members; status (or NULL) receives a status for each. Threads may share members out, each with a trail; that
+   changes no bit where shares begin at multiples of 32. The first status that is not OK. */
 #if PHI_TIMED
 phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *t0, const double *h,
     size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,

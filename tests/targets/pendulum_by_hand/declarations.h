@@ -71,7 +71,7 @@
 #define PHI_ALONG 0
 #define PHI_PACKS (PHI_FAST && !PHI_IMPLICIT)
 #define PHI_FAR 0
-#define PHI_ABREAST (PHI_PACKS && PHI_SPLITTING && PHI_ADJOINT)
+#define PHI_ABREAST ((PHI_PACKS || PHI_GROUPS) && PHI_ADJOINT)
 #define PHI_SPARSE 0
 #define PHI_SWEPT 0
 #define PHI_CENTRED 0
@@ -99,6 +99,7 @@ void phi_vector_field(const phi_params *params, const double x[2], double out[2]
 enum { PHI_STAGES = 3 };
 #endif
 enum { PHI_COEFFICIENTS = PHI_SPLITTING ? 4 : 2, PHI_TRAIL = (PHI_SPLITTING || PHI_COMPOSED ? 3 : 1) * PHI_DIM };
+enum { PHI_TRAIL_EACH = PHI_TRAIL * (PHI_SPLITTING || !PHI_ABREAST ? 1 : PHI_EXPLICIT ? 32 : 8) };
 #if PHI_GAUGE
 enum { PHI_GAUGES = 2 };
 #endif

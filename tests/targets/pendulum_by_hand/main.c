@@ -224,7 +224,8 @@ static void gradients_of_members_are_their_own(void)
     enum { MEMBERS = 37, BAD = 3, NO_STEP = 20, LOST = 33, NUMBERS = 6 * MEMBERS };
     static double x[2 * MEMBERS], h[MEMBERS], bars[NUMBERS], rows[NUMBERS], x0_bar[2 * MEMBERS];
     phi_params params[MEMBERS], params_bar[MEMBERS];
-    double trail[RUN * PHI_TRAIL], own_rows[6], own_bar[2];
+    static double trail[RUN * PHI_TRAIL_EACH];
+    double own_rows[6], own_bar[2];
     unsigned char status[MEMBERS];
     for (int m = 0; m < MEMBERS; ++m) {
         params[m].g = 1.5 + 0.01 * m;

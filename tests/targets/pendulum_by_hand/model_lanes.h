@@ -155,6 +155,20 @@ static void phi_explicit_lanes(phi_lanes coef[], phi_lanes state[2], int own, ph
     }
 }
 
+#if PHI_ADJOINT
+static void phi_explicit_adjoint_lanes(phi_lanes coef[], phi_lanes state[2], phi_lanes increment_bar[2],
+    phi_lanes state_bar[2], phi_lanes coef_bar[2])
+{
+    for (int lane = 0; lane < PHI_LANES; ++lane) {
+        const double c[2] = { coef[0][lane], coef[1][lane] }, x[2] = { state[0][lane], state[1][lane] };
+        const double bar[2] = { increment_bar[0][lane], increment_bar[1][lane] };
+        double back[2], found[2];
+        phi_explicit_adjoint(c, x, bar, back, found);
+        for (int i = 0; i < 2; ++i) state_bar[i][lane] = back[i], coef_bar[i][lane] = found[i];
+    }
+}
+
+#endif
 #endif
 #if PHI_SPLITTING
 static void phi_flows_lanes(int row, int own, phi_group *group)

@@ -1,0 +1,89 @@
+#ifndef PHI_FILE_ADJOINT_GROUPS
+#define PHI_FILE_ADJOINT_GROUPS
+#include <string.h>
+
+#include "adjoint_abreast.c"
+#if PHI_SPLITTING
+#include "adjoint_segments.c"
+#else
+#include "adjoint_kept.c"
+#endif
+#include "model.h"
+
+/* What was found for a member. 0 where it has values that are not finite. */
+#if PHI_GAUGE
+static int phi_pull_end(const phi_group *group, const phi_back_group *bar, int m, const phi_pulled *all, size_t at)
+#else
+static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all, size_t at)
+#endif
+{
+    const int k = m / PHI_LANES, lane = m % PHI_LANES;
+    phi_cotangent own;
+    for (int i = 0; i < PHI_DIM; ++i) own.x[i] = bar->x[k][i][lane];
+    if (!phi_finite(own.x, PHI_DIM)) return 0;
+    PHI_EACH_STAGE {
+        double *coef = PHI_OF(own.coef, stage);
+        for (int c = 0; c < PHI_COEFFICIENTS; ++c) coef[c] = PHI_OF(bar->coef[k], stage)[c][lane];
+        if (!phi_finite(coef, PHI_COEFFICIENTS)) return 0;
+    }
+    memcpy(all->x0_bar + at * PHI_DIM, own.x, sizeof own.x);
+#if PHI_PARAMETERS || PHI_MONITOR
+    phi_params *own_bar = all->params_bar != NULL ? all->params_bar + at : NULL;
+    phi_solver s = { .h = all->h[at], .params = all->params != NULL ? all->params[at] : phi_default_params };
+#if PHI_GAUGE
+    memcpy(s.gauge, group->gauge[m], sizeof s.gauge);
+#endif
+#if PHI_MONITOR
+    double e_bar = 0.0;
+    phi_add_parameters(&s, &own, own_bar, &e_bar);
+    phi_pull_level(all, at, e_bar);
+#else
+    phi_add_parameters(&s, &own, own_bar);
+#endif
+#elif PHI_GAUGE
+    (void)group;
+#endif
+    if (all->status != NULL) all->status[at] = PHI_OK;
+    return 1;
+}
+
+/* The members from first on, as many as a group holds. What lanes cannot do, and what fails, is done once more by single
+   members. The first status that is not OK. */
+PHI_APART static phi_status phi_pull_group(const phi_pulled *all, size_t first)
+{
+    phi_group group;
+    phi_back_group bar;
+    phi_status result = PHI_OK;
+    int good[PHI_BACK_GROUP];
+    const int count = all->members - first < PHI_BACK_GROUP ? (int)(all->members - first) : PHI_BACK_GROUP;
+    int together = count > 2; /* fewer are quicker without lanes */
+    memset(&group, 0, sizeof group);
+    memset(bar.x, 0, sizeof bar.x);
+    memset(bar.coef, 0, sizeof bar.coef);
+#if PHI_PACKS
+    group.packs = (count + PHI_LANES - 1) / PHI_LANES;
+#endif
+    for (int m = 0; m < count; ++m) good[m] = together && phi_pull_join(&group, m, all, first);
+#if PHI_SPLITTING
+    together = together && phi_pull_forth(&group, count, all, first, &bar);
+#else
+    together = together && phi_pull_forth(&group, count, all, first);
+#endif
+    for (int m = 0; m < count; ++m) {
+        double x[PHI_DIM];
+        phi_pull_state(&group, m, x);
+        good[m] = good[m] && together && group.active[m] && phi_finite(x, PHI_DIM);
+    }
+    if (together) phi_pull_back(&group, count, all, first, &bar);
+    for (int m = 0; m < count; ++m) {
+#if PHI_GAUGE
+        if (good[m] && phi_pull_end(&group, &bar, m, all, first + (size_t)m)) continue;
+#else
+        if (good[m] && phi_pull_end(&bar, m, all, first + (size_t)m)) continue;
+#endif
+        const phi_status status = phi_pull_member(all, first + (size_t)m);
+        if (result == PHI_OK) result = status;
+    }
+    return result;
+}
+#endif

@@ -1,0 +1,67 @@
+#ifndef PHI_FILE_ADJOINT_SEGMENTS
+#define PHI_FILE_ADJOINT_SEGMENTS
+#include <string.h>
+
+#include "adjoint_abreast.c"
+#include "model.h"
+
+/* Splittings are gone back through segment by segment. The states where segments begin are left in the trail; those before
+   each flow of a segment are made again, and stay near. */
+#include "adjoint_flows_lanes.h"
+
+/* Make all steps, and leave where segments begin, but for the first. */
+static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
+{
+    double *trail = all->trail;
+    memcpy(bar->start, group->pack, sizeof bar->start);
+    for (size_t done = 0; done < all->steps;) {
+        const size_t to_row = all->stride - done % all->stride, to_segment = PHI_SEGMENT - done % PHI_SEGMENT;
+        size_t until = to_row < to_segment ? to_row : to_segment;
+        if (all->steps - done < until) until = all->steps - done;
+        for (int k = 0; k < group->packs && done > 0 && done % PHI_SEGMENT == 0; ++k) {
+            memcpy(trail, group->pack[k].x, sizeof group->pack[k].x);
+            memcpy(trail + PHI_DIM * PHI_LANES, group->pack[k].carry, sizeof group->pack[k].carry);
+            trail += 2 * PHI_DIM * PHI_LANES;
+        }
+        phi_steps_lanes(1, group, (int)until);
+        done += until;
+        phi_pull_rows(group, count, all, first, done);
+    }
+    return 1;
+}
+
+/* Make steps once more, and keep the states before each flow. */
+static void phi_pull_again(phi_group *group, int steps, phi_back_group *bar)
+{
+    for (int step = 0; step < steps; ++step) {
+        phi_begin_lanes(group);
+        for (int flow = 0; flow < PHI_FLOWS; ++flow) {
+            for (int k = 0; k < group->packs; ++k) memcpy(bar->kept[step][flow][k], group->pack[k].x, sizeof group->pack[k].x);
+            phi_follow_lanes(phi_flow_part[flow], phi_flow_row[flow], group);
+        }
+        phi_end_lanes(group);
+    }
+}
+
+/* Pull the cotangents of rows back through all steps. */
+static void phi_pull_back(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
+{
+    for (size_t end = all->steps; end > 0;) {
+        const size_t begin = (end - 1) / PHI_SEGMENT * PHI_SEGMENT;
+        for (int k = 0; k < group->packs; ++k) {
+            const size_t place = (begin / PHI_SEGMENT - 1) * (size_t)group->packs + (size_t)k;
+            const double *left = all->trail + place * 2 * PHI_DIM * PHI_LANES;
+            group->pack[k] = bar->start[k];
+            if (begin == 0) continue;
+            memcpy(group->pack[k].x, left, sizeof group->pack[k].x);
+            memcpy(group->pack[k].carry, left + PHI_DIM * PHI_LANES, sizeof group->pack[k].carry);
+        }
+        phi_pull_again(group, (int)(end - begin), bar);
+        for (; end > begin; --end) {
+            phi_pull_joined(bar, count, all, first, end);
+            for (int flow = PHI_FLOWS - 1; flow >= 0; --flow)
+                phi_follow_back_lanes(phi_flow_part[flow], phi_flow_row[flow], group, bar->kept[end - begin - 1][flow], bar);
+        }
+    }
+}
+#endif
