@@ -9,6 +9,7 @@ import numpy as np
 
 from phigen.drawing.lattices import MOST_PANELS, draw_sites, places_of
 from phigen.drawing.palette import SERIES, styled
+from phigen.drawing.shades import bounds_of, shades_of
 from phigen.errors import MissingPackageError
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
@@ -61,18 +62,19 @@ def _flat(values: Floats) -> Floats:
 def _graph(axes: Any, name: str, run: LatticeTrajectory, places: Floats) -> Any:
     """A coordinate on a graph: the function that changes it."""
     values = run.column(name)
-    picture = draw_sites(axes, run.parameters["bonds"], places, values[0], float(np.abs(values).max()) or 1.0)
+    picture = draw_sites(axes, run.parameters["bonds"], places, values[0], shades_of(values))
     axes.set_title(name)
     return picture.set_array
 
 
 def _shown(axes: Any, name: str, values: Floats) -> Any:
     """What is shown of a coordinate (frames, *sizes): the function that changes it."""
-    first, most = _flat(values[0]), float(np.abs(values).max()) or 1.0
+    first = _flat(values[0])
     axes.set_title(name)
     if first.ndim == 1:
         (line,) = axes.plot(first, color=SERIES[0], linewidth=1.0)
-        axes.set_ylim(-1.05 * most, 1.05 * most)
+        low, high = bounds_of(values)
+        axes.set_ylim(low - 0.025 * (high - low), high + 0.025 * (high - low))
         return line.set_ydata
-    picture = axes.imshow(first.T, origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="none")
+    picture = axes.imshow(first.T, origin="lower", interpolation="none", **shades_of(values))
     return lambda plane: picture.set_data(plane.T)

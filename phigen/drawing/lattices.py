@@ -9,6 +9,7 @@ import numpy as np
 
 from phigen.drawing.exponents import draw_exponents
 from phigen.drawing.palette import SERIES, styled
+from phigen.drawing.shades import shades_of
 from phigen.lattice.placing import placed
 from phigen.runtime.lattice import LatticeTrajectory
 from phigen.symbolic.arrays import Floats
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
 MOST_PANELS, MOST_TIMES, SNAPSHOTS = 4, 800, 4
 #: Sites of a graph that is drawn as one; more of them, some times over, make large files.
 MOST_DRAWN = 100
-#: Colours of diagrams, and of snapshots.
+#: Colours of diagrams, and of snapshots: few enough that files stay small.
 LEVELS = 48
 
 
@@ -95,11 +96,11 @@ def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
 
 def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, dots: int = MOST_TIMES) -> None:
     """One coordinate of a chain: sites upwards, time to the right."""
-    axes, most = part.add_subplot(), _largest(values)
+    axes = part.add_subplot()
     times = np.linspace(0, len(run) - 1, min(len(run), dots)).astype(int)
     shown = axes.imshow(
-        values[times].T, aspect="auto", origin="lower", cmap=_colours(), vmin=-most, vmax=most, interpolation="none",
-        extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5),
+        values[times].T, aspect="auto", origin="lower", interpolation="none",
+        extent=(run.t[0], run.t[-1], -0.5, values.shape[1] - 0.5), **shades_of(values, LEVELS),
     )  # fmt: skip
     axes.set_xlabel("t")
     axes.set_ylabel(run.axes[0])
@@ -115,23 +116,23 @@ def places_of(run: LatticeTrajectory) -> Floats | None:
 
 def _draw_graph(part: Any, name: str, run: LatticeTrajectory, values: Floats, places: Floats) -> None:
     """One coordinate of a graph at some times."""
-    frames, most = _snapshots(run), _largest(values)
+    frames, shades = _snapshots(run), shades_of(values, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
-        shown = draw_sites(axes, run.parameters["bonds"], places, values[k], most)
+        shown = draw_sites(axes, run.parameters["bonds"], places, values[k], shades)
         axes.set_title(f"t = {run.t[k]:.4g}")
     part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
 
 
-def draw_sites(axes: Any, bonds: Any, places: Floats, values: Floats, most: float) -> Any:
-    """The sites of a graph with the bonds between them, coloured by values (sites,) from -most to most."""
+def draw_sites(axes: Any, bonds: Any, places: Floats, values: Floats, shades: Mapping[str, Any]) -> Any:
+    """The sites of a graph with the bonds between them, coloured by values (sites,) as `shades_of` says."""
     from matplotlib.collections import LineCollection
 
     lines = places[np.asarray(bonds).reshape(-1, 2)]
     axes.add_collection(LineCollection(lines, colors="0.6", linewidths=0.5, zorder=1))
     shown = axes.scatter(
-        *places.T, c=values, s=min(max(2500 / len(places), 5.0), 60.0), cmap=_colours(), vmin=-most, vmax=most,
-        edgecolors="0.3", linewidths=0.3, zorder=2,
+        *places.T, c=values, s=min(max(2500 / len(places), 5.0), 60.0), edgecolors="0.3", linewidths=0.3, zorder=2,
+        **shades,
     )  # fmt: skip
     axes.set_aspect("equal")
     axes.margins(0.08)
@@ -148,23 +149,14 @@ def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats
     """One coordinate of a plane, or of the middle plane across the first axis, at some times."""
     frames = _snapshots(run)
     planes = values if values.ndim == 3 else values[:, values.shape[1] // 2]
-    most = _largest(planes)
+    shades = shades_of(planes, LEVELS)
     panels = np.atleast_1d(part.subplots(1, len(frames)))
     for axes, k in zip(panels, frames.tolist(), strict=True):
-        shown = axes.imshow(
-            planes[k].T, origin="lower", cmap=_colours(), vmin=-most, vmax=most, interpolation="none", aspect="equal"
-        )
+        shown = axes.imshow(planes[k].T, origin="lower", interpolation="none", aspect="equal", **shades)
         axes.set_title(f"t = {run.t[k]:.4g}")
         axes.set_xlabel(run.axes[-2])
     panels[0].set_ylabel(run.axes[-1])
     part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
-
-
-def _colours() -> Any:
-    """Few enough that files stay small."""
-    from matplotlib import colormaps
-
-    return colormaps["RdBu_r"].resampled(LEVELS)
 
 
 def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:
@@ -175,7 +167,3 @@ def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]
     axes.set_ylabel("error")
     axes.grid(True)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=4)
-
-
-def _largest(values: Floats) -> float:
-    return float(np.max(np.abs(values))) or 1.0

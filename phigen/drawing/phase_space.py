@@ -13,6 +13,7 @@ from phigen.drawing.groups import Group, groups, is_orbit
 from phigen.drawing.leaf import Leaf, around, leaf_of, net
 from phigen.drawing.lettering import letter
 from phigen.drawing.palette import PALETTE, SERIES
+from phigen.drawing.shades import shades_of
 from phigen.runtime.trajectory import Trajectory
 from phigen.symbolic.arrays import Floats
 from phigen.symbolic.expression import Expression
@@ -178,11 +179,10 @@ def joins(points: Floats) -> bool:
 def _draw_image(figure: FigureBase, names: Group, t: Floats, x: Floats) -> None:
     """All coordinates over time, as colours."""
     axes = figure.add_subplot()
-    most = float(np.max(np.abs(x))) or 1.0
     times = np.linspace(0, len(t) - 1, min(len(t), 800)).astype(int)
     shown = axes.imshow(
-        x[times].T, aspect="auto", origin="lower", cmap="RdBu_r", vmin=-most, vmax=most, interpolation="nearest",
-        extent=(t[0], t[-1], 0.5, x.shape[1] + 0.5),
+        x[times].T, aspect="auto", origin="lower", interpolation="nearest",
+        extent=(t[0], t[-1], 0.5, x.shape[1] + 0.5), **shades_of(x),
     )  # fmt: skip
     named = range(0, len(names), -(-len(names) // 10))
     axes.set_yticks([1.0 + i for i in named], [names[i] for i in named])

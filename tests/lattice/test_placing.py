@@ -53,13 +53,14 @@ def test_graphs_are_drawn_with_their_bonds() -> None:
     from matplotlib.figure import Figure
 
     from phigen.drawing.lattices import draw_sites
+    from phigen.drawing.shades import shades_of
 
     axes, bonds = Figure().add_subplot(), square(3)
     places = placed(bonds, 9)
     assert places is not None
-    shown = draw_sites(axes, bonds, places, np.arange(9.0), 8.0)
+    shown = draw_sites(axes, bonds, places, np.arange(9.0), shades_of(np.arange(9.0)))
     lines, sites = axes.collections
     assert (type(lines), type(sites)) == (LineCollection, PathCollection)
     np.testing.assert_array_equal(np.array(lines.get_segments())[:, 0], places[bonds[:, 0]])
     np.testing.assert_array_equal(sites.get_offsets(), places)
-    assert (shown.get_array().tolist(), shown.get_clim()) == (list(range(9)), (-8.0, 8.0))
+    assert (shown.get_array().tolist(), shown.get_clim()) == (list(range(9)), (0.0, 8.0))

@@ -1,0 +1,36 @@
+"""Colours of fields: on both sides of 0 where the sign changes, else over the range of the values."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import phigen
+
+pytest.importorskip("matplotlib")
+
+from phigen.drawing.lattices import lattice_figure
+from phigen.drawing.shades import DIVERGING, SEQUENTIAL, shades_of
+
+
+@pytest.mark.parametrize(
+    ("values", "name", "bounds"),
+    [
+        ([-1, 3], DIVERGING, (-3, 3)),
+        ([1, 3], SEQUENTIAL, (1, 3)),
+        ([0, 3], SEQUENTIAL, (0, 3)),
+        ([-3, 0], SEQUENTIAL, (-3, 0)),
+        ([2, 2], SEQUENTIAL, (1, 3)),
+        ([0, 0], DIVERGING, (-0.5, 0.5)),
+    ],
+)
+def test_only_values_of_both_signs_have_colours_on_both_sides_of_0(values, name, bounds):
+    shades = shades_of(np.array(values, dtype=float))
+    assert (shades["cmap"].name.partition("_resampled")[0], shades["vmin"], shades["vmax"]) == (name, *bounds)
+
+
+def test_a_diagram_of_a_positive_field_uses_all_colours():
+    made = phigen.compile("volterra", "numpy").integrate(1 + np.arange(8.0).reshape(1, 8), h=0.001, steps=2)
+    errors = {"energy": np.full(len(made), 1e-9)}
+    images = [image for part in lattice_figure(made, errors, "").subfigs for axes in part.axes for image in axes.images]
+    assert [image.get_clim() for image in images] == [(made.x.min(), made.x.max())]
