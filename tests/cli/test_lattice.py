@@ -55,10 +55,11 @@ def test_show_cancels_common_factors(phigen, tmp_path):
     spec = tmp_path / "growth.yaml"
     spec.write_text(
         "phigen: 1\nname: growth\nlattice: {axes: [i]}\ncoordinates: [u, v]\nparameters: {d: 2}\n"
-        "poisson: {brackets: {u: {v: u*v*(u + v)/d**2}}}\nhamiltonian: d*log(u + v)\n",
+        "poisson: {brackets: {u: {v: u*v*(u + v)/d**2}}}\nhamiltonian: d*log(u + v)\ninvariants: {I: d*u/d**2}\n",
         encoding="utf-8",
     )
     assert "  du/dt = u*v/d\n  dv/dt = -u*v/d\n" in phigen("show", spec).stdout
+    assert "I = u/d\n" in phigen("show", spec).stdout
     assert json.loads(phigen("show", spec, "--json").stdout)["rates"] == {"du/dt": "u*v/d", "dv/dt": "-u*v/d"}
     assert r"\dot{u}_{i} &= \frac{u_{i} v_{i}}{d}" in phigen("show", spec, "--latex").stdout
 
