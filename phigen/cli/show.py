@@ -218,8 +218,10 @@ def _gauged(compilation: Compilation) -> list[str]:
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     from phigen.notation.generating import series_formulas
 
-    listed, _ = series_formulas(compilation, most)
-    return [("S_h", " + ".join(f"{_power(i)} S_{i}" for i, _ in listed)), *((f"S_{i}", str(f)) for i, f in listed)]
+    found = series_formulas(compilation, most)
+    names = [*(f"{_power(i)} S_{i}" for i, _ in found.listed), *(["…"] if found.beyond else [])]
+    rows = [("S_h", " + ".join(names)), *((f"S_{i}", str(f)) for i, f in found.listed)]
+    return [*rows, ("…", found.missing)] if found.beyond else rows
 
 
 def _power(exponent: int) -> str:
@@ -269,7 +271,7 @@ def _described_series(compilation: Compilation) -> dict[str, object]:
     from phigen.symbolic.readable import readable
 
     realisation, plan = compilation.chart, compilation.order
-    listed, correction = series_formulas(compilation, None)
+    found = series_formulas(compilation, None)
     return {
         "scheme": "series",
         "birealisation": {
@@ -282,6 +284,9 @@ def _described_series(compilation: Compilation) -> dict[str, object]:
         },
         "terms": compilation.stage.terms,
         "stages": list(compilation.program.fractions),
-        "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in listed},
-        "modified_hamiltonian": None if correction is None else {"power": plan.order, "coefficient": str(correction)},
+        "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in found.listed},
+        "series_not_written_from": found.beyond,
+        "modified_hamiltonian": None
+        if found.leading is None
+        else {"power": plan.order, "coefficient": str(found.leading)},
     }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from phigen.compilation import Compilation
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
@@ -26,17 +28,35 @@ def method(compilation: Compilation) -> str:
     return f"order {plan.order} from {terms}; {why}{note}"
 
 
-def series_formulas(compilation: Compilation, most: int | None) -> tuple[list[tuple[int, Formula]], Formula | None]:
-    """The S_i that do not vanish, with their index; and −S_{p+1}, the leading term of the modified Hamiltonian.
+@dataclass(frozen=True)
+class Generating:
+    """The S_i that do not vanish, with their index, and −S_{p+1}, the leading term of the modified Hamiltonian.
 
-    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series.
+    The map of step h is the flow of H − h^p S_{p+1} + …, where p is the order and S the untruncated series. S_i from
+    ``beyond`` on have too many terms to be written out; the code has them as expressions that share parts.
     """
+
+    listed: list[tuple[int, Formula]]
+    leading: Formula | None
+    beyond: int | None
+
+    @property
+    def missing(self) -> str:
+        """What is said of those that are not listed."""
+        return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
+
+
+def series_formulas(compilation: Compilation, most: int | None) -> Generating:
+    """The generating function of a series, as far as it can be written out; at most so many terms of each are shown."""
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
     more = not pushed and plan is compilation.order and plan.order <= _MODIFIED_UP_TO
-    series = compilation.series.polynomial(plan.order + 1 if more else plan.terms)
+    series = compilation.series.written(plan.order + 1 if more else plan.terms)
     listed = [(i, of_polynomial(series.tower, s, most)) for i, s in enumerate(series.terms[: plan.terms], 1) if s != 0]
-    return listed, of_polynomial(series.tower, -series.terms[plan.order], most) if more else None
+    known = len(series.terms)
+    leading = of_polynomial(series.tower, -series.terms[plan.order], most) if more and known > plan.order else None
+    following = known + 1 + (compilation.symmetric and known % 2 == 1)  # the next that does not vanish
+    return Generating(listed, leading, following if known < plan.terms else None)
 
 
 def modified_formulas(compilation: Compilation, count: int, most: int | None) -> list[tuple[int, Formula]]:
@@ -46,7 +66,7 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
     approximate bi-realisation if more are asked for.
     """
     if not count:
-        leading = None if compilation.splitting else series_formulas(compilation, most)[1]
+        leading = None if compilation.splitting else series_formulas(compilation, most).leading
         return [] if leading is None else [(compilation.order.order, leading)]
     if compilation.splitting:
         raise SpecError([Diagnostic("the modified Hamiltonian is not computed for a splitting")])

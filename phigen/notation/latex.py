@@ -102,9 +102,10 @@ def _gauged(compilation: Compilation) -> str:
 
 
 def _series(compilation: Compilation, most: int | None) -> Iterator[Equation]:
-    listed, _ = series_formulas(compilation, most)
-    yield _indexed("S", "h"), [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(listed)]
-    for i, formula in listed:
+    found = series_formulas(compilation, most)
+    listed = [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(found.listed)]
+    yield _indexed("S", "h"), [*listed, *([f"{_PLUS}<mo>…</mo>"] if found.beyond else [])]
+    for i, formula in found.listed:
         first, *others = _pieces(formula)
         yield _indexed("S", i), [_gauged(compilation) * (i == 1) + first, *others]
 

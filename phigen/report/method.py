@@ -58,11 +58,15 @@ def _series(compilation: Compilation) -> list[Markup]:
 
 
 def _generating_function(compilation: Compilation) -> list[Markup]:
-    listed, correction = generating.series_formulas(compilation, None)
-    terms = "<mo>+</mo>".join(f"{_power('h', i)}<mo>&#x2062;</mo>{_indexed('S', i)}" for i, _ in listed)
+    found = generating.series_formulas(compilation, None)
+    scaled = [f"{_power('h', i)}<mo>&#x2062;</mo>{_indexed('S', i)}" for i, _ in found.listed]
+    terms = "<mo>+</mo>".join([*scaled, *(["<mo>…</mo>"] if found.beyond else [])])
     blocks = [page.heading("Generating function")]
     blocks.append(page.equations([[mathml.math(f"{_indexed('S', 'h')}<mo>=</mo>{terms}")]]))
-    blocks += [polynomial(_indexed("S", i), formula) for i, formula in listed]
+    blocks += [polynomial(_indexed("S", i), formula) for i, formula in found.listed]
+    if found.beyond:
+        blocks.append(page.paragraph(f"{found.missing[0].upper()}{found.missing[1:]}.", "note"))
+    correction = found.leading
     if correction is None or not correction.size:
         return blocks
     blocks.append(page.heading("Modified Hamiltonian"))

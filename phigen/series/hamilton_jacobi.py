@@ -20,6 +20,7 @@ where τ is the time in the middle of the step. So in the series the time is one
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence, Sized
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -126,6 +127,14 @@ class HamiltonJacobi:
         self.reach(terms)
         return PolynomialSeries(self._polynomials.ring, self._polynomials.first(terms))
 
+    def written(self, terms: int) -> PolynomialSeries:
+        """S_1 … S_terms in a tower, or as many of the first of them as are not too large."""
+        with suppress(OverflowError):
+            return self.polynomial(terms)
+        with suppress(OverflowError):
+            return PolynomialSeries(self._polynomials.ring, self._polynomials.good)
+        return PolynomialSeries(series_tower(ZERO, self.coordinates, self.static, self.times), ())
+
     def graph(self, terms: int) -> tuple[Expression, ...]:
         """S_1 … S_terms as one shared expression graph, never expanded."""
         self.reach(terms)
@@ -211,6 +220,11 @@ class _Recursion:
             except OverflowError as error:
                 self._overflow = error
         return tuple(self._found[:terms])
+
+    @property
+    def good(self) -> tuple[Any, ...]:
+        """The terms so far."""
+        return tuple(self._found)
 
     def _expect_small(self, terms: int) -> None:
         """Raise `OverflowError` if the sizes so far say that ∇S_terms will be of no use."""

@@ -11,6 +11,8 @@ from cli_specs import NOT_POISSON
 from systems import slow_but
 
 from phigen import resources, spec
+from phigen.api import compilation_of
+from phigen.report.method import method_section
 from phigen.scheme import discretisation
 
 SPECS = resources.bundled_specs()
@@ -120,6 +122,20 @@ def test_show_log_canonical_s3_and_modified_hamiltonian(phigen):
     correction = eval(second["modified_hamiltonian"]["coefficient"], {"x1": x1, "x2": x2, "x3": x3})
     assert correction == pytest.approx(-value)
     assert second["modified_hamiltonian"]["power"] == 2
+
+
+def test_terms_that_are_too_many_are_told_and_the_others_shown(phigen, in_tmp, monkeypatch):
+    """The code has the series as a graph; what is printed of it ends where it cannot be expanded."""
+    monkeypatch.setattr("phigen.spec.limits.SERIES_TERMS", 8)
+    series = json.loads(phigen("show", SPECS / "henon_heiles.yaml", "--order", 6, "--json").stdout)
+    assert (list(series["series"]), series["series_not_written_from"]) == (["S_1", "S_3"], 5)
+    assert series["modified_hamiltonian"] is None
+    shown = phigen("show", SPECS / "henon_heiles.yaml", "--order", 6)
+    assert "S_h = h S_1 + h^3 S_3 + …" in shown.stdout
+    assert "from S_5 on there are too many terms" in shown.stdout
+    assert "\\cdots \\\\" in phigen("show", SPECS / "henon_heiles.yaml", "--order", 6, "--latex").stdout
+    reported = method_section(compilation_of(spec.load(SPECS / "henon_heiles.yaml"), 6))
+    assert "From S_5 on there are too many terms" in reported
 
 
 def test_series_of_a_composition_is_that_of_its_stages(phigen, write):
