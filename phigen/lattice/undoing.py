@@ -63,6 +63,21 @@ def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kerne
     )
 
 
+def apart(back: Kernel) -> tuple[Kernel, Kernel] | None:
+    """A transpose that undoes a sweep as two kernels, of which the latter alone reads what bonds or pairs add up: that
+    is then found with the cotangents that these give back, by the same functions.
+
+    None where the transpose itself reads it, so that it has to be found before."""
+    rest = tuple(o for o in back.outputs if o.name != UNDONE)
+    undo = tuple(o for o in back.outputs if o.name == UNDONE)
+    read = symbols_of(*(e for o in rest for e in o.values))
+    if not undo or not {*back.inputs["gathered"]}.isdisjoint(read):
+        return None
+    purpose = "the fields before the sweep, from what has been added up for them"
+    name = back.name.removesuffix(BACK) + f"_{UNDONE}"
+    return replace(back, outputs=rest), replace(back, name=name, purpose=purpose, outputs=undo)
+
+
 def _of_coefficients(step: Sweeps) -> dict[str, int]:
     """How the coefficients of a flow follow the sign of its time."""
     found = [parity for parity, _ in _parities(step.prepare.roots, dict.fromkeys(step.prepare.inputs["h"], ODD))]

@@ -288,6 +288,11 @@ class Ends:
     end: str = ""
     chosen: str = ""
 
+    @property
+    def of_all(self) -> bool:
+        """Whether both sites of every bond or pair add up what it gives them."""
+        return not (self.end or self.chosen)
+
 
 @dataclass(frozen=True)
 class Gather:

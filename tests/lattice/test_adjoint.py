@@ -94,8 +94,19 @@ hamiltonian:
   bonds: -J*cos(w*t)*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]) - D*(x[a]*y[b] - y[a]*x[b])
 """
 LATTICES["driven_graph"] = RING | {"J": 0.4 + np.arange(7) / 9, "B": 0.5 + np.arange(SITES) / 7, "w": 1.2}
+#: Forces of bonds that do not read what they change, beside those at sites with functions for small arguments.
+ROTORS = """phigen: 1
+name: rotors
+lattice: {graph: bonds}
+coordinates: [q, p]
+parameters: {J: {value: 1, at: bonds}, m: {value: 1, at: sites}, g: 0.3}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: {sites: p**2/2/m - g*cos(q), bonds: "-J*cos(q[a] - q[b])"}
+"""
+LATTICES["rotors fast"] = RING | {"J": 0.4 + np.arange(7) / 9, "m": 0.5 + np.arange(SITES) / 7}
 OWN = {
     "driven_graph": DRIVEN_GRAPH,
+    "rotors": ROTORS,
     "driven": DRIVEN,
     "swung": SWUNG,
     "named": NAMED,
@@ -110,7 +121,7 @@ OWN = {
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
 #: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
-IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES, "driven_graph": SITES}
+IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES, "driven_graph": SITES, "rotors fast": SITES}
 IN_C |= {
     "membrane fast": (5, 6),
     "named fast": SITES,
@@ -282,11 +293,11 @@ def test_c_pulls_back_what_numpy_does_and_tangent_vectors_say(name):
     assert [np.sum(x0_bar * v) for v in along] == pytest.approx(slopes, rel=1e-12)
 
 
-@pytest.mark.parametrize("scale", [1, 30])
-def test_functions_go_back_by_what_is_for_small_arguments_or_for_any(scale):
-    in_c, numpy, random = (*(made("toda fast", target) for target in ("c", "numpy")), np.random.default_rng(5))
+@pytest.mark.parametrize(("name", "scale"), [("toda fast", 1), ("toda fast", 30), ("rotors fast", 30)])
+def test_functions_go_back_by_what_is_for_small_arguments_or_for_any(name, scale):
+    in_c, numpy, random = (*(made(name, target) for target in ("c", "numpy")), np.random.default_rng(5))
     x, bar = beginning(in_c) * [[1], [scale]], random.normal(size=(2, SITES))
-    found, expected = (solver.pullback(x, H, STEPS, bar) for solver in (in_c, numpy))
+    found, expected = (solver.pullback(x, H, STEPS, bar, parameters=LATTICES.get(name, {})) for solver in (in_c, numpy))
     assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-12)
 
 

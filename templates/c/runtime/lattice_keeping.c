@@ -63,7 +63,7 @@ static void phi_sweep_back(const phi_solver *s, const phi_transpose *g, int swee
     if (!phi_hands[phi_part_of(s, sweep)]) return;
     phi_wait();
 #if PHI_GATHER
-    phi_hand_rows(s, sweep, coef, x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
+    phi_hand_rows(s, sweep, coef PHI_AND_FAR(g->far), x, bar, g->handed, g->sums + row * PHI_ROW, first, end);
 #else
     phi_hand_rows(s, sweep, x, bar, g->handed, first, end);
 #endif

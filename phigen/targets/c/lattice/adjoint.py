@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from phigen.lanes.lowering import Rows
 from phigen.lattice.adjoint import BACK
 from phigen.lattice.collecting import AROUND
-from phigen.lattice.undoing import can_be_undone, transposes
+from phigen.lattice.undoing import apart, can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Ends, Gather, Sweep, Sweeps
@@ -48,7 +48,7 @@ class Back:
 class _Pulled:
     """A transposed kernel, where its cotangents are, what is gathered for it, and the transposes of the kernels of
     that, with the parameters that are opposite seen from b; what is called before it, for pieces of rows; the fields
-    that it undoes."""
+    that it undoes, or another kernel, from sums that bonds or pairs add up in their transposes."""
 
     kernel: Kernel
     seeds: Seeds
@@ -56,6 +56,7 @@ class _Pulled:
     ends: tuple[tuple[Ends, Set[str], Kernel], ...]
     before: tuple[str, ...] = ()
     undone: tuple[int, ...] = ()
+    undo: Kernel | None = None
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
@@ -76,14 +77,15 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
         for p, setup in zip(parts, setups, strict=True)
     ]
     title = "How a kernel goes back" if step.equation else "How a part goes back"
-    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=bool(rows.limited)))
+    far = bool(rows.limited)
+    found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=far))
     where = _givers(program) if givers(step) else []
     hand = {
         k: Case(p.second, [*(line for line in setup if line != _VARIED), *where], beside=False)
         for k, (p, setup) in enumerate(zip(parts, setups, strict=True), 1)
         if p.second
     }
-    found += [_over(program, layout, "What sites are handed", "hand_rows", hand)] if hand else []
+    found += [_over(program, layout, "What sites are handed", "hand_rows", hand, far=far)] if hand else []
     return "\n".join([_tables(program, step, parts, adjoint.steps), *found, _added(program, step, layout)])
 
 
@@ -107,19 +109,23 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
         for s in kernel.inputs.get(AROUND, ())
         if isinstance(s, Symbol)
     }
-    for number, (part, own) in enumerate(zip(layout.step.parts, back, strict=True), 1):
+    for number, (part, found) in enumerate(zip(layout.step.parts, back, strict=True), 1):
         pulled = list[_Pulled]()
-        for sweep, kernel in zip(part, own, strict=True):
+        for sweep, kernel in zip(part, found, strict=True):
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
             seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
             ends = tuple(_ends_back(sweep.gather, kernels))
-            before = tuple(_gathered(program, layout, sweep)) if _reads_sums(kernel) else ()
-            pulled.append(_Pulled(kernel, seeds, sweep.gather, ends, before, sweep.moved if undone else ()))
-        found = _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
-        written = {layout.bar(layout.step.sites.places[s][0]) for k in own for s, e in k.along("site") if not e.is_zero}
+            moved = sweep.moved if undone else ()
+            alike = len(ends) == 1 and ends[0][0].of_all
+            own, undo = (alike and apart(kernel)) or (kernel, None)
+            before = tuple(_gathered(program, layout, sweep)) if _reads_sums(own) else ()
+            pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo))
+        both = _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
+        along = [pair for kernel in found for pair in kernel.along("site")]
+        written = {layout.bar(layout.step.sites.places[s][0]) for s, e in along if not e.is_zero}
         place = f"{layout.at(0, 'row.')}, s->length, {layout.swept()}"
         copied = tuple(f"{program.name}_ends(row.bar[{k}]{place});" for k in sorted(around & written) if layout.halo)
-        yield replace(found, first=found.first + copied, second=found.second and found.second + copied)
+        yield replace(both, first=both.first + copied, second=both.second and both.second + copied)
 
 
 def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
@@ -149,23 +155,28 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         source, sums = ("coef, ", "sums") if "*coef" in loop.arguments else ("", "numbers")
         return f"{program.name}_{loop.name}({source}{at(program, sites)}, {sums} + unit * {program.name}_SUMS);"
 
-    for one in pulled:
-        sums = one.gather.names if one.gather else ()
-        listed = handed_by(layout, one.kernel, given)
-        given = max([given, *(h.array + 1 for h in listed)])
-        lines, fields = {}, [program.coordinates[f] for f in one.undone]
-        for far, calls in call_forms(program, rows, [one.kernel]).items():
+    def over_sites(one: _Pulled, kernel: Kernel, listed: Sequence[Handed], moved: Sequence[str]) -> list[str]:
+        """The calls of a kernel, in each form, whose loops are listed."""
+        lines, sums = {}, one.gather.names if one.gather else ()
+        for far, calls in call_forms(program, rows, [kernel]).items():
             own = [
-                first_loop(program, layout, kernel, form + far, one.seeds, sums, listed, given, calls, fields)
-                for kernel, form in forms_of(program, one.kernel)
+                first_loop(program, layout, k, form + far, one.seeds, sums, listed, given, calls, moved)
+                for k, form in forms_of(program, kernel)
             ]
             lines[far] = [called(call.loop, call.sites) for call in calls_over_sites(own)]
-            loops += own
-        first += [*one.before, *either(lines)]
-        bonds = [loop for ends in one.ends for loop in gathering_back(program, layout, *ends, given)]
-        given += len(sums)
-        second += map(called, bonds)
+            loops.extend(own)
+        return either(lines)
+
+    for one in pulled:
+        listed = handed_by(layout, one.kernel, given)
+        given = max([given, *(h.array + 1 for h in listed)])
+        fields = [program.coordinates[f] for f in one.undone]
+        first += [*one.before, *over_sites(one, one.kernel, listed, () if one.undo else fields)]
+        bonds = [loop for e in one.ends for loop in gathering_back(program, layout, *e, given, summed=bool(one.undo))]
         loops += bonds
+        second += map(called, bonds)
+        second += over_sites(one, one.undo, (), fields) if one.undo else []
+        given += len(one.gather.names) if one.gather else 0
         beside += listed
     first += copied_ends(program, layout, beside)
     if beside:

@@ -35,12 +35,15 @@ class Seeds:
     bars: tuple[int, ...] = ()
     colour: int | None = 0
 
+    def read(self, code: Code) -> list[int]:
+        """The numbers of those that some code reads."""
+        return sorted({int(s.key[0]) for s in code.used if isinstance(s, Symbol) and s.kind == self.kind})
+
     def declared(self, code: Code, here: str) -> list[str]:
         """The declarations of those pointers that are not cotangents to be added to."""
-        read = {int(s.key[0]) for s in code.used if isinstance(s, Symbol) and s.kind == self.kind}
         if self.bars:
             return []
-        return [f"    const double *restrict {self.pointers[k]} = row->varied[{k}]{here};" for k in sorted(read)]
+        return [f"    const double *restrict {self.pointers[k]} = row->varied[{k}]{here};" for k in self.read(code)]
 
 
 def handed_by(layout: Layout, kernel: Kernel, first: int) -> list[Handed]:
@@ -67,7 +70,8 @@ def first_loop(
     calls: Mapping[str, str],
     moved: Sequence[str] = (),
 ) -> Loop:
-    """The first go of a kernel; cotangents of ``sums`` over bonds or pairs are handed in arrays from ``begin`` on.
+    """The first go of a kernel; cotangents of ``sums`` over bonds or pairs, if it finds any, are handed in arrays from
+    ``begin`` on.
 
     ``moved`` are the fields that it finds as they were before the sweep."""
     name, code = program.name, lower(kernel)
@@ -76,7 +80,7 @@ def first_loop(
         program, layout, kernel, code, {*moved}, calls, sums, {seeds.kind: seeds.pointers, AROUND: around}
     )
     head, stores, shares = _unused(code), list[str](), list[tuple[int, str]]()
-    used, given = {*seeds.bars}, dict[int, str]()
+    used, given = {seeds.bars[k] for k in seeds.read(code) if seeds.bars}, dict[int, str]()
     places = {(h.base, h.offset): h.array for h in handed}
     for store in (s for s in code.stores if not s.value.is_zero):
         value = names.show(store.value)
@@ -96,7 +100,8 @@ def first_loop(
         else:
             used.add(number)
             stores.append(f"bar_{number}[i] += {value};")
-    arrays = [*(h.array for h in handed), *range(begin, begin + len(sums))]
+    found = any(o.name == "gathered_bar" for o in kernel.outputs)
+    arrays = [*(h.array for h in handed), *range(begin, begin + len(sums) * found)]
     given |= {array: "0.0" for array in arrays if array not in given}
     stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
     head += seeds.declared(code, layout.at(0))

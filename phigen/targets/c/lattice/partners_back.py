@@ -25,18 +25,28 @@ from phigen.targets.code import Store, lower
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 
-#: Cotangents that all sites add up.
-_SUMS = ("coef_bar", "params_bar")
+#: Cotangents that all sites add up, and others.
+_SUMS, _OF_ARRAYS = ("coef_bar", "params_bar"), ("site_bar", "bonds_bar")
 
 
 def gathering_back(
-    program: Program, layout: Layout, ends: Ends, opposite: Set[str], kernel: Kernel, first: int
+    program: Program,
+    layout: Layout,
+    ends: Ends,
+    opposite: Set[str],
+    kernel: Kernel,
+    first: int,
+    *,
+    summed: bool = False,
 ) -> Iterator[Loop]:
     """The loops for bonds or pairs, where the cotangents of sums are in arrays from the first on.
 
-    Parameters at bonds that are ``opposite`` have the other sign seen from the end b."""
-    if not (ends.end or ends.chosen):
-        found = [("a", ends, paired(layout.step.sites.ends, ends.kernel, kernel, opposite))]
+    Parameters at bonds that are ``opposite`` have the other sign seen from the end b. The sums themselves are found too
+    if they are to be ``summed``."""
+    if ends.of_all:
+        whole = paired(layout.step.sites.ends, ends.kernel, kernel, opposite)
+        sums = [o for o in ends.kernel.outputs if summed]
+        found = [("a", ends, replace(whole, outputs=(*whole.outputs, *sums)))]
     else:
         turned = replace(ends, end=_OPPOSITE[ends.end], chosen=_CHOSEN[ends.chosen])
         found = [("b", turned, _at_end(layout, kernel, "b")), ("a", ends, _at_end(layout, kernel, "a"))]
@@ -66,7 +76,7 @@ def _loop(
     names = SiteNames(program, layout, kernel, code, set(), in_loops(program), (), seeds, end, opposite=opposite)
     other, own = names.of_pair(code)
     stores = [s for s in code.stores if not s.value.is_zero]
-    bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array not in _SUMS}
+    bars = {k: layout.bar(_array_of(layout, kernel, s)) for k, s in enumerate(stores) if s.array.endswith(_OF_ARRAYS)}
     head = names.pointers()
     used = {k for kind in (HERE, THERE) for k, s in enumerate(kernel.inputs.get(kind, ())) if s in code.used}
     head += [f"const double *handed_{first + k} = row->handed[{first + k}];" for k in sorted(used)]
@@ -87,7 +97,7 @@ def _loop(
     else:
         text = _over_pairs(name, stores, shown, bars, head, own, other, values)
     arguments = f"{told(program, source)}, double *sums"
-    if not (ends.end or ends.chosen):
+    if ends.of_all:
         return Loop(kernel.name, "what a site gets of cotangents of sums, its own and those of others", arguments, text)
     said = "the site where the sum is" if end == "a" else "the other site"
     return Loop(f"{kernel.name}_{end}", f"what {said} gets of cotangents of sums", arguments, text)
@@ -97,6 +107,13 @@ def _array_of(layout: Layout, kernel: Kernel, store: Store) -> str:
     if store.array == "bonds_bar":
         return kernel.inputs["bonds"][store.index]
     return layout.step.sites.ends[kernel.inputs["site"][store.index]][0]
+
+
+def _into(store: Store, bar: int | None, share: str, site: str) -> str:
+    """Where what bonds or pairs give to a site is added, or put."""
+    if store.array == "sums":
+        return f"row->s->gathered[{store.index}][{site}] ="
+    return f"{share if store.array in _SUMS else f'bar_{bar}[{site}]'} +="
 
 
 def _over_bonds(
@@ -120,7 +137,7 @@ def _over_bonds(
     lines = [*head, *(f"double share{k} = 0.0;" for k in shares), f"{OVER_SITES} {{"]
     lines += [f"    {line}" for line in [*own, *(f"double own{k} = 0.0;" for k in summed), loop]]
     lines += [*(f"        {line}" for line in inner if line), "    }"]
-    lines += [f"    {f'share{k}' if k in shares else f'bar_{bars[k]}[i]'} += own{k};" for k in summed]
+    lines += [f"    {_into(stores[k], bars.get(k), f'share{k}', 'i')} own{k};" for k in summed]
     lines += ["}", *(f"sums[{stores[k].index}] += share{k};" for k in shares)]
     return "".join(f"    {line}\n" for line in lines)
 
@@ -149,7 +166,7 @@ def _over_pairs(
     lines += [f"        {name}_EACH_SITE", "        for (ptrdiff_t l = 0; l < 8; ++l) {"]
     lines += [*(f"            {line}" for line in inner), "        }", "    }"]
     lines.append("    for (ptrdiff_t l = 0; l < 8 && first + l < to; ++l) { /* beyond are numbers, but no sites */")
-    into = [f"share{k}[l]" if k in shares else f"bar_{bars[k]}[first + l]" for k in range(len(stores))]
-    lines += [f"        {place} += own{k}[l];" for k, place in enumerate(into)]
+    into = [_into(s, bars.get(k), f"share{k}[l]", "first + l") for k, s in enumerate(stores)]
+    lines += [f"        {place} own{k}[l];" for k, place in enumerate(into)]
     lines += ["    }", "}", *(f"sums[{stores[k].index}] += {name}_total(share{k});" for k in shares)]
     return "".join(f"    {line}\n" for line in lines)
