@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8e3b195189af62492bb37bb7d4b51a274e2377d24a25a195064963a2687c5c61
+ * body-sha256: b009dde7d51441017979ec47b30e52e35bf63a8b1641599cb82a4c0e8f6d1bca
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -277,7 +277,7 @@ static size_t ablowitz_ladik_block(size_t rows, ptrdiff_t width) { return rows *
 
 size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = ablowitz_ladik_RESERVED * ablowitz_ladik_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9e1f92be8a283efbe042070efa9ec22c9b3f0166dc3b65d6f1dd28e97d11259a
+ * body-sha256: 1aef9a04f39e167a9a01f32f76284e877f982ab118daeed2967d294b91c73796
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -427,7 +427,7 @@ static size_t chiral_magnet_block(size_t rows, ptrdiff_t width) { return rows * 
 
 size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bonds)
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : chiral_magnet_shape(sizes, &width);
     if (rows == 0 || !chiral_magnet_few(sizes[0], bonds)) return 0;
     size_t doubles = chiral_magnet_RESERVED * chiral_magnet_block(rows, width);
@@ -473,7 +473,7 @@ chiral_magnet_status chiral_magnet_init(chiral_magnet_solver *s, const chiral_ma
     const chiral_magnet_params own = params != NULL ? *params : chiral_magnet_default_params;
     const size_t rows = chiral_magnet_shape(sizes, &width), length = sizes[0], sites = rows * length;
     const size_t count = bonds != NULL ? bonds->count : 0;
-    if (!chiral_magnet_few(sites, count) || !chiral_magnet_connected(bonds, sites)
+    if (rows == 0 || !chiral_magnet_few(sites, count) || !chiral_magnet_connected(bonds, sites)
         || !chiral_magnet_finite(x0, chiral_magnet_DIM * sites) || !chiral_magnet_allowed(&own, sites, count))
         return chiral_magnet_BAD_ARGUMENT;
     double coef[chiral_magnet_COEFFICIENTS];

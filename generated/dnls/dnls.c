@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 95a45908d95b9687d30d3303c7d177e93502b9b590ff40cd955cf5da54fa50aa
+ * body-sha256: b75337cc98a3188b0e4eaaae2a919e104533ff5961fd3879d3397728414f65b9
  */
 #include "dnls.h"
 #include <float.h>
@@ -261,7 +261,7 @@ static size_t dnls_block(size_t rows, ptrdiff_t width) { return rows * (size_t)w
 
 size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = dnls_RESERVED * dnls_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4a28f53db496c607b7d95c06e197fcf88e5d80d72df05ddcb843774e665af13f
+ * body-sha256: 2ceddd373c05d6e3e6526778a3f8292840b4eb3eef12a7ce4a582c6e9645307f
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -265,7 +265,7 @@ static size_t dnls_disorder_block(size_t rows, ptrdiff_t width) { return rows * 
 
 size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = dnls_disorder_RESERVED * dnls_disorder_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 1824a8794de6ba45de6fb182298364c75415163cc174b7907fd0c4a6ffb60105
+ * body-sha256: 8635f34afc540f2b3d647addda013e628e78fb664138b9942510f84236d420aa
  */
 #include "food_web.h"
 #include <float.h>
@@ -322,7 +322,7 @@ static size_t food_web_block(size_t rows, ptrdiff_t width) { return rows * (size
 
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : food_web_shape(sizes, &width);
     if (rows == 0 || !food_web_few(sizes[0], bonds)) return 0;
     size_t doubles = food_web_RESERVED * food_web_block(rows, width);
@@ -381,7 +381,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
     const food_web_params own = params != NULL ? *params : food_web_default_params;
     const size_t rows = food_web_shape(sizes, &width), length = sizes[0], sites = rows * length;
     const size_t count = bonds != NULL ? bonds->count : 0;
-    if (!food_web_few(sites, count) || !food_web_connected(bonds, sites) || !food_web_finite(x0,
+    if (rows == 0 || !food_web_few(sites, count) || !food_web_connected(bonds, sites) || !food_web_finite(x0,
         food_web_DIM * sites) || !food_web_allowed(&own, sites, count))
         return food_web_BAD_ARGUMENT;
     double coef[food_web_COEFFICIENTS];

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 06bd3fb2e0dabdce92bfe30c1744c01f9d6b72e22d5d18356a13eff8614613cb
+ * body-sha256: b3e661f5dd7fe25448716f609fee1809f0a187d0047dd2a5894934b619977165
  */
 #include "fput.h"
 #include <float.h>
@@ -267,7 +267,7 @@ static size_t fput_block(size_t rows, ptrdiff_t width)
 
 size_t fput_work_size(const size_t sizes[fput_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = fput_RESERVED * fput_block(rows, width);

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 5629f0d4c61586e81112cd747ad64cea23e8db763d0fc9720c5f06296fd0b018
+ * body-sha256: e60e6cbaccabfa05a7e0d34c452c76ca9bc411ce6063133e5d16cc3750d8a8e3
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -529,7 +529,7 @@ static size_t heisenberg_block(size_t rows, ptrdiff_t width)
 
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = heisenberg_RESERVED * heisenberg_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 95c5fd0e8c9d6ff87d84756f9ee4eb5a06c3809b65dda054e30e5768929208c2
+ * body-sha256: 957720742255d383c3eae18bc6386e1dd92fd6d6e1cc6f59a856873ffb0f59e4
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -351,7 +351,7 @@ static size_t heisenberg_plane_block(size_t rows, ptrdiff_t width) { return rows
 
 size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : heisenberg_plane_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = heisenberg_plane_RESERVED * heisenberg_plane_block(rows, width);

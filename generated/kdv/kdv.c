@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 7d2d127cb8f480f780fd40bcc375b9a0a77a91ec012ba72cf2ec0f8cf048d1df
+ * body-sha256: 49bf7951a2d4e9f3a2384432be8218ddf1a75a1090205aa6cefcd7691caa35ce
  */
 #include "kdv.h"
 #include <float.h>
@@ -303,7 +303,7 @@ static size_t kdv_block(size_t rows, ptrdiff_t width)
 
 size_t kdv_work_size(const size_t sizes[kdv_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : kdv_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = kdv_RESERVED * kdv_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6bee4f9dc53bdbbeadfe6b255055cc8e982c01200959bb12796687024eee38b5
+ * body-sha256: 7922e1fd3e6bcd9136809c1c40491f7f8869f60547e75d788b4a44fec4ddc0f1
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -211,7 +211,7 @@ static size_t klein_gordon_block(size_t rows, ptrdiff_t width) { return rows * (
 
 size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = klein_gordon_RESERVED * klein_gordon_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 3d850cee5f6eb62235ccc14e6fdc8e36bb8d5041672360ff89b5cc1a90cb3a6f
+ * body-sha256: 4635ef5bfdbb15fdf1b688a62f74e833c520507d2ac9f8a30c5e09ad86900f46
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -228,7 +228,7 @@ static size_t nonlinear_wave_block(size_t rows, ptrdiff_t width) { return rows *
 
 size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = nonlinear_wave_RESERVED * nonlinear_wave_block(rows, width);

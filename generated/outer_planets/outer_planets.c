@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f0d757ab38fc88fb3811449f62baca6c848c40306d79aed02cf6770bfd209c24
+ * body-sha256: 524e4d7fe169535998c9d1bd25bcb743666cfb1e970e9afc7e462fbe7e43f0a7
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -283,7 +283,7 @@ static size_t outer_planets_block(size_t rows, ptrdiff_t width) { return rows * 
 
 size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : outer_planets_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = outer_planets_RESERVED * outer_planets_block(rows, width);

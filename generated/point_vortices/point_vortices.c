@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: 0779535552f075a4a3cf04a0081a3a6b4e4d88864d609d943521e45dc685a22e
+ * body-sha256: ff0ccd5110faa853e000bec20bd4997528b95be504c5ec8fbdb6b90bd2458006
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -308,7 +308,7 @@ static size_t point_vortices_block(size_t rows, ptrdiff_t width)
 
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 57649338a4a28bac09a94a993f08fd8a5acfb06146cdc475d22a24b02c93cea8
+ * body-sha256: a48b092391a6ee4755cb4c3ae4e548af194360d4114d4eed3c918b19d48f9948
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -237,7 +237,7 @@ static size_t sine_gordon_block(size_t rows, ptrdiff_t width) { return rows * (s
 
 size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = sine_gordon_RESERVED * sine_gordon_block(rows, width);

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: e4b66bbdc5b3e2e83a8d9c2156d7cdf9e2a676a4a7b3c2495aab2bdcddb2eb4a
+ * body-sha256: 3ea847bce160412b5d5b73870451a8153670bf4eed3d05545f0944190494db50
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -459,7 +459,7 @@ static size_t thermal_heisenberg_block(size_t rows, ptrdiff_t width) { return ro
 
 size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : thermal_heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = thermal_heisenberg_RESERVED * thermal_heisenberg_block(rows, width);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 709ff655d2d8e6116840e168c871c9b84ae4d4c915b96ce40d53aeb14a53dc1f
+ * body-sha256: d4f86e738473d1a84bf0f70d69de7eea03e70eb3e07b987d2847d286a2650948
  */
 #include "toda.h"
 #include <float.h>
@@ -249,7 +249,7 @@ static size_t toda_block(size_t rows, ptrdiff_t width) { return rows * (size_t)w
 
 size_t toda_work_size(const size_t sizes[toda_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = toda_RESERVED * toda_block(rows, width);

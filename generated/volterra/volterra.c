@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 0264b569b0016bad8cce9d5bdf29dca25d363b8edad4b0135312a8c47a62ad74
+ * body-sha256: 2b413af6ddd6a214f516dd303f4dbe638e73dc1ce97fa8ffc4a90755004d5f19
  */
 #include "volterra.h"
 #include <float.h>
@@ -253,7 +253,7 @@ static size_t volterra_block(size_t rows, ptrdiff_t width) { return rows * (size
 
 size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = volterra_RESERVED * volterra_block(rows, width);

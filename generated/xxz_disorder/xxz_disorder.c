@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 9f7cb0f815fdaeef726117e1d44cc651113f6ac276b4201a47dc2c015cb5818b
+ * body-sha256: a6806e3b3cc8e41ca6056b03257e94d3aaab3e61d082c8880613f90091c717c5
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -282,7 +282,7 @@ static size_t xxz_disorder_block(size_t rows, ptrdiff_t width) { return rows * (
 
 size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = xxz_disorder_RESERVED * xxz_disorder_block(rows, width);

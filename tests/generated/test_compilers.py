@@ -173,3 +173,9 @@ def test_whole_interface_is_clean_under_valgrind(name, sources):
     valgrind = tool("valgrind")
     program = build_exercise(compiled(name), sources, tool("gcc"), "-std=c99", "-O1", "-g")
     run([valgrind, "--error-exitcode=9", "--quiet", "--track-origins=yes", program], sources)
+
+
+@pytest.mark.parametrize("name", ["food_web", "kdv", "heisenberg"])  # a graph, a chain, rows
+def test_gcc_sees_that_all_is_initialised_where_it_optimises_a_little(name, tmp_path):
+    """With -O1 it looks into functions, but not as far as with more."""
+    run([tool("gcc"), "-std=c99", "-O1", *WARNINGS, "-c", GENERATED / name / f"{name}.c", "-o", "object.o"], tmp_path)

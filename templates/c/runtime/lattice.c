@@ -136,7 +136,7 @@ size_t phi_work_size(const size_t sizes[PHI_AXES], size_t bonds)
 size_t phi_work_size(const size_t sizes[PHI_AXES])
 #endif
 {
-    ptrdiff_t width = 0;
+    ptrdiff_t width;
     const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
 #if PHI_GRAPH
     if (rows == 0 || !phi_few(sizes[0], bonds)) return 0;
@@ -307,7 +307,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     const size_t rows = phi_shape(sizes, &width), length = sizes[PHI_LAST_AXIS], sites = rows * length;
 #if PHI_GRAPH
     const size_t count = bonds != NULL ? bonds->count : 0;
-    if (!phi_few(sites, count) || !phi_connected(bonds, sites) || !phi_finite(x0, PHI_DIM * sites) ||
+    if (rows == 0 || !phi_few(sites, count) || !phi_connected(bonds, sites) || !phi_finite(x0, PHI_DIM * sites) ||
         !phi_allowed(&own, sites, count))
         return PHI_BAD_ARGUMENT;
 #else
