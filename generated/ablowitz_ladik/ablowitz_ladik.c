@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b009dde7d51441017979ec47b30e52e35bf63a8b1641599cb82a4c0e8f6d1bca
+ * body-sha256: 2ec4d4d4c9e0e2a9f11c0b8ea3d8a3f8e4ba34a2b46832760ca0e2f0e8eaa720
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -265,7 +265,7 @@ enum { ablowitz_ladik_BUFFER = 256 }; /* densities that are added in one go */
 static size_t ablowitz_ladik_shape(const size_t sizes[ablowitz_ladik_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / ablowitz_ladik_RESERVED;
-    if (sizes[0] < ablowitz_ladik_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < ablowitz_ladik_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = ablowitz_ladik_LEAD + ((sizes[0] + 7) / 8 * 8 + ablowitz_ladik_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -278,7 +278,7 @@ static size_t ablowitz_ladik_block(size_t rows, ptrdiff_t width) { return rows *
 size_t ablowitz_ladik_work_size(const size_t sizes[ablowitz_ladik_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : ablowitz_ladik_shape(sizes, &width);
+    const size_t rows = ablowitz_ladik_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = ablowitz_ladik_RESERVED * ablowitz_ladik_block(rows, width);
     return doubles * sizeof(double) + 64;

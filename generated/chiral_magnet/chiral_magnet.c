@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 1aef9a04f39e167a9a01f32f76284e877f982ab118daeed2967d294b91c73796
+ * body-sha256: 688153b463d490c47daf003f8e51bc3f984373ba185a350c6a3f2dbe94c4c77c
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -415,7 +415,7 @@ enum { chiral_magnet_BUFFER = 256 }; /* densities that are added in one go */
 static size_t chiral_magnet_shape(const size_t sizes[chiral_magnet_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / chiral_magnet_RESERVED;
-    if (sizes[0] < chiral_magnet_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < chiral_magnet_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -428,7 +428,7 @@ static size_t chiral_magnet_block(size_t rows, ptrdiff_t width) { return rows * 
 size_t chiral_magnet_work_size(const size_t sizes[chiral_magnet_AXES], size_t bonds)
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : chiral_magnet_shape(sizes, &width);
+    const size_t rows = chiral_magnet_shape(sizes, &width);
     if (rows == 0 || !chiral_magnet_few(sizes[0], bonds)) return 0;
     size_t doubles = chiral_magnet_RESERVED * chiral_magnet_block(rows, width);
     return doubles * sizeof(double) + chiral_magnet_graph_size(sizes[0], bonds) + 64;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: b75337cc98a3188b0e4eaaae2a919e104533ff5961fd3879d3397728414f65b9
+ * body-sha256: a4455b0dc521125e7405d6871f634e3a5e42d7035ac08432b63ee8dbd50c5ae3
  */
 #include "dnls.h"
 #include <float.h>
@@ -249,7 +249,7 @@ enum { dnls_BUFFER = 256 }; /* densities that are added in one go */
 static size_t dnls_shape(const size_t sizes[dnls_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_RESERVED;
-    if (sizes[0] < dnls_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < dnls_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = dnls_LEAD + ((sizes[0] + 7) / 8 * 8 + dnls_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -262,7 +262,7 @@ static size_t dnls_block(size_t rows, ptrdiff_t width) { return rows * (size_t)w
 size_t dnls_work_size(const size_t sizes[dnls_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : dnls_shape(sizes, &width);
+    const size_t rows = dnls_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = dnls_RESERVED * dnls_block(rows, width);
     return doubles * sizeof(double) + 64;

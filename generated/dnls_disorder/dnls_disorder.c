@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2ceddd373c05d6e3e6526778a3f8292840b4eb3eef12a7ce4a582c6e9645307f
+ * body-sha256: f85faa24feb6db0ac4d8b788a42952c35da47160274b7f3b8a4357b80e17b4ae
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -253,7 +253,7 @@ enum { dnls_disorder_BUFFER = 256 }; /* densities that are added in one go */
 static size_t dnls_disorder_shape(const size_t sizes[dnls_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / dnls_disorder_RESERVED;
-    if (sizes[0] < dnls_disorder_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < dnls_disorder_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = dnls_disorder_LEAD + ((sizes[0] + 7) / 8 * 8 + dnls_disorder_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -266,7 +266,7 @@ static size_t dnls_disorder_block(size_t rows, ptrdiff_t width) { return rows * 
 size_t dnls_disorder_work_size(const size_t sizes[dnls_disorder_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : dnls_disorder_shape(sizes, &width);
+    const size_t rows = dnls_disorder_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = dnls_disorder_RESERVED * dnls_disorder_block(rows, width);
     return doubles * sizeof(double) + 64;

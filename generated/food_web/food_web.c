@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 8635f34afc540f2b3d647addda013e628e78fb664138b9942510f84236d420aa
+ * body-sha256: 4285e23939b8aab8792fd3bc85407b99ff77b7a3022f2d1ed04ece7d89662e08
  */
 #include "food_web.h"
 #include <float.h>
@@ -310,7 +310,7 @@ enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 static size_t food_web_shape(const size_t sizes[food_web_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / food_web_RESERVED;
-    if (sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < food_web_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -323,7 +323,7 @@ static size_t food_web_block(size_t rows, ptrdiff_t width) { return rows * (size
 size_t food_web_work_size(const size_t sizes[food_web_AXES], size_t bonds)
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : food_web_shape(sizes, &width);
+    const size_t rows = food_web_shape(sizes, &width);
     if (rows == 0 || !food_web_few(sizes[0], bonds)) return 0;
     size_t doubles = food_web_RESERVED * food_web_block(rows, width);
     return doubles * sizeof(double) + food_web_graph_size(sizes[0], bonds) + 64;

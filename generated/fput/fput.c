@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: b3e661f5dd7fe25448716f609fee1809f0a187d0047dd2a5894934b619977165
+ * body-sha256: 4aee5e77dc6748341157709348852463adfc33d8de7f1926bda2b5b0bda37b38
  */
 #include "fput.h"
 #include <float.h>
@@ -250,7 +250,7 @@ enum { fput_BUFFER = 256 }; /* densities that are added in one go */
 static size_t fput_shape(const size_t sizes[fput_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / fput_RESERVED;
-    if (sizes[0] < fput_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < fput_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = fput_LEAD + ((sizes[0] + 7) / 8 * 8 + fput_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -268,7 +268,7 @@ static size_t fput_block(size_t rows, ptrdiff_t width)
 size_t fput_work_size(const size_t sizes[fput_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : fput_shape(sizes, &width);
+    const size_t rows = fput_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = fput_RESERVED * fput_block(rows, width);
     return doubles * sizeof(double) + 64;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: e60e6cbaccabfa05a7e0d34c452c76ca9bc411ce6063133e5d16cc3750d8a8e3
+ * body-sha256: 7bc57a053f4456e1752e293f1f0f4ec0f69a425ee56957200a2ec7d0e363e298
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -507,6 +507,7 @@ static size_t heisenberg_shape(const size_t sizes[heisenberg_AXES], ptrdiff_t *w
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_RESERVED;
     size_t rows = 1;
+    if (sizes == NULL) return 0;
     for (int a = 0; a < heisenberg_AXES; ++a)
         if (sizes[a] < heisenberg_least[a] || sizes[a] > most / 2) return 0;
     for (int a = 0; a < heisenberg_AXES - 1; ++a) {
@@ -530,7 +531,7 @@ static size_t heisenberg_block(size_t rows, ptrdiff_t width)
 size_t heisenberg_work_size(const size_t sizes[heisenberg_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : heisenberg_shape(sizes, &width);
+    const size_t rows = heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = heisenberg_RESERVED * heisenberg_block(rows, width);
     return doubles * sizeof(double) + rows * heisenberg_LINES * sizeof(ptrdiff_t) + 64;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 957720742255d383c3eae18bc6386e1dd92fd6d6e1cc6f59a856873ffb0f59e4
+ * body-sha256: 7ea08eee707c9ea7573ef0680d80a9e73c3c4ba0789e7e93e365be3e7a9021cb
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -333,6 +333,7 @@ static size_t heisenberg_plane_shape(const size_t sizes[heisenberg_plane_AXES], 
 {
     const size_t most = SIZE_MAX / 64 / heisenberg_plane_RESERVED;
     size_t rows = 1;
+    if (sizes == NULL) return 0;
     for (int a = 0; a < heisenberg_plane_AXES; ++a)
         if (sizes[a] < heisenberg_plane_least[a] || sizes[a] > most / 2) return 0;
     for (int a = 0; a < heisenberg_plane_AXES - 1; ++a) {
@@ -352,7 +353,7 @@ static size_t heisenberg_plane_block(size_t rows, ptrdiff_t width) { return rows
 size_t heisenberg_plane_work_size(const size_t sizes[heisenberg_plane_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : heisenberg_plane_shape(sizes, &width);
+    const size_t rows = heisenberg_plane_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = heisenberg_plane_RESERVED * heisenberg_plane_block(rows, width);
     return doubles * sizeof(double) + rows * heisenberg_plane_LINES * sizeof(ptrdiff_t) + 64;

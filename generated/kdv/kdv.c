@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 49bf7951a2d4e9f3a2384432be8218ddf1a75a1090205aa6cefcd7691caa35ce
+ * body-sha256: 4b17390e65206dd1956a93dafdfd7ada760152429142794648eab194cfae2ce7
  */
 #include "kdv.h"
 #include <float.h>
@@ -286,7 +286,7 @@ enum { kdv_BUFFER = 256 }; /* densities that are added in one go */
 static size_t kdv_shape(const size_t sizes[kdv_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / (kdv_RESERVED + 8 * kdv_BAND * kdv_DIM);
-    if (sizes[0] < kdv_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < kdv_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = kdv_LEAD + ((sizes[0] + 7) / 8 * 8 + kdv_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -304,7 +304,7 @@ static size_t kdv_block(size_t rows, ptrdiff_t width)
 size_t kdv_work_size(const size_t sizes[kdv_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : kdv_shape(sizes, &width);
+    const size_t rows = kdv_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = kdv_RESERVED * kdv_block(rows, width);
     kdv_matrix matrix;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7922e1fd3e6bcd9136809c1c40491f7f8869f60547e75d788b4a44fec4ddc0f1
+ * body-sha256: 2d4b30d3ebc349f38eaeb15ae1775f0a9167e05fd2750b3bf67d1878464b17b9
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -199,7 +199,7 @@ enum { klein_gordon_BUFFER = 256 }; /* densities that are added in one go */
 static size_t klein_gordon_shape(const size_t sizes[klein_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / klein_gordon_RESERVED;
-    if (sizes[0] < klein_gordon_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < klein_gordon_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = klein_gordon_LEAD + ((sizes[0] + 7) / 8 * 8 + klein_gordon_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -212,7 +212,7 @@ static size_t klein_gordon_block(size_t rows, ptrdiff_t width) { return rows * (
 size_t klein_gordon_work_size(const size_t sizes[klein_gordon_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : klein_gordon_shape(sizes, &width);
+    const size_t rows = klein_gordon_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = klein_gordon_RESERVED * klein_gordon_block(rows, width);
     return doubles * sizeof(double) + 64;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4635ef5bfdbb15fdf1b688a62f74e833c520507d2ac9f8a30c5e09ad86900f46
+ * body-sha256: 226cf25755dca2f096b20ebff83bbb17cab588ba917fd101993d1ab45ca3a118
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -216,7 +216,7 @@ enum { nonlinear_wave_BUFFER = 256 }; /* densities that are added in one go */
 static size_t nonlinear_wave_shape(const size_t sizes[nonlinear_wave_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / nonlinear_wave_RESERVED;
-    if (sizes[0] < nonlinear_wave_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < nonlinear_wave_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = nonlinear_wave_LEAD + ((sizes[0] + 7) / 8 * 8 + nonlinear_wave_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -229,7 +229,7 @@ static size_t nonlinear_wave_block(size_t rows, ptrdiff_t width) { return rows *
 size_t nonlinear_wave_work_size(const size_t sizes[nonlinear_wave_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : nonlinear_wave_shape(sizes, &width);
+    const size_t rows = nonlinear_wave_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = nonlinear_wave_RESERVED * nonlinear_wave_block(rows, width);
     return doubles * sizeof(double) + 64;

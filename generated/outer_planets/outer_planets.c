@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 524e4d7fe169535998c9d1bd25bcb743666cfb1e970e9afc7e462fbe7e43f0a7
+ * body-sha256: 96b1c457aa65663fff5a1c1b2e2e4cc315cf9e1684dbc696fa56973b251c6f69
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -271,7 +271,7 @@ enum { outer_planets_BUFFER = 256 }; /* densities that are added in one go */
 static size_t outer_planets_shape(const size_t sizes[outer_planets_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / outer_planets_RESERVED;
-    if (sizes[0] < outer_planets_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < outer_planets_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -284,7 +284,7 @@ static size_t outer_planets_block(size_t rows, ptrdiff_t width) { return rows * 
 size_t outer_planets_work_size(const size_t sizes[outer_planets_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : outer_planets_shape(sizes, &width);
+    const size_t rows = outer_planets_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = outer_planets_RESERVED * outer_planets_block(rows, width);
     return doubles * sizeof(double) + 64;

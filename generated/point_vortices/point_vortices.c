@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: ff0ccd5110faa853e000bec20bd4997528b95be504c5ec8fbdb6b90bd2458006
+ * body-sha256: a54e96c579f2c06f3b431113ea71c856a04704093fb98351ae521ddc3f0a7c42
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -291,7 +291,7 @@ enum { point_vortices_BUFFER = 256 }; /* densities that are added in one go */
 static size_t point_vortices_shape(const size_t sizes[point_vortices_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / point_vortices_RESERVED;
-    if (sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < point_vortices_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = (sizes[0] + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -309,7 +309,7 @@ static size_t point_vortices_block(size_t rows, ptrdiff_t width)
 size_t point_vortices_work_size(const size_t sizes[point_vortices_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : point_vortices_shape(sizes, &width);
+    const size_t rows = point_vortices_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = point_vortices_RESERVED * point_vortices_block(rows, width);
     return doubles * sizeof(double) + 64;

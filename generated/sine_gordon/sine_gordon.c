@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a48b092391a6ee4755cb4c3ae4e548af194360d4114d4eed3c918b19d48f9948
+ * body-sha256: 35984d290b946af0165390f2f5b004c5fb4654c0ecba4d8ed655821796226f94
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -225,7 +225,7 @@ enum { sine_gordon_BUFFER = 256 }; /* densities that are added in one go */
 static size_t sine_gordon_shape(const size_t sizes[sine_gordon_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / sine_gordon_RESERVED;
-    if (sizes[0] < sine_gordon_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < sine_gordon_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = sine_gordon_LEAD + ((sizes[0] + 7) / 8 * 8 + sine_gordon_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -238,7 +238,7 @@ static size_t sine_gordon_block(size_t rows, ptrdiff_t width) { return rows * (s
 size_t sine_gordon_work_size(const size_t sizes[sine_gordon_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : sine_gordon_shape(sizes, &width);
+    const size_t rows = sine_gordon_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = sine_gordon_RESERVED * sine_gordon_block(rows, width);
     return doubles * sizeof(double) + 64;

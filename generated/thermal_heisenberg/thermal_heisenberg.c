@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: 3ea847bce160412b5d5b73870451a8153670bf4eed3d05545f0944190494db50
+ * body-sha256: 873997941b2bdc8cfd3aecbd905b21942c70585a34c4c5613d915d0d2c2b3137
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -447,7 +447,7 @@ enum { thermal_heisenberg_BUFFER = 256 }; /* densities that are added in one go 
 static size_t thermal_heisenberg_shape(const size_t sizes[thermal_heisenberg_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / thermal_heisenberg_RESERVED;
-    if (sizes[0] < thermal_heisenberg_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < thermal_heisenberg_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = thermal_heisenberg_LEAD + ((sizes[0] + 7) / 8 * 8 + thermal_heisenberg_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -460,7 +460,7 @@ static size_t thermal_heisenberg_block(size_t rows, ptrdiff_t width) { return ro
 size_t thermal_heisenberg_work_size(const size_t sizes[thermal_heisenberg_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : thermal_heisenberg_shape(sizes, &width);
+    const size_t rows = thermal_heisenberg_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = thermal_heisenberg_RESERVED * thermal_heisenberg_block(rows, width);
     return doubles * sizeof(double) + 64;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: d4f86e738473d1a84bf0f70d69de7eea03e70eb3e07b987d2847d286a2650948
+ * body-sha256: e277c3e2d08c0ef537573e5776456c0eafa89cbde6a9e08b00113f6101fc936a
  */
 #include "toda.h"
 #include <float.h>
@@ -237,7 +237,7 @@ enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 static size_t toda_shape(const size_t sizes[toda_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / toda_RESERVED;
-    if (sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < toda_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = toda_LEAD + ((sizes[0] + 7) / 8 * 8 + toda_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -250,7 +250,7 @@ static size_t toda_block(size_t rows, ptrdiff_t width) { return rows * (size_t)w
 size_t toda_work_size(const size_t sizes[toda_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : toda_shape(sizes, &width);
+    const size_t rows = toda_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = toda_RESERVED * toda_block(rows, width);
     return doubles * sizeof(double) + 64;

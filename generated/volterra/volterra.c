@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2b413af6ddd6a214f516dd303f4dbe638e73dc1ce97fa8ffc4a90755004d5f19
+ * body-sha256: 07041acf32a5aeec24bbac3bda5870985d62d40e0992fd3531ef072ed49fcfb3
  */
 #include "volterra.h"
 #include <float.h>
@@ -241,7 +241,8 @@ enum { volterra_BUFFER = 256 }; /* densities that are added in one go */
 static size_t volterra_shape(const size_t sizes[volterra_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / volterra_RESERVED;
-    if (sizes[0] < volterra_least[0] || sizes[0] % volterra_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < volterra_least[0] || sizes[0] % volterra_periods[0] != 0
+        || sizes[0] > most / 2) return 0;
     size_t wide = volterra_LEAD + ((sizes[0] + 7) / 8 * 8 + volterra_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -254,7 +255,7 @@ static size_t volterra_block(size_t rows, ptrdiff_t width) { return rows * (size
 size_t volterra_work_size(const size_t sizes[volterra_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : volterra_shape(sizes, &width);
+    const size_t rows = volterra_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = volterra_RESERVED * volterra_block(rows, width);
     return doubles * sizeof(double) + 64;

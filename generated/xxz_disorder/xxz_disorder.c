@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a6806e3b3cc8e41ca6056b03257e94d3aaab3e61d082c8880613f90091c717c5
+ * body-sha256: 35c87143c217da393f5c6240cd9b3cfbeac1fc1785c8ae7254f782220a90f2e9
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -270,7 +270,7 @@ enum { xxz_disorder_BUFFER = 256 }; /* densities that are added in one go */
 static size_t xxz_disorder_shape(const size_t sizes[xxz_disorder_AXES], ptrdiff_t *width)
 {
     const size_t most = SIZE_MAX / 64 / xxz_disorder_RESERVED;
-    if (sizes[0] < xxz_disorder_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < xxz_disorder_least[0] || sizes[0] > most / 2) return 0;
     size_t wide = xxz_disorder_LEAD + ((sizes[0] + 7) / 8 * 8 + xxz_disorder_HALO + 7) / 8 * 8;
     if (wide % 512 == 0) wide += 8; /* rows a multiple of a page apart would share lines of the cache */
     *width = (ptrdiff_t)wide;
@@ -283,7 +283,7 @@ static size_t xxz_disorder_block(size_t rows, ptrdiff_t width) { return rows * (
 size_t xxz_disorder_work_size(const size_t sizes[xxz_disorder_AXES])
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : xxz_disorder_shape(sizes, &width);
+    const size_t rows = xxz_disorder_shape(sizes, &width);
     if (rows == 0) return 0;
     size_t doubles = xxz_disorder_RESERVED * xxz_disorder_block(rows, width);
     return doubles * sizeof(double) + 64;

@@ -86,12 +86,13 @@ static size_t phi_shape(const size_t sizes[PHI_AXES], ptrdiff_t *width)
 #endif
 #if PHI_ONE_ROW
 #if PHI_PERIODIC_COLOURS
-    if (sizes[0] < phi_least[0] || sizes[0] % phi_periods[0] != 0 || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < phi_least[0] || sizes[0] % phi_periods[0] != 0 || sizes[0] > most / 2) return 0;
 #else
-    if (sizes[0] < phi_least[0] || sizes[0] > most / 2) return 0;
+    if (sizes == NULL || sizes[0] < phi_least[0] || sizes[0] > most / 2) return 0;
 #endif
 #else
     size_t rows = 1;
+    if (sizes == NULL) return 0;
     for (int a = 0; a < PHI_AXES; ++a)
 #if PHI_PERIODIC_COLOURS
         if (sizes[a] < phi_least[a] || sizes[a] % phi_periods[a] != 0 || sizes[a] > most / 2) return 0;
@@ -137,7 +138,7 @@ size_t phi_work_size(const size_t sizes[PHI_AXES])
 #endif
 {
     ptrdiff_t width;
-    const size_t rows = sizes == NULL ? 0 : phi_shape(sizes, &width);
+    const size_t rows = phi_shape(sizes, &width);
 #if PHI_GRAPH
     if (rows == 0 || !phi_few(sizes[0], bonds)) return 0;
 #else
