@@ -237,6 +237,7 @@ class Solver(Named[Backend, Interface]):
         *,
         t0: float | None = None,
         seed: int | None = None,
+        member: int | None = None,
         step0: int | None = None,
         parameters: Mapping[str, float] | None = None,
         **more: float,
@@ -245,7 +246,7 @@ class Solver(Named[Backend, Interface]):
 
         The steps are those of `integrate`. Raises what `step_tangent` does.
         """
-        at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "step0": step0})
+        at = self._beginning(x0, "x0", h, parameters, more, t0, {"seed": seed, "member": member, "step0": step0})
         steps = arguments.count(steps, "steps", 0)
         session = self._started(at)
         for _ in range(steps):

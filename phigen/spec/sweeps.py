@@ -18,7 +18,9 @@ from phigen.spec.yaml_source import Scalar
 _WORDS = ("random", "seed", "file")
 
 
-def sweep(name: str, raw: Mapping[str, Any], runs: Mapping[str, Run], declared: Declarations) -> Sweep:
+def sweep(
+    name: str, raw: Mapping[str, Any], runs: Mapping[str, Run], declared: Declarations, *, monitored: bool
+) -> Sweep:
     """The sweep of that name. After errors, which are reported, some of its values are stand-ins."""
     place = ("sweeps", name)
     run = raw["run"].text if raw.get("run") else next(iter(runs), "")
@@ -45,7 +47,20 @@ def sweep(name: str, raw: Mapping[str, Any], runs: Mapping[str, Run], declared: 
     )
     incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or (found.random == 0 and "random" in words)
     _expect_sense(found, runs.get(run), place, declared, incomplete=incomplete)
+    if run in runs and (end := end_of_its_own(found, runs[run], monitored=monitored)):
+        _fail((*place, "run") if raw.get("run") else place, end, declared, "give it steps: in place of that")
     return found
+
+
+def end_of_its_own(found: Sweep, run: Run, *, monitored: bool) -> str:
+    """What is said where a run does not end with its last whole step, or not each member does; else nothing."""
+    said = f"members of a sweep make whole steps, all as many; the run {run.name} ends"
+    if run.stop is not None:
+        return f"{said} where its stop: is met"
+    moved = {"step", "start"} & {axis.name for axis in found.over}
+    if run.until is not None and (monitored or moved or (run.until - run.start) % run.step):
+        return f"{said} at the time {float(run.until):.9g}"
+    return ""
 
 
 def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: str = "", *, limit: bool = False) -> None:

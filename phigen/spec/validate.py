@@ -103,7 +103,11 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         ),
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,
-        "sweeps": {n: sweep(n, s, runs, declared) for n, (_, s) in raw.get("sweeps", {}).items() if s is not None},
+        "sweeps": {
+            n: sweep(n, s, runs, declared, monitored="monitor" in raw)
+            for n, (_, s) in raw.get("sweeps", {}).items()
+            if s is not None
+        },
         "lattice": lattice,
         "title": raw.get("title", ""),
         "description": raw.get("description", ""),

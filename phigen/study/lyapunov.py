@@ -122,14 +122,15 @@ def spectrum(
     steps: int,
     parameters: Mapping[str, float] | None = None,
     t0: float | None = None,
+    **draws: Any,
 ) -> Spectrum:
     """The Lyapunov exponents along ``steps`` steps of size ``h`` from ``x0`` (DIM,).
 
     ``solver`` must be compiled with ``tangent=True``, else `TypeError`. Raises `StepError`, and `ValueError` for wrong
-    arguments.
+    arguments. ``draws`` are those of noise: seed, member, step0.
     """
     growth = FrameGrowth(len(solver.coordinates), h)
-    for _, tangent in solver.tangents(x0, h, steps, t0=t0, parameters=parameters):
+    for _, tangent in solver.tangents(x0, h, steps, t0=t0, parameters=parameters, **draws):
         growth.see(tangent)
     return growth.spectrum()
 

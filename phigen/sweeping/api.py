@@ -19,6 +19,7 @@ from phigen.api import _spec_of
 from phigen.geometry.system import System
 from phigen.spec.model import Axis, Run, Spec, Sweep
 from phigen.spec.names import KEPT, SWEEP_NAMES
+from phigen.spec.sweeps import end_of_its_own
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -106,7 +107,7 @@ def _run_of(
     found = found or Run("run", (), Fraction(1), 1)
     given: dict[str, Any] = {} if initial is None else {"initial": tuple(Fraction(float(v)) for v in initial)}
     given |= {} if h is None else {"step": Fraction(float(h))}
-    given |= {} if steps is None else {"steps": steps}
+    given |= {} if steps is None else {"steps": steps, "until": None}
     if parameters:
         given["parameters"] = {**found.parameters, **{n: Fraction(float(v)) for n, v in parameters.items()}}
     found = replace(found, **given)
@@ -137,6 +138,8 @@ def _sweep_of(
     given |= {} if keep is None else {"keep": tuple(keep)}
     given |= {} if frames is None else {"frames": frames}
     found = replace(found, **given)
+    if end := end_of_its_own(found, run, monitored=spec.monitor is not None):
+        raise ValueError(f"{end}; give it steps in place of that")
     strange = [what for what in found.keep if what not in KEPT]
     if strange:
         raise ValueError(f"cannot keep {strange[0]!r}; there are {', '.join(KEPT)}")

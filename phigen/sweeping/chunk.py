@@ -90,7 +90,7 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
     for name, values in parameters.items():
         good &= np.isfinite(values) & ((values > 0) | (name not in solver.interface.positive))
     allowed = np.flatnonzero(good)
-    asked = Members(x0, h, plan.steps, parameters, t0, plan.frames, Draws(plan.seed), numbers).part(allowed)
+    asked = Members(x0, h, plan.steps, parameters, t0, plan.frames, Draws(plan.noise), numbers).part(allowed)
     states, failures = _integrated(solver, asked)
     status = np.full(count, _REFUSED, dtype=np.uint8)
     status[allowed] = 0
@@ -164,6 +164,7 @@ def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> 
             continue
         h, parameters, t0 = members.numbers(m)
         start = t0 if solver.interface.time else None
+        drawn = {"seed": members.draws.seed, "member": int(members.paths[m])} if solver.interface.noise else {}
         with contextlib.suppress(StepError):
-            found[m] = spectrum(solver, members.x0[m], h, members.steps, parameters, start).largest
+            found[m] = spectrum(solver, members.x0[m], h, members.steps, parameters, start, **drawn).largest
     return found

@@ -87,7 +87,7 @@ class _Member:
             return
         try:
             values = solver.values(given, {}, start.sizes)
-            draws = (Draws(plan.seed, number),) if solver.interface.noise else ()
+            draws = (Draws(plan.noise, number),) if solver.interface.noise else ()
             self.session = solver.backend.start(start.state, values, t0, *draws)
             self.status, kept = 0, self._made(start.state, h)
             if "lyapunov" in plan.keep:

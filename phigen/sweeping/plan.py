@@ -27,7 +27,8 @@ _MOST_BYTES = 256 * 2**20
 class Plan:
     """A sweep in numbers: ``initial``, ``h``, ``t0`` and ``parameters`` are those of what is not varied.
 
-    ``axes`` are varied, those without a size drawn from ``seed``. ``members`` is the number of those in a file or of
+    ``axes`` are varied, those without a size drawn from ``seed``; ``noise`` is the seed of the noise, whose member each
+    is by its number. ``members`` is the number of those in a file or of
     random ones, whose only dimension is ``member``; ``listed`` names the columns of the file. Of a
     lattice of these ``sizes`` there is no ``initial``: workers find it by the spec.
     """
@@ -41,6 +42,7 @@ class Plan:
     steps: int
     axes: tuple[Axis, ...] = ()
     seed: int = 0
+    noise: int = 0
     members: int = 0
     listed: tuple[str, ...] = ()
     keep: tuple[str, ...] = ("final",)

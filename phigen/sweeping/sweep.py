@@ -114,6 +114,7 @@ def _plan(spec: Spec, sweep: Sweep, run: Run, columns: Mapping[str, int], target
         steps=run.steps,
         axes=sweep.over,
         seed=sweep.seed,
+        noise=(run.seed + sweep.seed) % 2**64,
         members=sweep.random or next(iter(columns.values()), 0),
         listed=tuple(columns),
         keep=sweep.keep,
@@ -171,7 +172,7 @@ def _seconds_of_a_member(job: store.Job) -> float:
     values = {name: np.asarray(value) for name, value in plan.parameters.items()}
     x0 = np.array([plan.initial] * 64)
     h, t0 = np.asarray(plan.h), np.asarray(plan.t0)
-    trial = Members(x0, h, steps, values, t0, draws=Draws(plan.seed), paths=np.arange(len(x0)))
+    trial = Members(x0, h, steps, values, t0, draws=Draws(plan.noise), paths=np.arange(len(x0)))
     backend = job.backend()
     began = time.process_time()  # of a machine that is busy with other things, no less should be asked at a time
     try:

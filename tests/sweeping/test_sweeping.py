@@ -15,8 +15,9 @@ from click.testing import CliRunner
 import phigen
 from phigen import spec as specs
 from phigen.api import compilation_of
-from phigen.errors import FileError
+from phigen.errors import FileError, SpecError
 from phigen.spec.model import Axis
+from phigen.study.lyapunov import spectrum
 from phigen.sweeping.plan import Plan, chunk_of, values_of
 
 xarray = pytest.importorskip("xarray")
@@ -125,8 +126,6 @@ def test_what_is_kept_of_members_is_that_of_single_runs(spec, cluster, tmp_path,
     data = xarray.open_zarr(store).load()
     assert data.sizes == {"I2": 2, "x1": 3, "coordinate": 3, "frame": 3}
     solver = phigen.compile(spec, tangent=True)
-    from phigen.study.lyapunov import spectrum
-
     for i, I2 in enumerate(data.I2.values):
         for j, x1 in enumerate(data.x1.values):
             start, member = [x1, 1, 0.01], data.isel(I2=i, x1=j)
@@ -152,6 +151,41 @@ def test_a_member_that_fails_costs_itself_and_says_why(spec, cluster, tmp_path):
     for name in ("final", "energy_error"):
         failed = np.isnan(data[name].values.reshape(9, -1)).any(axis=1)
         assert (failed == (data.status.values.ravel() != 0)).all()
+
+
+def test_members_with_noise_take_the_seed_of_the_run_and_paths_of_their_own(cluster):
+    noisy = specs.loads(BODY.replace("order: 2", "order: 2\nnoise: {kick: {hamiltonian: x1, amplitude: 0.3}}").replace(
+        "section: x2", "seed: 7"))  # fmt: skip
+    given = {"over": {"I2": [2.0, 2.5], "seed": {"count": 2}}, "keep": ["final", "lyapunov"], "target": "numpy"}
+    data = phigen.sweep(noisy, **given, scheduler=cluster.scheduler_address)
+    solver = phigen.compile(noisy, target="numpy", tangent=True)
+    for place in range(4):
+        about = {"seed": 7, "member": place, "parameters": {"I2": [2.0, 2.5][place // 2]}}
+        member, alone = data.isel(I2=place // 2, seed=place % 2), solver.integrate([0.01, 1, 0.01], 0.1, 60, **about)
+        np.testing.assert_allclose(member.final, alone.x[-1], rtol=0, atol=1e-13)
+        exponents = spectrum(solver, [0.01, 1, 0.01], 0.1, 60, **about)
+        assert member.lyapunov == pytest.approx(exponents.largest, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("end", "over", "refused"),
+    [
+        ("steps: 60, stop: x2", "I2: [1, 2]", True),
+        ("until: 6.05", "I2: [1, 2]", True),
+        ("until: 6", "step: [0.1, 0.2]", True),
+        ("until: 6", "I2: [1, 2]", False),
+    ],
+)
+def test_runs_that_do_not_end_with_the_same_whole_step_are_refused(spec, end, over, refused):
+    text = BODY.replace("steps: 60", end) + f"sweeps: {{s: {{over: {{{over}}}}}}}\n"
+    if not refused:
+        assert specs.loads(text).sweeps["s"].run == "flip"
+        return
+    with pytest.raises(SpecError, match="make whole steps"):
+        specs.loads(text)
+    run = specs.loads(BODY.replace("steps: 60", end))
+    with pytest.raises(ValueError, match="make whole steps"):
+        phigen.sweep(run, over={"step": [0.1, 0.2]})
 
 
 @pytest.mark.slow
