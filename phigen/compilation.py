@@ -84,9 +84,11 @@ class Compilation:
         return "splitting of a lattice"
 
     def told(self, method: str) -> str:
-        """A line that names the method, with why it is the series where nothing but sizes of runs forbids to split."""
-        since = getattr(self.sweeps, "since", "")
-        return f"{method}: the series, since {since}" if since else method
+        """A line that names the method, and why it is the series, or has more colours, where sizes of runs ask it."""
+        if self.sweeps is None or not self.sweeps.since:
+            return method
+        colours = self.sweeps.colouring.count
+        return f"{method}: {f'{colours} colours' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     @property
     def exact(self) -> bool:

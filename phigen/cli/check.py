@@ -144,13 +144,13 @@ def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) 
 
 
 def _print(examination: Examination) -> None:
-    from phigen.proofs.statements import METHOD
+    from phigen.proofs.statements import METHOD, SPLITTING
 
     spec = examination.spec
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     compilation = examination.compilation
     for group, statements in examination.groups.items():
-        out(f"  {compilation.told(group) if compilation and group.startswith(METHOD) else group}")
+        out(f"  {compilation.told(group) if compilation and group.startswith((METHOD, SPLITTING)) else group}")
         for statement in statements:
             out("\n".join(_lines(statement)))
     if examination.unexamined:

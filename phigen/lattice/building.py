@@ -28,7 +28,7 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Sizes of runs are no multiples of the periods of colours; ``since`` says it in one line, with what would be."""
+    """Sizes of runs are no multiples of the periods of colours; ``since`` says it in one line, as `since_of` does."""
 
     def __init__(self, diagnostics: list[Diagnostic], since: str = "") -> None:
         super().__init__(diagnostics)
@@ -77,7 +77,7 @@ def least_sizes(cell: Cell) -> tuple[int, ...]:
 def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
     """Raises `MisfitError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
     if found := misfits(spec, cell, periods):
-        raise misfit_error(spec, found)
+        raise MisfitError(told_at(spec, found))
 
 
 def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
@@ -92,9 +92,9 @@ def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
     ]
 
 
-def misfit_error(spec: Spec, found: Sequence[Misfit]) -> MisfitError:
-    """The error that says where each of them is."""
-    problems = [
+def told_at(spec: Spec, found: Sequence[Misfit]) -> list[Diagnostic]:
+    """What is said of each of them at its place."""
+    return [
         spec.diagnostic(
             ("runs", m.run, "sizes"),
             f"sizes: {m}, as the colours of the splitting need",
@@ -102,9 +102,13 @@ def misfit_error(spec: Spec, found: Sequence[Misfit]) -> MisfitError:
         )
         for m in found
     ]
+
+
+def since_of(found: Sequence[Misfit], colours: int) -> str:
+    """All of them in one line, with sizes for a splitting with so many ``colours``; nothing if there are none."""
     distinct = {str(m): str(m.fitting) for m in found}
-    since = f"{' and '.join(distinct)}, as the colours of a splitting need"
-    return MisfitError(problems, f"{since}; {' and '.join(distinct.values())} would do")
+    needed = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
+    return f"{' and '.join(distinct)}, {needed}" if found else ""
 
 
 def _local(spec: Spec) -> dict[tuple[str, str], Expression]:

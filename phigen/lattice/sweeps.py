@@ -10,7 +10,7 @@ from typing import Any
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfit_error, misfits
+from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfits, since_of, told_at
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.damping import TogetherError
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
@@ -63,6 +63,7 @@ class SplittingPlan:
     parts: CellSplitting
     choice: Choice
     noise: tuple[CellFlow, ...] = ()
+    since: str = ""  # why there are more colours than the fewest
 
     @property
     def order(self) -> Order:
@@ -134,7 +135,7 @@ def _plan_splitting(
     cell: Cell, host: Host, order: int, composition: str, spec: Spec | None, scheme: str
 ) -> SplittingPlan:
     search = GraphSearch if cell.relation == GRAPH else PartSearch
-    parts, forced = _coloured(cell, search, host, spec, scheme)
+    parts, forced, since = _coloured(cell, search, host, spec, scheme)
     noise = tuple(noise_flows(cell, parts.colouring, search, host))
     flows = (*parts.flows, *forced)
     choice = planned(host, Splitting(flows), order, composition, lambda: () if cell.forces else _kicks(cell, parts))
@@ -144,13 +145,13 @@ def _plan_splitting(
         raise SpecError([Diagnostic(message, host.locations.get(("noise",)), "scheme: series takes it")])
     if cell.time:  # the flows of colours follow each other in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
-    return SplittingPlan(parts, choice, noise)
+    return SplittingPlan(parts, choice, noise, since)
 
 
 def _coloured(
     cell: Cell, search: type[PartSearch], host: Host, spec: Spec | None, scheme: str
-) -> tuple[CellSplitting, tuple[CellFlow, ...]]:
-    """The parts of H and of the forces, by the fewest colours such as all runs have sizes for.
+) -> tuple[CellSplitting, tuple[CellFlow, ...], str]:
+    """The parts of H and of the forces, by the fewest colours such as all runs have sizes for, and why not by fewer.
 
     Where there are none, the scheme ``splitting`` has the fewest of all, with which the runs are refused.
     """
@@ -165,15 +166,15 @@ def _coloured(
             continue
         wrong = misfits(spec, cell, parts.colouring.periods(cell.boundary)) if spec else []
         if not wrong:
-            return made
+            return *made, since_of(misfit, best[0].colouring.count) if best else ""
         best, misfit = best or made, misfit or wrong
     if best is None:
         assert refused is not None
         raise refused
     if scheme == "auto":
         assert spec is not None  # else nothing misfits
-        raise misfit_error(spec, misfit)
-    return best
+        raise MisfitError(told_at(spec, misfit), since_of(misfit, best[0].colouring.count))
+    return *best, ""
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:

@@ -40,18 +40,33 @@ def test_a_run_keeps_what_it_should(phigen, chain, tmp_path):
     assert [p.name for p in tmp_path.iterdir() if "chain" not in p.name] == ["wave.npz"]
 
 
-def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
-    ring, brackets = tmp_path / "ring.yaml", ", ".join(f'"a[i+{k}]": "a*a[i+{k}]"' for k in (1, 2, 4))
-    ring.write_text(
+def ring(offsets, size):
+    """A ring whose bracket couples sites so far apart."""
+    brackets = ", ".join(f'"a[i+{k}]": "a*a[i+{k}]"' for k in offsets)
+    return (
         f"phigen: 1\nname: ring\nlattice: {{axes: [i]}}\ncoordinates: [a]\nhamiltonian: a\n"
         f"poisson: {{brackets: {{a: {{{brackets}}}}}}}\n"
-        "runs: {r: {sizes: [5], initial: {a: 1}, step: 0.1, steps: 1}}\n", encoding="utf-8"
-    )  # fmt: skip
+        f"runs: {{r: {{sizes: [{size}], initial: {{a: 1}}, step: 0.1, steps: 1}}}}\n"
+    )
+
+
+def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
+    spec = tmp_path / "ring.yaml"
+    spec.write_text(ring([1, 2, 4], 5), encoding="utf-8")
     # 3 is a multiple of 3 too, but smaller than the stencil
-    said = ": the series, since 5 along i is no multiple of 3, as the colours of a splitting need; 6 would do\n"
-    assert f"Bi-realisation (constant in logarithms){said}" in phigen("check", ring).stdout
-    assert f"order 4, target numpy{said}" in phigen("run", ring, "-t", "numpy").stdout
-    assert "series" not in phigen("run", ring, "-t", "numpy", "--sizes", "6").stdout
+    said = ": the series, since 5 along i is no multiple of 3, as a splitting with 3 colours needs; 6 would do\n"
+    assert f"Bi-realisation (constant in logarithms){said}" in phigen("check", spec).stdout
+    assert f"order 4, target numpy{said}" in phigen("run", spec, "-t", "numpy").stdout
+    assert "since" not in phigen("run", spec, "-t", "numpy", "--sizes", "6").stdout
+
+
+def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours(phigen, tmp_path):
+    spec = tmp_path / "ring.yaml"
+    spec.write_text(ring([1], 9), encoding="utf-8")
+    said = (
+        "Splitting: 3 colours, since 9 along i is no multiple of 2, as a splitting with 2 colours needs; 8 would do\n"
+    )
+    assert said in phigen("check", spec).stdout
 
 
 def test_a_run_is_drawn_over_space_and_time(phigen, chain, tmp_path):

@@ -542,7 +542,7 @@ def test_odd_sizes_do_not_fit_two_colours() -> None:
         (
             [8, 9],
             "auto",
-            "scheme: series, since 9 along i is no multiple of 2, as the colours of a splitting need; 8 would do",
+            "scheme: series, since 9 along i is no multiple of 2, as a splitting with 2 colours needs; 8 would do",
         ),
         ([9], "splitting", "sites of 3 colours"),
     ],
