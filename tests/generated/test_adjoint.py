@@ -283,29 +283,32 @@ def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypat
         assert bars == pytest.approx(together.parameters_bar[name], rel=1e-10, abs=1e-13)
 
 
-#: Members that are pulled back in lanes, which cannot do a state, or a step, that is so many times as large: arguments
-#: of functions are beyond the short ways, Newton's method or expansions fail.
-OUT_OF_REACH = {
-    "splitting": (40, 1),
-    "explicit": (1e7, 1),
-    "newton, gauge": (1, 35),
-    "path": (1, 15),
-    "newton, composed": (1, 1),  # all are in reach
-    "newton, monitor": (1, 1),
+#: Members that are pulled back in lanes. Of one the state, or the step, is so many times as large: in splittings all in
+#: lanes take the ways that are for large arguments then; the others cannot do it (functions have no values, Newton's
+#: method or expansions fail), but of a composition.
+FAR = {
+    "splitting": (40, 1, True),
+    "kicks": (1, 1, True),  # all, after some steps
+    "explicit": (1e7, 1, False),
+    "newton, gauge": (1, 35, False),
+    "path": (1, 15, False),
+    "newton, composed": (1, 9, True),
+    "newton, monitor": (1, 1, True),
 }
 
 #: Specs of those that are not in `KINDS`.
 FURTHER = {
     "splitting": f"{TOP}order: 4\n",
+    "kicks": f"{SWING}order: 6\n",
     "explicit": f"{SWING}birealisation: {{kind: canonical-euler, side: q}}\norder: 1\n",
 }
 
 
-@pytest.mark.parametrize("kind", OUT_OF_REACH)
+@pytest.mark.parametrize("kind", FAR)
 def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     """As each is alone: with rows, and numbers of its own, splittings in segments; one that lanes cannot do to the last
     bit, since it is done by itself. The last group is not full."""
-    text, scheme = FURTHER.get(kind), "splitting" if kind == "splitting" else None
+    text, scheme = FURTHER.get(kind), "splitting" if kind in ("splitting", "kicks") else None
     head = "phigen: 1\nname: t\nadjoint: true\n"
     compiled = compile_spec(spec.loads(head + text), scheme=scheme) if text else compilation(kind)
     assert "t_pull_group(" in files(compiled, "c")["t.c"]
@@ -313,19 +316,15 @@ def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 43, 5
     first = np.array([0.4, 0.9, 0.3][: compiled.program.dimension])
     many, h = first + 0.1 * rng.random((count, len(first))), H * (1 + 0.1 * rng.random(count))
-    many[far] *= OUT_OF_REACH[kind][0]
-    h[far] *= OUT_OF_REACH[kind][1]
+    wider, longer, in_reach = FAR[kind]
+    many[far], h[far] = wider * many[far], longer * h[far]
     own = {name: value * (1 + 0.1 * rng.random(count)) for name, value in made.interface.parameters.items()}
     bar = rng.normal(size=(4, *many.shape))
     one, two = (made.pullback(many, h, 23, bar, 9, threads=n, parameters=own) for n in (1, 2))
     assert np.array_equal(one.x0_bar, two.x0_bar)
     for m in range(count):
         alone = made.pullback(many[m], h[m], 23, bar[:, m], 9, parameters={k: v[m] for k, v in own.items()})
-        near = (
-            0
-            if m == far and OUT_OF_REACH[kind] != (1, 1)
-            else 1e-13 * np.max(np.abs([*alone.x0_bar, *alone.parameters_bar.values()]))
-        )
+        near = 1e-13 * np.max(np.abs([*alone.x0_bar, *alone.parameters_bar.values()])) * (m != far or in_reach)
         assert np.max(np.abs(one.x1[:, m] - alone.x1)) <= near
         assert np.max(np.abs(one.x0_bar[m] - alone.x0_bar)) <= near
         assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in own) <= near

@@ -74,7 +74,9 @@ def printed(program: Program, lanes: Lanes) -> list[str]:
 def printed_back(program: Program, packs: Packs) -> str:
     """The transposes of the flows of packs."""
     assert isinstance(program.step, Splitting)
-    return "\n".join(splitting.adjoint_in_lanes(program, program.step, packs.back, _short(program)))
+    return "\n".join(
+        splitting.adjoint_in_lanes(program, program.step, packs.back, _short(program), lane_calls(program))
+    )
 
 
 def _short(program: Program) -> dict[str, str]:

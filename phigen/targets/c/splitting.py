@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from phigen.lanes.functions import NEAR_FUNCTIONS, operations
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Splitting
@@ -79,12 +80,22 @@ def adjoint(program: Program, step: Splitting, adjoint: Adjoint) -> str:
 
 
 def adjoint_in_lanes(
-    program: Program, step: Splitting, back: Sequence[Kernel], functions: Mapping[str, str]
+    program: Program, step: Splitting, back: Sequence[Kernel], near: Mapping[str, str], far: Mapping[str, str]
 ) -> list[str]:
-    """Those of members of packs, which call ``functions``."""
+    """Those of members of packs, which call the functions ``near``; where that makes a difference, also by those that
+    are for large arguments, ``far``."""
     kernels, own = _transposed(program, step, back)
-    found = [function(program, kernel, lanes=True, functions=functions) for kernel in kernels]
+    found = []
+    for kernel in kernels:
+        found.append(function(program, kernel, lanes=True, functions=near))
+        if reaches_far(kernel):
+            found.append(function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far))
     return [*found, render("c", "adjoint_flows_lanes.c", own)]
+
+
+def reaches_far(kernel: Kernel) -> bool:
+    """Whether there is another way in lanes to compute a kernel where arguments are large."""
+    return not operations([kernel]).isdisjoint(NEAR_FUNCTIONS)
 
 
 def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], dict[str, object]]:
@@ -97,7 +108,8 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
         ]
         kernels.append(replace(kernel, outputs=tuple(outputs)))
         label = f"case {k}" if k < len(back) else "default"
-        parts.append((label, k, *(list(enumerate(i_s)) for i_s in reached)))
+        far = reaches_far(step.flows[k - 1]), reaches_far(kernels[-1])
+        parts.append((label, k, *far, *(list(enumerate(i_s)) for i_s in reached)))
     return kernels, {"NAME": program.name, "n": program.dimension, "row": max(1, step.row), "parts": parts}
 
 

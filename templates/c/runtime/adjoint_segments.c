@@ -9,7 +9,24 @@
    each flow of a segment are made again, and stay near. */
 #include "adjoint_flows_lanes.h"
 
+#if PHI_FAR
+/* Whether all values are finite. */
+static int phi_pull_finite(const phi_group *group)
+{
+    phi_lanes sum = { 0.0 };
+    for (int k = 0; k < group->packs; ++k)
+        for (int i = 0; i < PHI_DIM; ++i) {
+            PHI_EACH_LANE
+            for (int lane = 0; lane < PHI_LANES; ++lane) sum[lane] += 0.0 * group->pack[k].x[i][lane];
+        }
+    return phi_finite(sum, PHI_LANES);
+}
+
+/* Make all steps, and leave where segments begin, but for the first. Where values are not finite, begin once more, by ways
+   that are for larger arguments of functions. */
+#else
 /* Make all steps, and leave where segments begin, but for the first. */
+#endif
 static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, size_t first, phi_back_group *bar)
 {
     double *trail = all->trail;
@@ -23,7 +40,19 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
             memcpy(trail + PHI_DIM * PHI_LANES, group->pack[k].carry, sizeof group->pack[k].carry);
             trail += 2 * PHI_DIM * PHI_LANES;
         }
+#if PHI_FAR
+        if (group->far) phi_steps_far_lanes(group, (int)until);
+        else phi_steps_lanes(1, group, (int)until);
+        if (!group->far && !phi_pull_finite(group)) {
+            memcpy(group->pack, bar->start, sizeof bar->start);
+            trail = all->trail;
+            done = 0;
+            group->far = 1;
+            continue;
+        }
+#else
         phi_steps_lanes(1, group, (int)until);
+#endif
         done += until;
         phi_pull_rows(group, count, all, first, done);
     }
