@@ -13,15 +13,16 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
 {
     const phi_transpose *g = flow->g;
 #if PHI_HANDS
+    if (flow->go > 1) {
 #if PHI_GATHER
-    if (flow->go > 1) phi_hand_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+        phi_hand_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
 #else
-    if (flow->go > 1) phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
+        phi_hand_rows(s, flow->part, s->x, flow->bar, g->handed, first, end);
 #endif
-    else phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
-#else
+        return;
+    }
+#endif
     phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
-#endif
 }
 
 /* Go back through some flows, the last first; all threads come here at once. */
