@@ -8,6 +8,17 @@
 
 /* ---- The transpose of sweeps ---- */
 #if PHI_SHARES
+#if !PHI_SWEPT
+/* Before a loop over eight sites, whose sums are in lanes: compilers may not write it out and make vectors of the loop around it. */
+#if defined(__clang__)
+#define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
+#elif defined(__GNUC__)
+#define PHI_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
+#else
+#define PHI_EACH_LANE
+#endif
+
+#endif
 /* The sum of all lanes, which are changed. */
 static inline double phi_total(double lanes[8])
 {

@@ -167,7 +167,7 @@ def _in_vectors(
 
     lines = [f"double {', '.join(f'share{k}[8] = {{ 0.0 }}' for k in range(len(shares)))};"]
     lines.append("const ptrdiff_t to = row->to, whole = to - (to - row->from) % 8;")
-    lines += ["for (ptrdiff_t j = row->from; j < whole; j += 8) {", f"    {name}_EACH_SITE"]
+    lines += ["for (ptrdiff_t j = row->from; j < whole; j += 8) {", f"    {name}_EACH_LANE"]
     lines += ["    for (ptrdiff_t l = 0; l < 8; ++l) {", "        const ptrdiff_t i = j + l;"]
     lines += [*(f"        {line}" for line in added("l")), "    }", "}"]
     lines += ["for (ptrdiff_t i = whole; i < to; ++i) {", *(f"    {line}" for line in added("0")), "}"]
