@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import groupby
 
 from phigen.lanes.functions import NEAR_FUNCTIONS, operations
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Splitting
+from phigen.symbolic.expression import symbols_of
 from phigen.targets.c.functions import FLOW_FUNCTIONS
 from phigen.targets.c.kernels import FUNCTIONS, function
 from phigen.targets.rendering import render
@@ -90,6 +92,7 @@ def adjoint_in_lanes(
         found.append(function(program, kernel, lanes=True, functions=near))
         if reaches_far(kernel):
             found.append(function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far))
+    own["linear"] = not any(_read(kernel) for kernel in kernels)
     return [*found, render("c", "adjoint_flows_lanes.c", own)]
 
 
@@ -109,8 +112,16 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
         kernels.append(replace(kernel, outputs=tuple(outputs)))
         label = f"case {k}" if k < len(back) else "default"
         far = reaches_far(step.flows[k - 1]), reaches_far(kernels[-1])
-        parts.append((label, k, *far, *(list(enumerate(i_s)) for i_s in reached)))
+        parts.append((label, k, *far, *(list(enumerate(i_s)) for i_s in reached), _read(kernels[-1])))
     return kernels, {"NAME": program.name, "n": program.dimension, "row": max(1, step.row), "parts": parts}
+
+
+def _read(kernel: Kernel) -> list[tuple[int, int]]:
+    """Which coordinates of the state a kernel reads, in runs: the first, and how many."""
+    used = {s for e in kernel.roots for s in symbols_of(e)}
+    places = [i for i, s in enumerate(kernel.inputs["state"]) if s in used]
+    runs = groupby(places, key=lambda i: i - places.index(i))
+    return [(of[0], len(of)) for _, found in runs for of in [list(found)]]
 
 
 def _along(program: Program) -> int:

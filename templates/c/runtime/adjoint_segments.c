@@ -59,15 +59,13 @@ static int phi_pull_forth(phi_group *group, int count, const phi_pulled *all, si
     return 1;
 }
 
-/* Make steps once more, and keep the states before each flow. */
+/* Make steps once more, and keep what is needed of the states before each flow. */
 static void phi_pull_again(phi_group *group, int steps, phi_back_group *bar)
 {
     for (int step = 0; step < steps; ++step) {
         phi_begin_lanes(group);
-        for (int flow = 0; flow < PHI_FLOWS; ++flow) {
-            for (int k = 0; k < group->packs; ++k) memcpy(bar->kept[step][flow][k], group->pack[k].x, sizeof group->pack[k].x);
-            phi_follow_lanes(phi_flow_part[flow], phi_flow_row[flow], group);
-        }
+        for (int flow = 0; flow < PHI_FLOWS; ++flow)
+            phi_follow_lanes(phi_flow_part[flow], phi_flow_row[flow], group, bar->kept[step][flow]);
         phi_end_lanes(group);
     }
 }

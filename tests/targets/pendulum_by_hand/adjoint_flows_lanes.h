@@ -2,9 +2,10 @@
 #define ADJOINT_FLOWS_LANES_H
 #include "packs.c"
 
-static void phi_follow_lanes(int part, int row, phi_group *group)
+static void phi_follow_lanes(int part, int row, phi_group *group, phi_lanes kept[PHI_BACK_PACKS][2])
 {
     for (int k = 0; k < group->packs; ++k) {
+        memcpy(kept[k], group->pack[k].x, sizeof group->pack[k].x);
         phi_pack *at = &group->pack[k];
         phi_lanes change, *coef = group->coef[k] + row * PHI_ROW;
         const int kick = part == 2;
