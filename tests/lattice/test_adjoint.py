@@ -77,9 +77,19 @@ coordinates: [q, p, r, s]
 parameters: {own0: 0.7, first: {value: 1, at: sites}}
 poisson: {canonical: {q: [q, r], p: [p, s]}}
 hamiltonian:
-  sites: (p**2 + s**2)/2 + q**2
+  sites: (p**2 + s**2)/2 + cos(q)
   pairs: own0*(cos(q[a] - q[b]) + first[a]*first[b]*sin(r[a] + r[b]))/4
 """
+#: Forces of bonds that are found once more while these go back, with parameters that have the direction of bonds.
+SPRINGS = """phigen: 1
+name: springs
+lattice: {graph: bonds}
+coordinates: [q, p]
+parameters: {k: {value: 1, at: bonds}, d: {value: 0.1, at: bonds}, c: 0.3}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: {sites: p**2/2 + c*q**4, bonds: "c*k*(q[b] - q[a] - d)**2/2"}
+"""
+LATTICES["springs fast"] = RING | {"k": 0.4 + np.arange(7) / 9, "d": np.arange(7) / 20, "c": 0.4}
 LATTICES["named fast"] = {"l": 0.3 + np.arange(SITES) / 5, "whole": 1.2, "j": 0.4}
 #: Colours, disorder at bonds and sites, and coefficients of bonds that depend on the time.
 DRIVEN_GRAPH = """phigen: 1
@@ -112,6 +122,7 @@ OWN = {
     "named": NAMED,
     "membrane": MEMBRANE,
     "paired": PAIRED,
+    "springs": SPRINGS,
     "mixed": PAIRED.replace("paired", "mixed").replace("sin(r[a] + r[b])", "r[a]*r[b]"),
     "far_open": SPECS["far_open"],
     "spin_graph": SPECS["spin_graph"],
@@ -133,6 +144,7 @@ IN_C |= {
     "point_vortices": SITES,
     "paired fast": 11,
     "mixed series": 11,
+    "springs fast": SITES,
 }
 SLOW = ("volterra", "far_open series")
 
