@@ -75,6 +75,7 @@ name: paired
 lattice: {pairs: all}
 coordinates: [q, p, r, s]
 parameters: {own0: 0.7, first: {value: 1, at: sites}}
+order: 2
 poisson: {canonical: {q: [q, r], p: [p, s]}}
 hamiltonian:
   sites: (p**2 + s**2)/2 + cos(q)
@@ -88,6 +89,16 @@ coordinates: [q, p]
 parameters: {k: {value: 1, at: bonds}, d: {value: 0.1, at: bonds}, c: 0.3}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: {sites: p**2/2 + c*q**4, bonds: "c*k*(q[b] - q[a] - d)**2/2"}
+"""
+#: Rotations about what pairs add up, whose cotangents read that; and which read the spins of the others only.
+MEAN_FIELD = """phigen: 1
+name: mean_field
+lattice: {pairs: all}
+coordinates: [x, y, z]
+parameters: {J: 0.3, B: {value: 1, at: sites}}
+order: 2
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: {sites: B*z, pairs: "J*(x[a]*x[b] + y[a]*y[b] + z[a]*z[b]/2)"}
 """
 LATTICES["springs fast"] = RING | {"k": 0.4 + np.arange(7) / 9, "d": np.arange(7) / 20, "c": 0.4}
 LATTICES["named fast"] = {"l": 0.3 + np.arange(SITES) / 5, "whole": 1.2, "j": 0.4}
@@ -123,6 +134,7 @@ OWN = {
     "membrane": MEMBRANE,
     "paired": PAIRED,
     "springs": SPRINGS,
+    "mean_field": MEAN_FIELD,
     "mixed": PAIRED.replace("paired", "mixed").replace("sin(r[a] + r[b])", "r[a]*r[b]"),
     "far_open": SPECS["far_open"],
     "spin_graph": SPECS["spin_graph"],
@@ -145,6 +157,7 @@ IN_C |= {
     "paired fast": 11,
     "mixed series": 11,
     "springs fast": SITES,
+    "mean_field": 11,
 }
 SLOW = ("volterra", "far_open series")
 

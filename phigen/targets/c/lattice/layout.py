@@ -139,7 +139,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
         "UNDONE": can_be_undone(program, step),
-        "APART": (program.profile == "small" or step.sites.colours > 1) and shares(step, at_pairs=False),
+        "APART": (program.profile == "small" or step.sites.colours > 1) and shares(step),
         "GIVERS": step.adjoint is not None and givers(step),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
@@ -192,11 +192,10 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
     return found
 
 
-def shares(step: Sweeps, *, at_pairs: bool = True) -> bool:
-    """Whether sites, or pairs, have shares in sums over all of them: the cotangents of coefficients, or parameters."""
+def shares(step: Sweeps) -> bool:
+    """Whether loops over sites have shares in sums over all of them: the cotangents of coefficients, or parameters."""
     kernels = step.adjoint.steps if step.adjoint else ()
-    if step.partners and (step.partners.graph or not at_pairs):
-        kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
+    kernels = tuple(kernel for kernel in kernels if "sums_bar" not in kernel.inputs)
     summed = [kernel.along(array) for kernel in kernels for array in (TABLE, "params") if array in kernel.inputs]
     return any(not e.is_zero for along in summed for _, e in along)
 

@@ -20,7 +20,7 @@ from phigen.targets.reserved import C_RESERVED
 #: What the loops call their own.
 _OWN = frozenset(
     {"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole"}
-    | {"at_bonds", "sign", "across", "first"}
+    | {"at_bonds", "sign", "across", "first", "left", "count"}
 )
 
 

@@ -25,6 +25,9 @@ from phigen.targets.code import Store, lower
 _OPPOSITE = {"": "", "a": "b", "b": "a"}
 _CHOSEN = {"": "", "here": "there", "there": "here"}
 
+#: Sites that get at once what pairs give them.
+_AT_ONCE = 32
+
 #: Cotangents that all sites add up, and others.
 _SUMS, _OF_ARRAYS = ("coef_bar", "params_bar"), ("site_bar", "bonds_bar")
 
@@ -152,21 +155,25 @@ def _over_pairs(
     other: Sequence[str],
     values: Sequence[str],
 ) -> str:
-    """Loops over all sites for eight of a piece at a time, whose sums stay in registers.
+    """Loops over all sites for some of a piece at a time, as many as make additions to their sums independent.
 
-    What a pair adds is found for all sums before any of it is added, or gcc would not vectorise the loop."""
+    They are whole vectors of 8: rows have room for them. What a pair adds is found for all sums before any of it is
+    added, or gcc would not vectorise the loop."""
     shares = [k for k, s in enumerate(stores) if s.array in _SUMS]
     inner = ["const ptrdiff_t i = first + l;", *own, *values]
     inner += [f"const double add{k} = i == j ? 0.0 : {value};" for k, value in enumerate(shown)]
     inner += [f"own{k}[l] += add{k};" for k in range(len(stores))]
-    lines = [*head, *(f"double share{k}[8] = {{ 0.0 }};" for k in shares)]
-    lines += ["for (ptrdiff_t first = row->from, to = row->to; first < to; first += 8) {"]
-    lines.append(f"    double {', '.join(f'own{k}[8] = {{ 0.0 }}' for k in range(len(stores)))};")
-    lines += ["    for (ptrdiff_t j = 0; j < row->s->length; ++j) {", *(f"        {line}" for line in other)]
-    lines += [f"        {name}_EACH_SITE", "        for (ptrdiff_t l = 0; l < 8; ++l) {"]
-    lines += [*(f"            {line}" for line in inner), "        }", "    }"]
-    lines.append("    for (ptrdiff_t l = 0; l < 8 && first + l < to; ++l) { /* beyond are numbers, but no sites */")
-    into = [_into(s, bars.get(k), f"share{k}[l]", "first + l") for k, s in enumerate(stores)]
-    lines += [f"        {place} own{k}[l];" for k, place in enumerate(into)]
-    lines += ["    }", "}", *(f"sums[{stores[k].index}] += {name}_total(share{k});" for k in shares)]
+    sums = [f"own{k}[{_AT_ONCE}]" for k in range(len(stores))]
+    body = [f"const ptrdiff_t left = to - first < {_AT_ONCE} ? to - first : {_AT_ONCE}, count = (left + 7) / 8 * 8;"]
+    body += [f"double {', '.join(sums)};", "for (ptrdiff_t l = 0; l < count; ++l) {"]
+    body += [*(f"    own{k}[l] = 0.0;" for k in range(len(stores))), "}"]
+    body += ["for (ptrdiff_t j = 0; j < row->s->length; ++j) {", *(f"    {line}" for line in other)]
+    body += [f"    {name}_EACH_SITE", "    for (ptrdiff_t l = 0; l < count; ++l) {"]
+    body += [*(f"        {line}" for line in inner), "    }", "}"]
+    body.append("for (ptrdiff_t l = 0; l < left; ++l) { /* beyond are numbers, but no sites */")
+    into = [_into(s, bars.get(k), f"share{k}", "first + l") for k, s in enumerate(stores)]
+    body += [*(f"    {place} own{k}[l];" for k, place in enumerate(into)), "}"]
+    lines = [*head, *(f"double share{k} = 0.0;" for k in shares)]
+    lines += [f"for (ptrdiff_t first = row->from, to = row->to; first < to; first += {_AT_ONCE}) {{"]
+    lines += [*(f"    {line}" for line in body), "}", *(f"sums[{stores[k].index}] += share{k};" for k in shares)]
     return "".join(f"    {line}\n" for line in lines)
