@@ -86,10 +86,12 @@ def solve_ivp(
     a monitor); without it they are halved until the last state changes by less than atol + rtol |y|. States between
     steps, at ``t_eval``, of ``sol`` and at ``events``, are those of further steps, on the leaf, not interpolated. A
     step that fails, and tolerances that are not reached, as by chaotic motion over long times, are told by ``status``.
+    Raises `TypeError` for systems with noise: steps of other sizes are not on the same path.
     """
     solver = system if isinstance(system, Solver) else _compiled(system, target, order)
     for name in sorted(_SCIPY.keys() & more.keys() - {*solver.interface.parameters}):
         raise TypeError(f"solve_ivp has no {name!r} here: {_SCIPY[name]}")
+    arguments.expect_no_noise("solve_ivp", solver.interface)
     begin, end = map(float, t_span)
     if not (math.isfinite(begin) and math.isfinite(end)) or begin == end:
         raise ValueError(f"t_span must be two different numbers, not {t_span!r}")

@@ -19,6 +19,9 @@ ROUNDING = 4e-16
 #: By how much distances of differences are shorter than usual.
 DISTANCES = (1.0, 256.0)
 
+#: How much of itself a coordinate is moved by to see what π feels of it.
+_SHARE = 1e-6
+
 #: Refinements of the step, as factors: pairs two apart halve the step.
 _REFINEMENTS = tuple(f * 2**k for k in range(9) for f in (4, 6))
 
@@ -66,10 +69,16 @@ def poisson_matrix(system: System, parameters: Mapping[str, float], x: Floats) -
 
 
 def poisson_defect(system: System, parameters: Mapping[str, float], method: Method, x: Floats, h: float) -> float:
-    """The largest entry of DΦ π DΦᵀ − π∘Φ, relative to |DΦ| |π| |DΦ|ᵀ; DΦ by differences if the code states none."""
-    tangent = method.tangent(x, h) if method.tangent else by_differences(method, x, h)
-    before, after = (poisson_matrix(system, parameters, state) for state in (x, method.step(x, h)))
-    size = float(np.max(np.abs(tangent) @ np.abs(before) @ np.abs(tangent).T))
+    """The largest entry of DΦ π DΦᵀ − π∘Φ, relative to |DΦ| |π| |DΦ|ᵀ; DΦ by differences if the code states none.
+
+    Where π nearly vanishes, as terms of it cancel, it is known to what rounding of the state leaves of it: there the
+    defect is relative to Σ |x_i ∂_i π|.
+    """
+    tangent, image = method.tangent(x, h) if method.tangent else by_differences(method, x, h), method.step(x, h)
+    before, after = (poisson_matrix(system, parameters, state) for state in (x, image))
+    moved = (poisson_matrix(system, parameters, image + _SHARE * part) for part in np.diag(image))
+    felt = sum((np.abs(there - after) for there in moved), np.zeros_like(after)) / _SHARE
+    size = max(float(np.max(np.abs(tangent) @ np.abs(before) @ np.abs(tangent).T)), float(np.max(felt)))
     return float(np.max(np.abs(tangent @ before @ tangent.T - after))) / (size or 1.0)
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.linalg import expm
 from support import COMMAND, compile_text, javascript, run, slow_but, solver, tool, write
 
+import phigen
 from phigen.compiler import emit, examine
 from phigen.errors import SpecError
 from phigen.report.live import gathered
@@ -470,6 +471,8 @@ def test_arguments_of_noise_are_checked():
         quiet.integrate([0, 0, 1], 0.1, 3, seed=1)
     with pytest.raises(TypeError, match="section is not offered with noise"):
         noisy.section([0, 0, 1], 0.1, 3, lambda x: x[:, 0])
+    with pytest.raises(TypeError, match="solve_ivp is not offered with noise"):
+        phigen.solve_ivp(noisy, (0, 1), [0, 0, 1], h=0.1)
 
 
 def test_states_at_times_are_those_after_whole_steps():

@@ -278,3 +278,16 @@ def test_derivatives_are_compared_near_a_singularity_too():
     assert measures.tangent_error(method, np.array([0.01, 0.0, 0.0, 14.1]), 1e-4) < 1e-8
     wrong = replace(method, tangent=lambda x, h: 1.00001 * method.tangent(x, h))
     assert measures.tangent_error(wrong, np.array([0.01, 0.0, 0.0, 14.1]), 1e-4) > 1e-6
+
+
+def test_a_bracket_that_nearly_vanishes_is_kept_to_the_rounding_of_the_state():
+    """Of {u, v} = v + u² rounding of u and v leaves 12 digits here; an error of the map is seen all the same."""
+    text = "coordinates: [u, v]\npoisson: {pullback: {of: {lie_algebra: {name: aff(1)}}, map: {y1: u, y2: v + u**2}}}\n"
+    text += "hamiltonian: (u**2 + v**2)/2 + v\norder: 2\ntangent: true\n"
+    compilation = compilation_of(f"phigen: 1\nname: t\n{text}")
+    method = of_solver(solver_of(compilation, "numpy"), {})
+    for v in np.linspace(-2.2649, -2.2640, 7):
+        near = np.array([1.505, v])
+        assert measures.poisson_defect(compilation.system, {}, method, near, 0.02) < 2e-15
+        wrong = replace(method, tangent=lambda x, h: (1 + 1e-8) * method.tangent(x, h))
+        assert measures.poisson_defect(compilation.system, {}, wrong, near, 0.02) > 1e-14
