@@ -224,3 +224,13 @@ def test_code_without_extras_is_the_same_whatever_was_compiled_before():
 def test_generated_c_has_no_warnings(name, compiler, tmp_path):
     write(tmp_path, files(with_tangent(name), "c"))
     run([tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)
+
+
+def test_splittings_that_turn_an_attitude_have_tangents_too():
+    """The derivative is that of the same steps without."""
+    text = f"{BODY}profile: small\nscheme: splitting\norder: 2\n"
+    found = [
+        solver(text_with_tangent(text + more), "c").step_tangent([0.4, 0.9, 0.3], 0.1)
+        for more in ("", "reconstruct: quaternion\n")
+    ]
+    assert np.array_equal(found[0][1], found[1][1])

@@ -36,7 +36,7 @@ def printed(program: Program, step: Splitting) -> str:
         found.append(render("c", "flow.c", {**values, "more": more}))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
-    passed = "x, moved, start" + ", element" * bool(program.attitude)
+    passed = _moves(bool(program.attitude))
     kept = f", double (*kept)[{program.dimension}]" if step.adjoint else ""
     found.append(_steps(program, step, "", "static inline ", arguments + more + kept, passed, kept=bool(kept)))
     return "\n".join(found)
@@ -57,8 +57,10 @@ def in_lanes(program: Program, step: Splitting, form: str, functions: Mapping[st
 
 def tangent(program: Program, step: Splitting) -> str:
     """The derivatives of the flows."""
-    count, flows = len(step.flows), step.schedule.flows
+    count, flows, turned = len(step.flows), step.schedule.flows, bool(program.attitude)
     own = {
+        "turned": turned,
+        "moves": _moves(turned),
         "NAME": program.name,
         "n": program.dimension,
         "along": _along(program),
@@ -122,6 +124,11 @@ def _read(kernel: Kernel) -> list[tuple[int, int]]:
     places = [i for i, s in enumerate(kernel.inputs["state"]) if s in used]
     runs = groupby(places, key=lambda i: i - places.index(i))
     return [(of[0], len(of)) for _, found in runs for of in [list(found)]]
+
+
+def _moves(turned: bool) -> str:
+    """What a flow moves, as its arguments."""
+    return "x, moved, start" + ", element" * turned
 
 
 def _along(program: Program) -> int:
