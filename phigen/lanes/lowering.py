@@ -169,7 +169,10 @@ def _rows(program: Program, step: Sweeps) -> Rows:
             along = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
             looped = [kernel for kernel in looped if kernel.name not in {*VARIED, *along}]
         return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
-    called = operations(swept) & _called_in_forms(step)
+    formed = _called_in_forms(step)
+    called = operations(swept) & formed
+    # transposes call the derivatives of functions where these are called, and arguments are as small
+    called |= {f for f in NEAR_FUNCTIONS if f in formed and f.removesuffix("1") in called}
     near = tuple(f for f in (*NEAR_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
     limited = frozenset({*near, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)
     return Rows(with_formulas(operations(looped)), near, limited)

@@ -100,6 +100,7 @@ _LISTED = (
         own=True,
         slopes=lambda call, f, a: (call("sin", a),),
         known=lambda call, a: 1 - call("cos", a),
+        parity="even",
         value=lambda library, a: 2 * library.sin(a / 2) ** 2,
         written=_languages(
             "(2.0 * sin(0.5 * ({0})) * sin(0.5 * ({0})))",

@@ -14,7 +14,12 @@ from support import precisely
 
 import phigen
 from phigen import SpecError, StepError
+from phigen.compiler import compile_spec
+from phigen.lanes.lowering import in_lanes
+from phigen.lattice.undoing import can_be_undone
+from phigen.resources import bundled
 from phigen.runtime import c_lattice
+from phigen.spec.model import Extras
 
 H, STEPS, SITES = 0.05, 4, 6
 RING = {"bonds": np.array([[i, (i + 1) % SITES] for i in range(SITES)] + [[0, 2]])}
@@ -145,6 +150,7 @@ OWN = {
 #: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
 IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES, "driven_graph": SITES, "rotors fast": SITES}
+IN_C["ablowitz_ladik fast"] = SITES
 IN_C |= {
     "membrane fast": (5, 6),
     "named fast": SITES,
@@ -324,6 +330,20 @@ def test_functions_go_back_by_what_is_for_small_arguments_or_for_any(name, scale
     x, bar = beginning(in_c) * [[1], [scale]], random.normal(size=(2, SITES))
     found, expected = (solver.pullback(x, H, STEPS, bar, parameters=LATTICES.get(name, {})) for solver in (in_c, numpy))
     assert found.x0_bar == pytest.approx(expected.x0_bar, rel=1e-12, abs=1e-12)
+
+
+def test_fields_before_sweeps_without_forces_are_found_again():
+    """So that they are not kept: rotations and scalings at each site, along bonds and of pairs, where nothing damps."""
+    for name in ("ablowitz_ladik", "volterra", "chiral_magnet", "food_web", "outer_planets", "driven"):
+        spec = phigen.spec.loads(OWN[name]) if name in OWN else phigen.spec.load(bundled()[name])
+        program = compile_spec(spec, extras=Extras(adjoint=True)).program
+        assert can_be_undone(program, program.step) == (name != "driven"), name
+
+
+def test_derivatives_that_transposes_call_have_the_short_way_of_their_functions():
+    spec = phigen.spec.load(bundled()["ablowitz_ladik"])
+    rows = in_lanes(compile_spec(spec, extras=Extras(adjoint=True), profile="fast").program)
+    assert {"sinroot", "sinroot1"} <= {*rows.near} == {*rows.limited}
 
 
 UNSTABLE = """phigen: 1
