@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -228,18 +229,17 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "pullback"):
             raise MissingExtraError("pullback")
-        of_step, count = int(self._c.trail_size()), len(members)
+        count, together = len(members), self._goes_back_together(members)
+        of_step = int(self._c.trail_size_each() if together else self._c.trail_size())
         pieces = segments(members.steps, members.stride, max(1, KEPT // of_step))
         room = of_step * max((s.count for s in pieces), default=1)
-        of_all = int(self._c.trail_size_each()) * members.steps if hasattr(self._c, "pullback_each") else KEPT + 1
-        together = of_all <= KEPT and (count > 1 or len(pieces) <= 1)
         rows, x0_bar, found = np.empty_like(bars), np.empty_like(members.x0), np.zeros((len(members.parameters), count))
         status = np.zeros(count, dtype=np.uint8)
 
         def make(part: slice) -> None:
-            trail = np.empty(max(1, of_all) if together else room, self._real)
+            trail = np.empty(room, self._real)
             if together:
-                own = self._all_pulled(members.part(part), bars[:, part], trail, status[part])
+                own = self._all_pulled(members.part(part), pieces, trail, bars[:, part], status[part])
                 rows[:, part], x0_bar[part], found[:, part] = own
                 return
             for m in range(count)[part]:
@@ -255,20 +255,46 @@ class CSolver:
             raise BackendError(status_name(int(status[m])), 0, members.x0, (m,))
         return rows, x0_bar, found
 
+    def _goes_back_together(self, members: Members) -> bool:
+        """Whether members are pulled back by one call for all: one for each segment of a long run, unless a segment
+        would have to begin at a time, or with a gauge, of the run."""
+        if not hasattr(self._c, "pullback_each"):
+            return False
+        held = self.interface.time or hasattr(self._c, "init_gauge")
+        return int(self._c.trail_size_each()) * members.steps <= KEPT or (len(members) > 1 and not held)
+
     def _all_pulled(
-        self, members: Members, bars: Floats, trail: Floats, status: Bytes
+        self, members: Members, pieces: Sequence[Segment], trail: Floats, bars: Floats, status: Bytes
     ) -> tuple[Floats, Floats, Floats]:
-        """`pullback` of some members by one call."""
-        count, rows = len(members), np.empty_like(bars)
-        packed, own, h = self._given(members)
-        x0, given = self._own(members.x0), self._own(bars[1:].transpose(1, 0, 2))
-        made, x0_bar, found = np.empty_like(given), np.empty_like(x0), np.zeros_like(packed)
-        out = made.ctypes.data, given.ctypes.data, x0_bar.ctypes.data, found.ctypes.data, trail.ctypes.data
-        start = packed.ctypes.data if members.parameters else None, x0.ctypes.data, count
-        more = (members.steps, max(1, members.stride), *out, status.ctypes.data)
-        self._c.pullback_each(*start, *(None if a is None else a.ctypes.data for a in own), h.ctypes.data, *more)
-        rows[0], rows[1:] = members.x0, made.transpose(1, 0, 2)
-        return rows, x0_bar + bars[0], found.T[: len(members.parameters)]
+        """`pullback` of some members, by one call for each piece of the run."""
+        rows, (packed, own, h) = np.empty_like(bars), self._given(members)
+        found, x_bar = np.zeros_like(packed), np.zeros_like(members.x0, dtype=self._real)
+        before = packed.ctypes.data if members.parameters else None
+        begun = self._begun(members, pieces, status)
+        for segment, x in zip(reversed(pieces), reversed(begun), strict=True):
+            if status.any():
+                break
+            ends = bars[segment.rows.start : segment.rows.stop] if segment.rows else np.zeros((1, *x.shape))
+            given = np.array(ends.transpose(1, 0, 2), dtype=self._real, order="C")
+            given[:, -1] += x_bar
+            made, x_bar = np.empty_like(given), np.empty_like(x)
+            out = (a.ctypes.data for a in (made, given, x_bar, found, trail, status))
+            start = before, x.ctypes.data, len(members), *(None if a is None else a.ctypes.data for a in own)
+            self._c.pullback_each(*start, h.ctypes.data, segment.count, max(1, segment.stride), *out)
+            if segment.rows:
+                rows[segment.rows.start : segment.rows.stop] = made.transpose(1, 0, 2)
+        rows[0] = members.x0
+        return rows, x_bar + bars[0], found.T[: len(members.parameters)]
+
+    def _begun(self, members: Members, pieces: Sequence[Segment], status: Bytes) -> list[Floats]:
+        """The states of members (members, DIM) where pieces of a run begin."""
+        begun = [self._own(members.x0)]
+        for segment in pieces[:-1]:
+            x = np.array(begun[-1].T, order="C")
+            if not status.any():
+                self._each(replace(members, steps=segment.count), x, status, None)
+            begun.append(self._own(x.T))
+        return begun[: len(pieces)]
 
     def _pulled(
         self,

@@ -307,7 +307,7 @@ FURTHER = {
 @pytest.mark.parametrize("kind", FAR)
 def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     """As each is alone: with rows, and numbers of its own, splittings in segments; one that lanes cannot do to the last
-    bit, since it is done by itself. The last group is not full."""
+    bit, since it is done by itself. The last group is not full. Long runs are those of segments."""
     text, scheme = FURTHER.get(kind), "splitting" if kind in ("splitting", "kicks") else None
     head = "phigen: 1\nname: t\nadjoint: true\n"
     compiled = compile_spec(spec.loads(head + text), scheme=scheme) if text else compilation(kind)
@@ -328,6 +328,11 @@ def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
         assert np.max(np.abs(one.x1[:, m] - alone.x1)) <= near
         assert np.max(np.abs(one.x0_bar[m] - alone.x0_bar)) <= near
         assert max(abs(one.parameters_bar[k][m] - alone.parameters_bar[k]) for k in own) <= near
+    monkeypatch.setattr(c_solver, "KEPT", 7 * int(made.backend._c.trail_size_each()))
+    cut, others = made.pullback(many, h, 23, bar, 9, threads=2, parameters=own), np.arange(count) != far
+    for whole, found in ((one.x0_bar, cut.x0_bar), *((one.parameters_bar[k], cut.parameters_bar[k]) for k in own)):
+        assert np.max(np.abs(whole - found)[others]) <= 1e-12 * np.max(np.abs(whole[others]))
+    assert cut.x1[:, others] == pytest.approx(one.x1[:, others], abs=1e-13)
 
 
 def test_jacobian_has_columns_for_state_and_parameters():
