@@ -58,7 +58,7 @@ class Turning:
 
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
-    """The same flows by the sines that their elements need in any case: those of half the angles for se(3)."""
+    """The same flows by the functions that their elements need in any case: those of half the angles."""
     turned = turnings(system, group, flows, put_back=put_back)
     return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turned, strict=True))
 
@@ -66,11 +66,13 @@ def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: 
 def _by_angles(system: System, group: Group, flow: Flow, turning: Turning) -> Flow:
     entries = [e for factor in factor_elements(system, group, turning) for e in factor]
     angles = {e.args[0] for e in topological(entries) if e.op == "sin"}
+    squares = {e.args[0] for e in topological(entries) if e.op == "cosroot"}
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
-        if e.op not in ("sin", "cos", "versin"):
-            return rebuild(e, args)
-        for angle in angles:
+        for square in squares if e.op in ("sinroot", "cosroot") else ():
+            if decide_zero("", [("", args[0] - 4 * square)], system.positive).verdict == PROVED:
+                return _of_square(e.op, square)
+        for angle in angles if e.op in ("sin", "cos", "versin") else ():
             for sign in (ONE, -ONE):
                 same = [("", args[0] - sign * (2 * angle if group.translation else angle))]
                 if decide_zero("", same, system.positive).verdict == PROVED:
@@ -86,6 +88,12 @@ def _of_angle(function: str, sign: Expression, angle: Expression, *, double: boo
     if double:
         sine, versine = 2 * (sine * (ONE - versine)), 2 * sine**2
     return sign * sine if function == "sin" else versine if function == "versin" else ONE - versine
+
+
+def _of_square(function: str, square: Expression) -> Expression:
+    """A function of the root of 4s by those of the root of s."""
+    sine = call("sinroot", square)
+    return sine * call("cosroot", square) if function == "sinroot" else ONE - 2 * (square * sine**2)
 
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:

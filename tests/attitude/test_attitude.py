@@ -20,6 +20,7 @@ from phigen.proofs.statements import ATTITUDE
 from phigen.runtime.crossings import CrossingFinder
 from phigen.runtime.march import march
 from phigen.runtime.solver import Solver
+from phigen.symbolic.expression import topological
 from phigen.symbolic.verdict import PROVED, REFUTED
 
 INERTIA = np.array([1.0, 2.0, 3.0])
@@ -38,6 +39,7 @@ hamiltonian: (P1**2/1 + P2**2/2 + P3**2/3)/2 + G1/3 + G3
 casimirs: {A: G1**2 + G2**2 + G3**2, B: P1*G1 + P2*G2 + P3*G3}
 reconstruct: quaternion
 """
+SYMMETRIC = TOP.replace("(P1**2/1 + P2**2/2 + P3**2/3)/2 + G1/3 + G3", "(P1**2 + P2**2)/2 + P3**2/3 + G3")
 
 
 def algebra(name, sign, n, *more):
@@ -57,6 +59,7 @@ CASES = {
     "momenta in space": algebra("so(3)", "plus", 3, "reconstruct: quaternion"),
     "momenta in space, split": algebra("so(3)", "plus", 3, "reconstruct: quaternion", "scheme: splitting"),
     "top": TOP,
+    "symmetric top, split": SYMMETRIC + "scheme: splitting\n",
     "top by Cayley": TOP + "birealisation: cayley\n",
     "top along paths": TOP + "birealisation: karasev\n",
     "motions, momenta in space": algebra("se(3)", "plus", 6, "reconstruct: quaternion", "scheme: series"),
@@ -125,6 +128,12 @@ def test_elements_leave_the_other_momentum_as_it_is_and_turn_as_h_says(case):
         assert [s.verdict for s in found].count(PROVED) >= 2
     else:
         assert [s.verdict for s in found] == [PROVED] * len(found)
+
+
+def test_a_flow_and_its_element_take_each_function_of_an_angle_once():
+    turned = made("symmetric top, split").program.attitude.turns[1]
+    taken = sorted(e.op for e in topological(turned.roots) if e.op in {"sin", "versin", "sinroot", "cosroot"})
+    assert taken == ["cosroot", "sin", "sinroot", "versin"]
 
 
 def altered(case, **changes):
@@ -280,6 +289,14 @@ def test_a_heavy_top_has_the_attitude_and_position_of_the_whole_motion(target):
     assert found.position.shape == (101, 3)
     assert np.abs(found.attitude[-1] - exact[6:10]).max() < 1e-11
     assert np.abs(found.position[-1] - exact[10:]).max() < 1e-11
+
+
+def test_a_split_symmetric_top_has_those_of_the_whole_motion():
+    x0 = np.array([0.3, -0.2, 1.0, 0.6, 0.0, 0.8])
+    exact = whole_motion(x0, lambda x: (x[:3] * [1, 1, 2 / 3], np.array([0, 0, 1])), 2.0)
+    found = solver("symmetric top, split", "numpy", 6).integrate(x0, 0.02, 100)
+    whole = np.concatenate([found.x[-1], found.attitude[-1], found.position[-1]])
+    assert np.abs(whole - exact).max() < 1e-9
 
 
 @pytest.mark.slow
