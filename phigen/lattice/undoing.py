@@ -14,10 +14,10 @@ from phigen.lattice.adjoint import BACK
 from phigen.lattice.collecting import collecting
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Sweep, Sweeps
-from phigen.symbolic.expression import Expression, fold, neg, rebuild, substitute, symbol, symbols_of
+from phigen.scheme.steps import Sites, Sweep, Sweeps
+from phigen.symbolic.expression import ONE, Expression, fold, neg, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.functions import FUNCTIONS
-from phigen.symbolic.symbols import coefficient
+from phigen.symbolic.symbols import PRESENT, Symbol, coefficient
 
 #: The output of a transpose that is the moved fields before the sweep, and the input of those that it reads for that.
 UNDONE = "undone"
@@ -41,11 +41,35 @@ def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
     undone = can_be_undone(program, step)
     found = []
     for part in step.parts if step.adjoint else ():
-        found.append([kernels[sweep.kernel.name + BACK] for sweep in part])
+        found.append([unweighted(step.sites, kernels[sweep.kernel.name + BACK]) for sweep in part])
         for k, sweep in enumerate(part if undone else ()):
             back = found[-1][k]
             found[-1][k] = undoing(program, step, sweep, collecting(program.coordinates, step, sweep, back) or back)
     return found
+
+
+def unweighted(sites: Sites, back: Kernel) -> Kernel:
+    """The transpose without weights of open ends in what it hands on, so that this is one value for many neighbours.
+
+    A neighbour that takes it is there, and so is the term, if that reaches no further."""
+
+    def handed(name: str, value: Expression) -> Expression:
+        offset = sites.places[name][1]
+        return _without_factors(value, offset) if any(offset) else value
+
+    values = tuple(handed(name, value) for name, value in back.along("site"))
+    return replace(back, outputs=tuple(replace(o, values=values) if o.name == "site_bar" else o for o in back.outputs))
+
+
+def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
+    """A product without the weights of terms that are there for every site that has a neighbour at an offset."""
+    if value.op in ("mul", "neg"):
+        return rebuild(value, [_without_factors(e, offset) for e in value.args])
+    if value.op != "symbol" or not isinstance(value.value, Symbol) or value.value.kind != PRESENT:
+        return value
+    ends = [int(k) for k in value.value.key]
+    pairs = zip(ends[::2], ends[1::2], offset, strict=True)
+    return ONE if all(low >= min(0, o) and high <= max(0, o) for low, high, o in pairs) else value
 
 
 def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kernel:
