@@ -302,22 +302,15 @@ static inline void phi_factor(const phi_solver *s PHI_AND_INT_STAGE, const doubl
 /* Two factors as one, in place of the first; all less 1. */
 static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_ELEMENT], double both[PHI_ELEMENT])
 {
-    double change[PHI_ELEMENT];
+    double whole[PHI_ELEMENT], change[PHI_ELEMENT];
+    memcpy(whole, first, sizeof whole);
 #if PHI_MATRICES
-    phi_added(first, second, change);
-#elif PHI_SPATIAL
-    phi_quaternion_product(second, first, change);
+    for (int i = 0; i < PHI_ELEMENT; i += PHI_ROWS_OF_ATTITUDE + 1) whole[i] += 1.0;
 #else
-    phi_quaternion_product(first, second, change);
+    whole[0] += 1.0;
 #endif
-#if PHI_POSITION && PHI_SPATIAL
-    const double q[4] = { 1.0 + second[0], second[1], second[2], second[3] };
-    phi_rotation(q, first + 4, change + 4);
-#elif PHI_POSITION
-    const double q[4] = { 1.0 + first[0], first[1], first[2], first[3] };
-    phi_rotation(q, second + 4, change + 4);
-#endif
-    for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = (first[i] + second[i]) + change[i];
+    phi_added(whole, second, change);
+    for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
 /* Multiply by the elements of the stages of a block in turn. */
