@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 0b66a5e4b861adadf904c6bc2b941100c68a229f10a42d64315f0308f458a537
+ * body-sha256: 58c9f78a672e407ee1db82626276ab0e7f3ddbd306926ac34ff35efcec180319
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -3193,7 +3193,7 @@ enum {
     kowalevski_top_GROUP = kowalevski_top_LANES, /* members, one in each lane */
     kowalevski_top_FEWEST = 3,                   /* fewer members are quicker one by one */
     /* steps that fits cost: of eight values at once, only one is foreseen */
-    kowalevski_top_GROUP_REPAY = 200 * kowalevski_top_DIM,
+    kowalevski_top_GROUP_REPAY = 5000 * kowalevski_top_DIM,
     /* steps until recurrences that did not help are fitted again */
     kowalevski_top_HOPELESS_WAIT = 100 * kowalevski_top_REPAY
 };

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 65fb457cf59badff51b574803e4d638a8684b0c51db5d322792e84da2393a444
+ * body-sha256: b262e4d2727ce435d2a7cd15979c524436ff6105c59c1d39265967c2033b8e03
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -1307,7 +1307,7 @@ enum {
     lotka_volterra_GROUP = lotka_volterra_LANES, /* members, one in each lane */
     lotka_volterra_FEWEST = 3,                   /* fewer members are quicker one by one */
     /* steps that fits cost: of eight values at once, only one is foreseen */
-    lotka_volterra_GROUP_REPAY = 200 * lotka_volterra_DIM,
+    lotka_volterra_GROUP_REPAY = 5000 * lotka_volterra_DIM,
     /* steps until recurrences that did not help are fitted again */
     lotka_volterra_HOPELESS_WAIT = 100 * lotka_volterra_REPAY
 };

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: ace95f5c66d63c8e553d701d507ea5364bcf19a02eb46ce5005203f6fab3465f
+ * body-sha256: 1f4d736aad41fdd13ed0acdc9d2f6531ca86794be99ec0609cdb9578c955cd13
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -2055,7 +2055,7 @@ enum {
     nambu_pendulum_GROUP = nambu_pendulum_LANES, /* members, one in each lane */
     nambu_pendulum_FEWEST = 3,                   /* fewer members are quicker one by one */
     /* steps that fits cost: of eight values at once, only one is foreseen */
-    nambu_pendulum_GROUP_REPAY = 200 * nambu_pendulum_DIM,
+    nambu_pendulum_GROUP_REPAY = 5000 * nambu_pendulum_DIM,
     /* steps until recurrences that did not help are fitted again */
     nambu_pendulum_HOPELESS_WAIT = 100 * nambu_pendulum_REPAY
 };

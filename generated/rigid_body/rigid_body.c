@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: b0fedd5e7388af0324f10338f05205645ea3c71edbc4062a89da2adf59ada961
+ * body-sha256: 935817d0f30e36aee11cdae2199ef2b6ebb488cb08084645e8d9b2dd9b95b46a
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -1679,7 +1679,7 @@ enum {
     rigid_body_GROUP = rigid_body_LANES, /* members, one in each lane */
     rigid_body_FEWEST = 3,               /* fewer members are quicker one by one */
     /* steps that fits cost: of eight values at once, only one is foreseen */
-    rigid_body_GROUP_REPAY = 200 * rigid_body_DIM,
+    rigid_body_GROUP_REPAY = 5000 * rigid_body_DIM,
     /* steps until recurrences that did not help are fitted again */
     rigid_body_HOPELESS_WAIT = 100 * rigid_body_REPAY
 };

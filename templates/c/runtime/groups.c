@@ -11,7 +11,7 @@
 enum {
     PHI_GROUP = PHI_LANES,              /* members, one in each lane */
     PHI_FEWEST = 3,                     /* fewer members are quicker one by one */
-    PHI_GROUP_REPAY = 200 * PHI_DIM,    /* steps that fits cost: of eight values at once, only one is foreseen */
+    PHI_GROUP_REPAY = 5000 * PHI_DIM,   /* steps that fits cost: of eight values at once, only one is foreseen */
     PHI_HOPELESS_WAIT = 100 * PHI_REPAY /* steps until recurrences that did not help are fitted again */
 };
 
