@@ -1,0 +1,77 @@
+"""Loops over lanes and sites become vector instructions: compilers tell which do, so that nothing need be timed."""
+
+import platform
+import re
+
+import pytest
+from support import run, spec_of, tool, write
+
+from phigen.compiler import compile_spec, emit
+from phigen.runtime import toolchain
+from phigen.spec.model import Extras
+
+pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="other processors have other vectors")
+
+#: As phigen compiles, with vectors of four numbers whatever the processor here has.
+FLAGS = ["-std=c99", "-O3", "-march=haswell", *toolchain.TUNING_FLAGS[1:]]
+BACK = Extras(adjoint=True)
+
+#: One for each kind of code in lanes: how it is compiled, and functions that do most of the work.
+CASES = {
+    "equations": ("rigid_body", {}, "evaluate_lanes linearise_lanes invert_lanes apply foresee group_foresee"),
+    "paths": ("nambu_pendulum", {}, "curvature_lanes momentum_lanes values_lanes along_mean_lanes follow add_terms"),
+    "explicit": ("pendulum_euler", {"extras": BACK}, "explicit_lanes explicit_adjoint_lanes stage_lanes gain_lanes"),
+    "flows": ("toda3", {"scheme": "splitting"}, "add_lanes change1_lanes change2_lanes change1_far_lanes settle_lanes"),
+    "flows back": (
+        "rigid_body", {"scheme": "splitting", "extras": BACK}, "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes"
+    ),
+    "sites": ("heisenberg", {}, "sweep1_near sweep1_far sweep2_near sweep3_far vector_field_row energy_row"),
+    "sites back": ("klein_gordon", {"extras": BACK}, "sweep1 sweep2 sweep1_back sweep2_back"),
+    "pairs": ("outer_planets", {}, "pair_forces sweep1 sweep2"),
+    "equations of sites": ("kdv", {}, "slope relax increment"),
+}  # fmt: skip
+
+
+#: Equations clang writes out lane by lane first, and finds the vectors in what stands there then.
+CLANG = [("clang", case) for case in ("explicit", "flows", "flows back", "sites back", "pairs")]
+
+
+@pytest.mark.parametrize(("compiler", "case"), [*(("gcc", case) for case in CASES), *CLANG])
+def test_loops_over_lanes_become_vectors(compiler, case, tmp_path):
+    name, asked, functions = CASES[case]
+    compilation = compile_spec(spec_of(name), profile="fast", **asked)
+    write(tmp_path, emit(compilation.program, "c", "phigen"))
+    marked = marked_loops((tmp_path / f"{name}.c").read_text(encoding="utf-8"))
+    assert {f"{name}_{function}" for function in functions.split()} - {*marked.values()} == set()
+    found = vectors(compiler, tmp_path / f"{name}.c")
+    assert {f"{function}, line {line}" for line, function in marked.items() if line not in found} == set()
+
+
+def marked_loops(code):
+    """The function of each line with a loop that compilers are told to make vectors of."""
+    found, function = {}, ""
+    lines = code.splitlines()
+    for number, line in enumerate(lines, 1):
+        if start := re.match(r"[a-z].*?\b(\w+)\((?!\*)", line):
+            function = start[1]
+        if re.fullmatch(r" +\w+_EACH_(LANE|SITE)", line):
+            assert lines[number].lstrip().startswith("for ("), lines[number]
+            found[number + 1] = function
+    return found
+
+
+#: How a compiler is asked to write into a file what it did with loops, and what it says of those that became vectors.
+ASKED = {
+    "gcc": (["-fopt-info-vec-optimized=told"], r"\.c:(\d+):\d+: optimized: loop vectorized"),
+    "clang": (
+        ["-fsave-optimization-record", "-foptimization-record-file=told"],
+        r"--- !Passed\nPass: +loop-vectorize\nName: +Vectorized\nDebugLoc: .*Line: (\d+)",
+    ),
+}
+
+
+def vectors(compiler, path):
+    """The lines of loops that the compiler makes vectors of."""
+    options, said = ASKED[compiler]
+    run([tool(compiler), *FLAGS, *options, "-c", path.name, "-o", "vectors.o"], path.parent)
+    return {int(line) for line in re.findall(said, (path.parent / "told").read_text(encoding="utf-8"))}
