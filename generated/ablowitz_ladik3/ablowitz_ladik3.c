@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: d6a2e127680c860dd51c776e4538bae8a3196ad4222478c145e0855dd652ea14
+ * body-sha256: 49e78af48781b3dfce76444f7dc700c30187358cd5ec79f9cf752b0c5cdb93c9
  */
 #include "ablowitz_ladik3.h"
 #include <float.h>
@@ -529,7 +529,10 @@ ablowitz_ladik3_status ablowitz_ladik3_init(ablowitz_ladik3_solver *s, const abl
 {
     if (s == NULL || x0 == NULL) return ablowitz_ladik3_BAD_ARGUMENT;
     if (params == NULL) params = &ablowitz_ladik3_default_params;
-    ablowitz_ladik3_solver fresh = { .h = (double)NAN, .params = *params };
+    ablowitz_ladik3_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!ablowitz_ladik3_finite(fresh.x, ablowitz_ladik3_DIM)) return ablowitz_ladik3_BAD_ARGUMENT;
     *s = fresh;

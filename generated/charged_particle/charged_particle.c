@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 79c27a97c89803823ba439c05a4e5c78503c26b2264be871187e36f94283d1a1
+ * body-sha256: f2b0f043e371499a9f8dcd5590baeb9b80691c154f7ff603eb7e9de1f9fb4739
  */
 #include "charged_particle.h"
 #include <float.h>
@@ -511,7 +511,10 @@ charged_particle_status charged_particle_init(charged_particle_solver *s,
 {
     if (s == NULL || x0 == NULL) return charged_particle_BAD_ARGUMENT;
     if (params == NULL) params = &charged_particle_default_params;
-    charged_particle_solver fresh = { .h = (double)NAN, .params = *params };
+    charged_particle_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!charged_particle_finite(fresh.x, charged_particle_DIM)) return charged_particle_BAD_ARGUMENT;
     *s = fresh;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: b6e06075a430b1ca59fdebd3422bdb912e7feef636bbde255a972d2651e3611a
+ * body-sha256: 476a761c719d9f0e4e9d43216757955796692ff3b27d5c21568428211046e67d
  */
 #include "cyclotron.h"
 #include <float.h>
@@ -272,7 +272,10 @@ cyclotron_status cyclotron_init(cyclotron_solver *s, const cyclotron_params *par
 {
     if (s == NULL || x0 == NULL) return cyclotron_BAD_ARGUMENT;
     if (params == NULL) params = &cyclotron_default_params;
-    cyclotron_solver fresh = { .h = (double)NAN, .params = *params };
+    cyclotron_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!cyclotron_finite(fresh.x, cyclotron_DIM)) return cyclotron_BAD_ARGUMENT;
     *s = fresh;

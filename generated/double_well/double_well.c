@@ -14,7 +14,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 9043ea77f0124518201a82db96e8c00de2d2c8c37056e94dd762f59c164657f0
+ * body-sha256: 1a2d029954a0aa1726b39f2816355e32c15b83f5bcdd5bce99798b0b9503ac8f
  */
 #include "double_well.h"
 #include <float.h>
@@ -334,7 +334,10 @@ double_well_status double_well_init(double_well_solver *s, const double_well_par
 {
     if (s == NULL || x0 == NULL) return double_well_BAD_ARGUMENT;
     if (params == NULL) params = &double_well_default_params;
-    double_well_solver fresh = { .h = (double)NAN, .params = *params };
+    double_well_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     double_well_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!double_well_finite(fresh.x, double_well_DIM) || !double_well_allowed(&fresh.params)

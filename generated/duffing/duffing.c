@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: f5020d215a81b20803afb0d01d4d0adeac5ac243cef2f740fa68b49e0f909188
+ * body-sha256: 5038b7d787c8cd099e77964568b6c437308a5fdc3eb2083b626ce1f10ae5c95f
  */
 #include "duffing.h"
 #include <float.h>
@@ -314,7 +314,10 @@ duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, 
 {
     if (s == NULL || x0 == NULL || !isfinite(t0)) return duffing_BAD_ARGUMENT;
     if (params == NULL) params = &duffing_default_params;
-    duffing_solver fresh = { .h = (double)NAN, .params = *params };
+    duffing_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     duffing_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 0013d65187f36011280815f41a62f988c1072ed732a9af1a334c1a1a01669d56
+ * body-sha256: ed5d531517aae24468aa8a223592f760fc697e7710110fdb51d3fcd867b58ecf
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -677,7 +677,10 @@ dzhanibekov_status dzhanibekov_init_gauge(dzhanibekov_solver *s, const dzhanibek
 {
     if (s == NULL || x0 == NULL) return dzhanibekov_BAD_ARGUMENT;
     if (params == NULL) params = &dzhanibekov_default_params;
-    dzhanibekov_solver fresh = { .h = (double)NAN, .params = *params };
+    dzhanibekov_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     dzhanibekov_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!dzhanibekov_finite(fresh.x, dzhanibekov_DIM) || !dzhanibekov_allowed(&fresh.params)
@@ -789,6 +792,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } dzhanibekov_members;
 
+static dzhanibekov_members dzhanibekov_asked(const dzhanibekov_params *params, double *x, size_t members,
+    const double *h, size_t steps, unsigned char *status)
+{
+    dzhanibekov_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static dzhanibekov_status dzhanibekov_begin_member(const dzhanibekov_members *all, size_t m,
     const double x[dzhanibekov_DIM], const double *gauge, dzhanibekov_solver *s)
@@ -888,18 +905,17 @@ dzhanibekov_status dzhanibekov_ensemble_attitudes(const dzhanibekov_params *para
     double *attitude, size_t members, const double *gauge, const double *h, size_t steps, size_t stride,
     double *frames, double *attitudes, unsigned char *status)
 {
-    dzhanibekov_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .attitude = attitude };
+    dzhanibekov_members all = dzhanibekov_asked(params, x, members, h, steps, status);
     dzhanibekov_status worst = dzhanibekov_OK;
     size_t earliest = members;
     if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return dzhanibekov_BAD_ARGUMENT;
     if ((frames != NULL || attitudes != NULL) && stride == 0) return dzhanibekov_BAD_ARGUMENT;
     all.gauge = gauge;
-    all.h = h;
+    all.own = 1;
     all.stride = frames != NULL || attitudes != NULL ? stride : 0;
     all.frames = frames;
+    all.attitude = attitude;
     all.attitudes = attitudes;
-    all.status = status;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic, 16)
 #endif

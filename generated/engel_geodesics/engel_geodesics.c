@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: ffc80a2d52c219e0039f918148b23a6e5674c223e2d8f97b90b1df35aebbbfb6
+ * body-sha256: 0d6e42dfa01a207154bcce26aef27b988e045d932a81be6c8abdae897ede823f
  */
 #include "engel_geodesics.h"
 #include <float.h>
@@ -301,7 +301,10 @@ engel_geodesics_status engel_geodesics_init(engel_geodesics_solver *s, const eng
 {
     if (s == NULL || x0 == NULL) return engel_geodesics_BAD_ARGUMENT;
     if (params == NULL) params = &engel_geodesics_default_params;
-    engel_geodesics_solver fresh = { .h = (double)NAN, .params = *params };
+    engel_geodesics_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!engel_geodesics_finite(fresh.x, engel_geodesics_DIM)) return engel_geodesics_BAD_ARGUMENT;
     *s = fresh;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 4aee5e77dc6748341157709348852463adfc33d8de7f1926bda2b5b0bda37b38
+ * body-sha256: 5f36887915674d2f134b8f4e63a73a9c0398e0402bb4f4664993e8c87d630a34
  */
 #include "fput.h"
 #include <float.h>
@@ -401,7 +401,7 @@ static size_t fput_depth(const fput_solver *s)
         room = slices / fput_THREADS / (2 * fput_SPAN);
     const size_t depth = held < room ? held : room;
     if (bytes <= fput_CACHE || depth < 2) return 1;
-    return depth < fput_DEEPEST ? depth : fput_DEEPEST;
+    return depth < fput_DEEPEST ? depth : (size_t)fput_DEEPEST;
 }
 
 static void fput_make_slices(const fput_solver *s, const fput_flow *flow, size_t from, size_t to)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: f06bafbe47aeccd6f8d970e5c8169a6ad7b70c070157f33c98914fceaa894a55
+ * body-sha256: 67343bb0237e930f8311d194c31e833bd225cbd9190f6ecac48f0b50f6e2725a
  */
 #include "gaussian_moments.h"
 #include <float.h>
@@ -376,7 +376,10 @@ gaussian_moments_status gaussian_moments_init(gaussian_moments_solver *s,
 {
     if (s == NULL || x0 == NULL) return gaussian_moments_BAD_ARGUMENT;
     if (params == NULL) params = &gaussian_moments_default_params;
-    gaussian_moments_solver fresh = { .h = (double)NAN, .params = *params };
+    gaussian_moments_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     gaussian_moments_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!gaussian_moments_finite(fresh.x, gaussian_moments_DIM) || !gaussian_moments_allowed(&fresh.params)

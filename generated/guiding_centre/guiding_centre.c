@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 7c4fc067994e055f84e876b935d18daddfbf7dcd1a1cdf9cbe583a67f211dd20
+ * body-sha256: d33da721ed77a06d1d344f3254b29ac65e4218b2cd928157e451e1c489440591
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -615,7 +615,10 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
 {
     if (s == NULL || x0 == NULL) return guiding_centre_BAD_ARGUMENT;
     if (params == NULL) params = &guiding_centre_default_params;
-    guiding_centre_solver fresh = { .h = (double)NAN, .params = *params };
+    guiding_centre_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     guiding_centre_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!guiding_centre_finite(fresh.x, guiding_centre_DIM) || !guiding_centre_allowed(&fresh.params)

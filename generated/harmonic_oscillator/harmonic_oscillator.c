@@ -8,7 +8,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: c01a21cb962e8ae7470c25d0f0a9c1337b090b212b63b3de8d71b6eef5e83d34
+ * body-sha256: 48c32b10c34e78048bb2906ead79fc2234ca1e20fbf2fe91330e998a764471b5
  */
 #include "harmonic_oscillator.h"
 #include <float.h>
@@ -279,7 +279,10 @@ harmonic_oscillator_status harmonic_oscillator_init(harmonic_oscillator_solver *
 {
     if (s == NULL || x0 == NULL) return harmonic_oscillator_BAD_ARGUMENT;
     if (params == NULL) params = &harmonic_oscillator_default_params;
-    harmonic_oscillator_solver fresh = { .h = (double)NAN, .params = *params };
+    harmonic_oscillator_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     harmonic_oscillator_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!harmonic_oscillator_finite(fresh.x, harmonic_oscillator_DIM)

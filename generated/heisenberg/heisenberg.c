@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 7bc57a053f4456e1752e293f1f0f4ec0f69a425ee56957200a2ec7d0e363e298
+ * body-sha256: 3c321cc7298eae47a6ed67d9f5f60f3b34d91c45003a38e45a9ff1d5ebc37855
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -711,7 +711,7 @@ static size_t heisenberg_depth(const heisenberg_solver *s)
         room = slices / heisenberg_THREADS / (2 * heisenberg_SPAN);
     const size_t depth = held < room ? held : room;
     if (bytes <= heisenberg_CACHE || depth < 2) return 1;
-    return depth < heisenberg_DEEPEST ? depth : heisenberg_DEEPEST;
+    return depth < heisenberg_DEEPEST ? depth : (size_t)heisenberg_DEEPEST;
 }
 
 static void heisenberg_make_slices(const heisenberg_solver *s, const heisenberg_flow *flow, size_t from,

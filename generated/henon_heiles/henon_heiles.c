@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: a3a9e0fc5e1ec30c0911b105a41c029293134c6ae5480297ec16b54dd7a48465
+ * body-sha256: 7bdcc07432d271aee8a9d962cb05b8d1d190910db5b5f664495c35632235cafa
  */
 #include "henon_heiles.h"
 #include <float.h>
@@ -330,7 +330,10 @@ henon_heiles_status henon_heiles_init(henon_heiles_solver *s, const henon_heiles
 {
     if (s == NULL || x0 == NULL) return henon_heiles_BAD_ARGUMENT;
     if (params == NULL) params = &henon_heiles_default_params;
-    henon_heiles_solver fresh = { .h = (double)NAN, .params = *params };
+    henon_heiles_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!henon_heiles_finite(fresh.x, henon_heiles_DIM)) return henon_heiles_BAD_ARGUMENT;
     *s = fresh;

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Elimination in a band;
  *   Newton's method where sweeps fail; What is seen at sites
- * body-sha256: 4b17390e65206dd1956a93dafdfd7ada760152429142794648eab194cfae2ce7
+ * body-sha256: f9718dd3637f3b1e3669d09de580339e28c1735dadc8fe825a29107f8e255601
  */
 #include "kdv.h"
 #include <float.h>
@@ -599,7 +599,7 @@ static void kdv_probe(kdv_solver *s, const kdv_matrix *m, const double *coef, in
     ptrdiff_t count, int f)
 {
     const ptrdiff_t sites = s->length, apart = 2 * kdv_REACH + 1;
-    const ptrdiff_t reach = sites < apart ? sites / 2 : kdv_REACH;
+    const ptrdiff_t reach = sites < apart ? sites / 2 : (ptrdiff_t)kdv_REACH;
     for (int k = 0; k < kdv_DIM; ++k) {
         for (ptrdiff_t i = -kdv_HALO; i < sites + kdv_HALO; ++i) s->v[k][i] = 0.0;
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 7e89f56b39a977d9e8a4a236f95dab8f8950a51ae2dfdffc48ad97042fac3109
+ * body-sha256: 928f1a4fdbd890596d0a9bb7b4f86b22747233ad53bd4d6dc0b5c8c8f337da1b
  */
 #include "kepler.h"
 #include <float.h>
@@ -617,7 +617,10 @@ kepler_status kepler_init(kepler_solver *s, const kepler_params *params, const d
 {
     if (s == NULL || x0 == NULL) return kepler_BAD_ARGUMENT;
     if (params == NULL) params = &kepler_default_params;
-    kepler_solver fresh = { .h = (double)NAN, .params = *params };
+    kepler_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     kepler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!kepler_finite(fresh.x, kepler_DIM) || !kepler_allowed(&fresh.params) || !kepler_finite(fresh.coef,

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
  *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: 5d5ad30846b86c71f87685ae3f1502a74d4d3912f6fee0cbe45107898e0808f8
+ * body-sha256: 79ca787201303d3afb61ff24ab0d6c25a089b94b74eed2e70772a8c7111fa0d7
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -243,7 +243,10 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
 {
     if (s == NULL || x0 == NULL) return kepler_eccentric_BAD_ARGUMENT;
     if (params == NULL) params = &kepler_eccentric_default_params;
-    kepler_eccentric_solver fresh = { .h = (double)NAN, .params = *params };
+    kepler_eccentric_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     /* so short a step does not matter */
     kepler_eccentric_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);

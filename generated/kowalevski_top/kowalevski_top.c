@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: 58c9f78a672e407ee1db82626276ab0e7f3ddbd306926ac34ff35efcec180319
+ * body-sha256: aaf59a0060dba581a0782a58beb251f826752531a93c8f332b132e22df2116d3
  */
 #include "kowalevski_top.h"
 #include <float.h>
@@ -1107,7 +1107,7 @@ static int kowalevski_top_solve(double matrix[kowalevski_top_DIM * kowalevski_to
 #define kowalevski_top_HOPELESS 1e-7
 
 /* equations of the least squares */
-enum { kowalevski_top_ROWS = kowalevski_top_REMEMBERED - kowalevski_top_WINDOW - kowalevski_top_AHEAD
+enum { kowalevski_top_ROWS = (int)kowalevski_top_REMEMBERED - kowalevski_top_WINDOW - kowalevski_top_AHEAD
     - kowalevski_top_CHECKS + 1 };
 
 /* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
@@ -1396,7 +1396,10 @@ kowalevski_top_status kowalevski_top_init(kowalevski_top_solver *s, const kowale
 {
     if (s == NULL || x0 == NULL) return kowalevski_top_BAD_ARGUMENT;
     if (params == NULL) params = &kowalevski_top_default_params;
-    kowalevski_top_solver fresh = { .h = (double)NAN, .params = *params };
+    kowalevski_top_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!kowalevski_top_finite(fresh.x, kowalevski_top_DIM)) return kowalevski_top_BAD_ARGUMENT;
     *s = fresh;
@@ -3133,6 +3136,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } kowalevski_top_members;
 
+static kowalevski_top_members kowalevski_top_asked(const kowalevski_top_params *params, double *x,
+    size_t members, const double *h, size_t steps, unsigned char *status)
+{
+    kowalevski_top_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static kowalevski_top_status kowalevski_top_begin_member(const kowalevski_top_members *all, size_t m,
     const double x[kowalevski_top_DIM], kowalevski_top_solver *s)
@@ -3572,8 +3589,7 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
     double h, size_t steps, unsigned char *status)
 {
     const kowalevski_top_params shared = params != NULL ? *params : kowalevski_top_default_params;
-    kowalevski_top_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
-        .status = status };
+    kowalevski_top_members all = kowalevski_top_asked(&shared, x, members, &h, steps, status);
     if (x == NULL && members > 0) return kowalevski_top_BAD_ARGUMENT;
     const kowalevski_top_status result = kowalevski_top_run(&all);
     return isfinite(h) ? result : kowalevski_top_BAD_ARGUMENT;
@@ -3582,13 +3598,12 @@ kowalevski_top_status kowalevski_top_ensemble(const kowalevski_top_params *param
 kowalevski_top_status kowalevski_top_ensemble_each(const kowalevski_top_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
 {
-    kowalevski_top_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .h = h };
+    kowalevski_top_members all = kowalevski_top_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return kowalevski_top_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return kowalevski_top_BAD_ARGUMENT;
+    all.own = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
-    all.status = status;
     return kowalevski_top_run(&all);
 }
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: fb95613568f025ea5e208ba7314cc23ff076fea14cb3d24eb751eec22f1825e2
+ * body-sha256: 7a9f17e851c7384a452503f94f6518e9a4841dbdaad20b6119d49aeec4b7aa59
  */
 #include "lagrange_top.h"
 #include <float.h>
@@ -724,7 +724,10 @@ lagrange_top_status lagrange_top_init(lagrange_top_solver *s, const lagrange_top
 {
     if (s == NULL || x0 == NULL) return lagrange_top_BAD_ARGUMENT;
     if (params == NULL) params = &lagrange_top_default_params;
-    lagrange_top_solver fresh = { .h = (double)NAN, .params = *params };
+    lagrange_top_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     lagrange_top_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!lagrange_top_finite(fresh.x, lagrange_top_DIM) || !lagrange_top_allowed(&fresh.params)

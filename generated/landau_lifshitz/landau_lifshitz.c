@@ -13,7 +13,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: fdd908829658d65bdafbd21a61393f8eb9283175fc294b9dd5e3d3cf5985e14f
+ * body-sha256: 779f26796886e7b807954d550bd742712ad28734698fa35d3af90c9ef4b65f06
  */
 #include "landau_lifshitz.h"
 #include <float.h>
@@ -373,7 +373,10 @@ landau_lifshitz_status landau_lifshitz_init(landau_lifshitz_solver *s, const lan
 {
     if (s == NULL || x0 == NULL) return landau_lifshitz_BAD_ARGUMENT;
     if (params == NULL) params = &landau_lifshitz_default_params;
-    landau_lifshitz_solver fresh = { .h = (double)NAN, .params = *params };
+    landau_lifshitz_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     landau_lifshitz_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!landau_lifshitz_finite(fresh.x, landau_lifshitz_DIM) || !landau_lifshitz_allowed(&fresh.params)

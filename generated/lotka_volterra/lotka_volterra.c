@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The solver; Several steps or members at
  *   once; Newton's method in lanes; The residuals of a block; Blocks of steps; Members of an ensemble;
  *   Groups of members; Ensembles
- * body-sha256: b262e4d2727ce435d2a7cd15979c524436ff6105c59c1d39265967c2033b8e03
+ * body-sha256: ec93d366b8692e34d0b5a3888a171ab732aaed2257ecdd42cd9b1efba6194bd0
  */
 #include "lotka_volterra.h"
 #include <float.h>
@@ -214,7 +214,7 @@ static int lotka_volterra_solve(double matrix[lotka_volterra_DIM * lotka_volterr
 #define lotka_volterra_HOPELESS 1e-7
 
 /* equations of the least squares */
-enum { lotka_volterra_ROWS = lotka_volterra_REMEMBERED - lotka_volterra_WINDOW - lotka_volterra_AHEAD
+enum { lotka_volterra_ROWS = (int)lotka_volterra_REMEMBERED - lotka_volterra_WINDOW - lotka_volterra_AHEAD
     - lotka_volterra_CHECKS + 1 };
 
 /* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
@@ -501,7 +501,10 @@ lotka_volterra_status lotka_volterra_init(lotka_volterra_solver *s, const lotka_
 {
     if (s == NULL || x0 == NULL) return lotka_volterra_BAD_ARGUMENT;
     if (params == NULL) params = &lotka_volterra_default_params;
-    lotka_volterra_solver fresh = { .h = (double)NAN, .params = *params };
+    lotka_volterra_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!lotka_volterra_finite(fresh.x, lotka_volterra_DIM)) return lotka_volterra_BAD_ARGUMENT;
     *s = fresh;
@@ -1247,6 +1250,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } lotka_volterra_members;
 
+static lotka_volterra_members lotka_volterra_asked(const lotka_volterra_params *params, double *x,
+    size_t members, const double *h, size_t steps, unsigned char *status)
+{
+    lotka_volterra_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static lotka_volterra_status lotka_volterra_begin_member(const lotka_volterra_members *all, size_t m,
     const double x[lotka_volterra_DIM], lotka_volterra_solver *s)
@@ -1686,8 +1703,7 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
     double h, size_t steps, unsigned char *status)
 {
     const lotka_volterra_params shared = params != NULL ? *params : lotka_volterra_default_params;
-    lotka_volterra_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
-        .status = status };
+    lotka_volterra_members all = lotka_volterra_asked(&shared, x, members, &h, steps, status);
     if (x == NULL && members > 0) return lotka_volterra_BAD_ARGUMENT;
     const lotka_volterra_status result = lotka_volterra_run(&all);
     return isfinite(h) ? result : lotka_volterra_BAD_ARGUMENT;
@@ -1696,13 +1712,12 @@ lotka_volterra_status lotka_volterra_ensemble(const lotka_volterra_params *param
 lotka_volterra_status lotka_volterra_ensemble_each(const lotka_volterra_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
 {
-    lotka_volterra_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .h = h };
+    lotka_volterra_members all = lotka_volterra_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return lotka_volterra_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return lotka_volterra_BAD_ARGUMENT;
+    all.own = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
-    all.status = status;
     return lotka_volterra_run(&all);
 }
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 8a1be3eeddb7db37c105f8b786dc277e432de3d68ff04286f1250e96f6c088bb
+ * body-sha256: e9cdaaf07f6ef8ae5e4695bc3850ef986a7faace82e12421f4246371a36815c0
  */
 #include "maxwell_bloch.h"
 #include <float.h>
@@ -282,7 +282,10 @@ maxwell_bloch_status maxwell_bloch_init(maxwell_bloch_solver *s, const maxwell_b
 {
     if (s == NULL || x0 == NULL) return maxwell_bloch_BAD_ARGUMENT;
     if (params == NULL) params = &maxwell_bloch_default_params;
-    maxwell_bloch_solver fresh = { .h = (double)NAN, .params = *params };
+    maxwell_bloch_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!maxwell_bloch_finite(fresh.x, maxwell_bloch_DIM)) return maxwell_bloch_BAD_ARGUMENT;
     *s = fresh;

@@ -11,7 +11,7 @@
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Several steps or
  *   members at once; Newton's method in lanes; Paths in lanes; Blocks along paths; The residuals of a
  *   block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 1f4d736aad41fdd13ed0acdc9d2f6531ca86794be99ec0609cdb9578c955cd13
+ * body-sha256: a54452ee262bc9c01d5b7f7067e7f2979663d0c9557b22974882d99551037ded
  */
 #include "nambu_pendulum.h"
 #include <float.h>
@@ -203,7 +203,7 @@ static int nambu_pendulum_solve(double matrix[nambu_pendulum_DIM * nambu_pendulu
 #define nambu_pendulum_HOPELESS 1e-7
 
 /* equations of the least squares */
-enum { nambu_pendulum_ROWS = nambu_pendulum_REMEMBERED - nambu_pendulum_WINDOW - nambu_pendulum_AHEAD
+enum { nambu_pendulum_ROWS = (int)nambu_pendulum_REMEMBERED - nambu_pendulum_WINDOW - nambu_pendulum_AHEAD
     - nambu_pendulum_CHECKS + 1 };
 
 /* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
@@ -669,7 +669,10 @@ nambu_pendulum_status nambu_pendulum_init(nambu_pendulum_solver *s, const nambu_
 {
     if (s == NULL || x0 == NULL) return nambu_pendulum_BAD_ARGUMENT;
     if (params == NULL) params = &nambu_pendulum_default_params;
-    nambu_pendulum_solver fresh = { .h = (double)NAN, .params = *params };
+    nambu_pendulum_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!nambu_pendulum_finite(fresh.x, nambu_pendulum_DIM)) return nambu_pendulum_BAD_ARGUMENT;
     *s = fresh;
@@ -1995,6 +1998,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } nambu_pendulum_members;
 
+static nambu_pendulum_members nambu_pendulum_asked(const nambu_pendulum_params *params, double *x,
+    size_t members, const double *h, size_t steps, unsigned char *status)
+{
+    nambu_pendulum_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static nambu_pendulum_status nambu_pendulum_begin_member(const nambu_pendulum_members *all, size_t m,
     const double x[nambu_pendulum_DIM], nambu_pendulum_solver *s)
@@ -2434,8 +2451,7 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
     double h, size_t steps, unsigned char *status)
 {
     const nambu_pendulum_params shared = params != NULL ? *params : nambu_pendulum_default_params;
-    nambu_pendulum_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
-        .status = status };
+    nambu_pendulum_members all = nambu_pendulum_asked(&shared, x, members, &h, steps, status);
     if (x == NULL && members > 0) return nambu_pendulum_BAD_ARGUMENT;
     const nambu_pendulum_status result = nambu_pendulum_run(&all);
     return isfinite(h) ? result : nambu_pendulum_BAD_ARGUMENT;
@@ -2444,13 +2460,12 @@ nambu_pendulum_status nambu_pendulum_ensemble(const nambu_pendulum_params *param
 nambu_pendulum_status nambu_pendulum_ensemble_each(const nambu_pendulum_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
 {
-    nambu_pendulum_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .h = h };
+    nambu_pendulum_members all = nambu_pendulum_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return nambu_pendulum_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return nambu_pendulum_BAD_ARGUMENT;
+    all.own = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
-    all.status = status;
     return nambu_pendulum_run(&all);
 }
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: a0c7f14a8e271ca9f0725427c0a90d605a61394b0d1fc8c9543f7dee855073f7
+ * body-sha256: 99b617c740b9fcd1bac082e6d2accf5c40f135dc569bd0eb41a0469fd4b1ec2d
  */
 #include "pendulum.h"
 #include <float.h>
@@ -283,7 +283,10 @@ pendulum_status pendulum_init(pendulum_solver *s, const pendulum_params *params,
 {
     if (s == NULL || x0 == NULL) return pendulum_BAD_ARGUMENT;
     if (params == NULL) params = &pendulum_default_params;
-    pendulum_solver fresh = { .h = (double)NAN, .params = *params };
+    pendulum_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     pendulum_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!pendulum_finite(fresh.x, pendulum_DIM) || !pendulum_allowed(&fresh.params)

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6bc0525f64eaeba70a04ba59baab181d864b2afa43e88749f30484631ce3339b
+ * body-sha256: 850b1a71f55f28241dfa43ea8980b70ccfb3682ca83c15dca95487728eaf00e7
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -86,7 +86,10 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
 {
     if (s == NULL || x0 == NULL) return pendulum_euler_BAD_ARGUMENT;
     if (params == NULL) params = &pendulum_euler_default_params;
-    pendulum_euler_solver fresh = { .h = (double)NAN, .params = *params };
+    pendulum_euler_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     pendulum_euler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!pendulum_euler_finite(fresh.x, pendulum_euler_DIM) || !pendulum_euler_allowed(&fresh.params)

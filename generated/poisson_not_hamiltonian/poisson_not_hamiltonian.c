@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 89d8bfdd07acdf6b70797bfaf55b7c5f91430c8caf91b4baa4febf8c6b5be711
+ * body-sha256: fa5e87968bdddbcbcdb883f45a6544266cec50244ba211fcda8f05c94d1f3f32
  */
 #include "poisson_not_hamiltonian.h"
 #include <float.h>
@@ -352,7 +352,10 @@ poisson_not_hamiltonian_status poisson_not_hamiltonian_init(poisson_not_hamilton
 {
     if (s == NULL || x0 == NULL) return poisson_not_hamiltonian_BAD_ARGUMENT;
     if (params == NULL) params = &poisson_not_hamiltonian_default_params;
-    poisson_not_hamiltonian_solver fresh = { .h = (double)NAN, .params = *params };
+    poisson_not_hamiltonian_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!poisson_not_hamiltonian_finite(fresh.x, poisson_not_hamiltonian_DIM))
         return poisson_not_hamiltonian_BAD_ARGUMENT;

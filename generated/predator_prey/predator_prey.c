@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 088cbcdb45185d03518f7caaa4caa9c77aa51ef252c3dd7fccae3ead631b74a2
+ * body-sha256: 6130197783fe85f473a614ca507c5e44079c5d926cb3ee33c93508ce73bda9dd
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -290,7 +290,10 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
 {
     if (s == NULL || x0 == NULL) return predator_prey_BAD_ARGUMENT;
     if (params == NULL) params = &predator_prey_default_params;
-    predator_prey_solver fresh = { .h = (double)NAN, .params = *params };
+    predator_prey_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!predator_prey_finite(fresh.x, predator_prey_DIM) || !predator_prey_allowed(&fresh.params)

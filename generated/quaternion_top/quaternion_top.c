@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 134ba67819e0d5f3a00b7fa8194b7ca3defa56c23e6f025afb9382fc182cbdd6
+ * body-sha256: 716fa13e5facfa094e9525d655ff8615a066669eeb6055a5023ac5cc8fa20fc7
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -863,7 +863,10 @@ quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const 
 {
     if (s == NULL || x0 == NULL) return quaternion_top_BAD_ARGUMENT;
     if (params == NULL) params = &quaternion_top_default_params;
-    quaternion_top_solver fresh = { .h = (double)NAN, .params = *params };
+    quaternion_top_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     /* so short a step does not matter */
     quaternion_top_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 935817d0f30e36aee11cdae2199ef2b6ebb488cb08084645e8d9b2dd9b95b46a
+ * body-sha256: 73a5cda76020cd1e6897d4aed7c064b908ef24118aefbc8628a245afd462f839
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -429,7 +429,7 @@ static int rigid_body_solve(double matrix[rigid_body_DIM * rigid_body_DIM], doub
 #define rigid_body_HOPELESS 1e-7
 
 /* equations of the least squares */
-enum { rigid_body_ROWS = rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
+enum { rigid_body_ROWS = (int)rigid_body_REMEMBERED - rigid_body_WINDOW - rigid_body_AHEAD - rigid_body_CHECKS
     + 1 };
 
 /* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
@@ -832,7 +832,10 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
 {
     if (s == NULL || x0 == NULL) return rigid_body_BAD_ARGUMENT;
     if (params == NULL) params = &rigid_body_default_params;
-    rigid_body_solver fresh = { .h = (double)NAN, .params = *params };
+    rigid_body_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     rigid_body_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params)
@@ -1619,6 +1622,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } rigid_body_members;
 
+static rigid_body_members rigid_body_asked(const rigid_body_params *params, double *x, size_t members,
+    const double *h, size_t steps, unsigned char *status)
+{
+    rigid_body_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static rigid_body_status rigid_body_begin_member(const rigid_body_members *all, size_t m,
     const double x[rigid_body_DIM], const double *gauge, rigid_body_solver *s)
@@ -2050,8 +2067,7 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
     size_t steps, unsigned char *status)
 {
     const rigid_body_params shared = params != NULL ? *params : rigid_body_default_params;
-    rigid_body_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
-        .status = status };
+    rigid_body_members all = rigid_body_asked(&shared, x, members, &h, steps, status);
     if (x == NULL && members > 0) return rigid_body_BAD_ARGUMENT;
     const rigid_body_status result = rigid_body_run(&all);
     return isfinite(h) ? result : rigid_body_BAD_ARGUMENT;
@@ -2060,14 +2076,13 @@ rigid_body_status rigid_body_ensemble(const rigid_body_params *params, double *x
 rigid_body_status rigid_body_ensemble_each(const rigid_body_params *params, double *x, size_t members,
     const double *gauge, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
 {
-    rigid_body_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .h = h };
+    rigid_body_members all = rigid_body_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return rigid_body_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return rigid_body_BAD_ARGUMENT;
     all.gauge = gauge;
+    all.own = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
-    all.status = status;
     return rigid_body_run(&all);
 }
 

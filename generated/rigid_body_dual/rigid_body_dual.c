@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: d4f00fc3f483e1c5f05a69ab83ac2e320e7887224715d20929cb7a844da90db4
+ * body-sha256: f47328f6af68d786a06a2aa7f62d2e52392ab0883db6e69a3b51b6c7069fe62d
  */
 #include "rigid_body_dual.h"
 #include <float.h>
@@ -407,7 +407,10 @@ rigid_body_dual_status rigid_body_dual_init_gauge(rigid_body_dual_solver *s,
 {
     if (s == NULL || x0 == NULL) return rigid_body_dual_BAD_ARGUMENT;
     if (params == NULL) params = &rigid_body_dual_default_params;
-    rigid_body_dual_solver fresh = { .h = (double)NAN, .params = *params };
+    rigid_body_dual_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     /* so short a step does not matter */
     rigid_body_dual_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 2660cc2bf359bf0f69316f907de0c701a0c8bb361bd1ff0398e6b3a865593e4e
+ * body-sha256: 0415e28efdaac23aabac057e38be34b0d2f12a30fa8be29855d4302c88c68090
  */
 #include "rigid_body_paper.h"
 #include <float.h>
@@ -351,7 +351,10 @@ rigid_body_paper_status rigid_body_paper_init(rigid_body_paper_solver *s,
 {
     if (s == NULL || x0 == NULL) return rigid_body_paper_BAD_ARGUMENT;
     if (params == NULL) params = &rigid_body_paper_default_params;
-    rigid_body_paper_solver fresh = { .h = (double)NAN, .params = *params };
+    rigid_body_paper_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     rigid_body_paper_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!rigid_body_paper_finite(fresh.x, rigid_body_paper_DIM) || !rigid_body_paper_allowed(&fresh.params)

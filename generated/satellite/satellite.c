@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 53997fdc6de3491f7f85f55c698ff674b766eb6db91eb4cf2475ff92e2dd1815
+ * body-sha256: 7be4afd66376601e4e8a17a344eb64e3d93978a5c1b18df872e39d060d26dbba
  */
 #include "satellite.h"
 #include <float.h>
@@ -1163,7 +1163,10 @@ satellite_status satellite_init(satellite_solver *s, const satellite_params *par
 {
     if (s == NULL || x0 == NULL) return satellite_BAD_ARGUMENT;
     if (params == NULL) params = &satellite_default_params;
-    satellite_solver fresh = { .h = (double)NAN, .params = *params };
+    satellite_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     satellite_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!satellite_finite(fresh.x, satellite_DIM) || !satellite_allowed(&fresh.params)
@@ -1283,6 +1286,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } satellite_members;
 
+static satellite_members satellite_asked(const satellite_params *params, double *x, size_t members,
+    const double *h, size_t steps, unsigned char *status)
+{
+    satellite_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static satellite_status satellite_begin_member(const satellite_members *all, size_t m,
     const double x[satellite_DIM], satellite_solver *s)
@@ -1381,17 +1398,16 @@ satellite_status satellite_ensemble_attitudes(const satellite_params *params, do
     size_t members, const double *h, size_t steps, size_t stride, double *frames, double *attitudes,
     unsigned char *status)
 {
-    satellite_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .attitude = attitude };
+    satellite_members all = satellite_asked(params, x, members, h, steps, status);
     satellite_status worst = satellite_OK;
     size_t earliest = members;
     if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return satellite_BAD_ARGUMENT;
     if ((frames != NULL || attitudes != NULL) && stride == 0) return satellite_BAD_ARGUMENT;
-    all.h = h;
+    all.own = 1;
     all.stride = frames != NULL || attitudes != NULL ? stride : 0;
     all.frames = frames;
+    all.attitude = attitude;
     all.attitudes = attitudes;
-    all.status = status;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic, 16)
 #endif

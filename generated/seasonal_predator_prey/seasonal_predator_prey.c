@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 7426755adc3051b329c9928db6af85cd3b280f6db05ce90d56e26c424ad9584c
+ * body-sha256: ae2030a8adbcd59b30cf2df8343c59b2c17e2d0bb35916496341bf37f5c14e89
  */
 #include "seasonal_predator_prey.h"
 #include <float.h>
@@ -331,7 +331,10 @@ seasonal_predator_prey_status seasonal_predator_prey_init_at(seasonal_predator_p
 {
     if (s == NULL || x0 == NULL || !isfinite(t0)) return seasonal_predator_prey_BAD_ARGUMENT;
     if (params == NULL) params = &seasonal_predator_prey_default_params;
-    seasonal_predator_prey_solver fresh = { .h = (double)NAN, .params = *params };
+    seasonal_predator_prey_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     seasonal_predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */

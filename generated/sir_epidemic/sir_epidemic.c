@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 3dae6ec6e9187962dd0cf1f9d8c13ba2878f9c971196cc71365c5da500a5152f
+ * body-sha256: 55959e2eb8125bb34ba319c65a4b98016e35b8ef74fbe5536976160f503a90bc
  */
 #include "sir_epidemic.h"
 #include <float.h>
@@ -439,7 +439,10 @@ sir_epidemic_status sir_epidemic_init(sir_epidemic_solver *s, const sir_epidemic
 {
     if (s == NULL || x0 == NULL) return sir_epidemic_BAD_ARGUMENT;
     if (params == NULL) params = &sir_epidemic_default_params;
-    sir_epidemic_solver fresh = { .h = (double)NAN, .params = *params };
+    sir_epidemic_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     sir_epidemic_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!sir_epidemic_finite(fresh.x, sir_epidemic_DIM) || !sir_epidemic_allowed(&fresh.params)

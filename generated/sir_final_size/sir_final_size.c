@@ -8,7 +8,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: f074c374450ddc6cd5dfb32eca1ae5ce21267157bf30c78d6d22ce3be684c98b
+ * body-sha256: 4fc4b9de1ffd1fae9c2fb7248cdc0b847ae97298cdc699bd98747062f26d1947
  */
 #include "sir_final_size.h"
 #include <float.h>
@@ -446,7 +446,10 @@ sir_final_size_status sir_final_size_init(sir_final_size_solver *s, const sir_fi
 {
     if (s == NULL || x0 == NULL) return sir_final_size_BAD_ARGUMENT;
     if (params == NULL) params = &sir_final_size_default_params;
-    sir_final_size_solver fresh = { .h = (double)NAN, .params = *params };
+    sir_final_size_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     sir_final_size_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!sir_final_size_finite(fresh.x, sir_final_size_DIM) || !sir_final_size_allowed(&fresh.params)

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: d28d70d74d876aef9fc7cf50f30c248e864ecb268a2defb01df6715ccd47ae99
+ * body-sha256: de0a2628148c2a509cf17a1394135f6a93c3d45784318c665c0558f868a07b4c
  */
 #include "sklyanin_gyrostat.h"
 #include <float.h>
@@ -629,7 +629,10 @@ sklyanin_gyrostat_status sklyanin_gyrostat_init_gauge(sklyanin_gyrostat_solver *
 {
     if (s == NULL || x0 == NULL) return sklyanin_gyrostat_BAD_ARGUMENT;
     if (params == NULL) params = &sklyanin_gyrostat_default_params;
-    sklyanin_gyrostat_solver fresh = { .h = (double)NAN, .params = *params };
+    sklyanin_gyrostat_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!sklyanin_gyrostat_finite(fresh.x, sklyanin_gyrostat_DIM)) return sklyanin_gyrostat_BAD_ARGUMENT;
     if (gauge == NULL) sklyanin_gyrostat_choose_gauge(&fresh.params, fresh.x, fresh.gauge);

@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 33cd4409a29287482e68a391efe6e6b06f482a6a61d2b88177320af58497fd90
+ * body-sha256: 65cc30ee3cb5a33d07b009ef859ed17937e63555cab5da9c6ca99fa774a687c4
  */
 #include "so4_manakov.h"
 #include <float.h>
@@ -799,7 +799,10 @@ so4_manakov_status so4_manakov_init_gauge(so4_manakov_solver *s, const so4_manak
 {
     if (s == NULL || x0 == NULL) return so4_manakov_BAD_ARGUMENT;
     if (params == NULL) params = &so4_manakov_default_params;
-    so4_manakov_solver fresh = { .h = (double)NAN, .params = *params };
+    so4_manakov_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!so4_manakov_finite(fresh.x, so4_manakov_DIM)) return so4_manakov_BAD_ARGUMENT;
     if (gauge == NULL) so4_manakov_choose_gauge(&fresh.params, fresh.x, fresh.gauge);

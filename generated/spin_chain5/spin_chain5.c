@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: d63ddefcd6768999043aef39d37e2ba780f95799423484726c12c58d649ba140
+ * body-sha256: 8c4824138e36eb281cd58f6852fb50fcae9516299c03a160ddc2f0555fbf962b
  */
 #include "spin_chain5.h"
 #include <float.h>
@@ -1704,7 +1704,10 @@ spin_chain5_status spin_chain5_init_gauge(spin_chain5_solver *s, const spin_chai
 {
     if (s == NULL || x0 == NULL) return spin_chain5_BAD_ARGUMENT;
     if (params == NULL) params = &spin_chain5_default_params;
-    spin_chain5_solver fresh = { .h = (double)NAN, .params = *params };
+    spin_chain5_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     spin_chain5_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!spin_chain5_finite(fresh.x, spin_chain5_DIM) || !spin_chain5_allowed(&fresh.params)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: c593b0042de3b0feb1fd3d7ebda9f167d485565a6b538cb7996dbfd819a45593
+ * body-sha256: 250eb04522658d2f1990cdbf132122ed1709760a2ebf66656fc8646df604a941
  */
 #include "spin_resonance.h"
 #include <float.h>
@@ -381,7 +381,10 @@ spin_resonance_status spin_resonance_init_at(spin_resonance_solver *s, const spi
 {
     if (s == NULL || x0 == NULL || !isfinite(t0)) return spin_resonance_BAD_ARGUMENT;
     if (params == NULL) params = &spin_resonance_default_params;
-    spin_resonance_solver fresh = { .h = (double)NAN, .params = *params };
+    spin_resonance_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
     spin_resonance_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 9a2e99ca2b2dac7d1c1633f9223bc829c87b81f0402fb2eb09d0dd1e2a5ffb7c
+ * body-sha256: 65230cbbd3c64fab4c74a97b7eefc0d8978190160b4fea0776ef490415dafa5d
  */
 #include "thermal_chain.h"
 #include <float.h>
@@ -886,7 +886,10 @@ thermal_chain_status thermal_chain_init(thermal_chain_solver *s, const thermal_c
 {
     if (s == NULL || x0 == NULL) return thermal_chain_BAD_ARGUMENT;
     if (params == NULL) params = &thermal_chain_default_params;
-    thermal_chain_solver fresh = { .h = (double)NAN, .params = *params };
+    thermal_chain_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     thermal_chain_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!thermal_chain_finite(fresh.x, thermal_chain_DIM) || !thermal_chain_allowed(&fresh.params)

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Random numbers; Noise; The lattice; The solver; The flows; What
  *   is seen at sites
- * body-sha256: 873997941b2bdc8cfd3aecbd905b21942c70585a34c4c5613d915d0d2c2b3137
+ * body-sha256: 5a80a75b6834fd558b3632231ba1996868aa059022de67a34457d81c5a6e1ee2
  */
 #include "thermal_heisenberg.h"
 #include <float.h>
@@ -583,7 +583,7 @@ static void thermal_heisenberg_steps(const thermal_heisenberg_solver *s, size_t 
 {
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
         for (int flow = 0; flow < thermal_heisenberg_FLOWS; ++flow) {
-            if (flow == 0 || flow == thermal_heisenberg_FLOWS - thermal_heisenberg_SOURCES)
+            if (flow == 0 || flow == thermal_heisenberg_FLOWS - (int)thermal_heisenberg_SOURCES)
                 thermal_heisenberg_draw(s, step, flow > 0);
             thermal_heisenberg_sweep_part(s, thermal_heisenberg_flow_parts[flow],
                 s->coef + flow * thermal_heisenberg_ROW);

@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 89dffb1c23d1d43810dc16d236a35b2987ab3cf13ca8b3cf6211b8b836ffc969
+ * body-sha256: 1acf2a97cba2d1a72dab828a8b2d00866fab5b78041f69270e14be031609d1fd
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -421,7 +421,10 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
 {
     if (s == NULL || x0 == NULL) return thermal_spin_BAD_ARGUMENT;
     if (params == NULL) params = &thermal_spin_default_params;
-    thermal_spin_solver fresh = { .h = (double)NAN, .params = *params };
+    thermal_spin_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     thermal_spin_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
     if (!thermal_spin_finite(fresh.x, thermal_spin_DIM) || !thermal_spin_allowed(&fresh.params)

@@ -13,7 +13,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 593e09d211f5e7dfd7477ad4f8e77d42012cf363640413489fb18cb14c3e70a8
+ * body-sha256: a4d14c83e2c0155ac8f9d2244b6e80c849e29d34abb7d5bf9e1d885576401dcf
  */
 #include "thruster_body.h"
 #include <float.h>
@@ -361,7 +361,10 @@ thruster_body_status thruster_body_init(thruster_body_solver *s, const thruster_
 {
     if (s == NULL || x0 == NULL) return thruster_body_BAD_ARGUMENT;
     if (params == NULL) params = &thruster_body_default_params;
-    thruster_body_solver fresh = { .h = (double)NAN, .params = *params };
+    thruster_body_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     thruster_body_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
     if (!thruster_body_finite(fresh.x, thruster_body_DIM) || !thruster_body_allowed(&fresh.params)

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 867bb144aa6c6746003925bd2ccb8970487bc94992432e1cb0963dd5b4ada924
+ * body-sha256: e4a8e45a3df3ab5302b400c9f335bd12e29601697552be2280cd493be4568bbf
  */
 #include "toda3.h"
 #include <float.h>
@@ -397,7 +397,10 @@ toda3_status toda3_init(toda3_solver *s, const toda3_params *params, const doubl
 {
     if (s == NULL || x0 == NULL) return toda3_BAD_ARGUMENT;
     if (params == NULL) params = &toda3_default_params;
-    toda3_solver fresh = { .h = (double)NAN, .params = *params };
+    toda3_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!toda3_finite(fresh.x, toda3_DIM)) return toda3_BAD_ARGUMENT;
     *s = fresh;

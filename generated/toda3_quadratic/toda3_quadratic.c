@@ -9,7 +9,7 @@
  * Contents: The model; Compensated sums, linear equations; Recurrences fitted to the last values;
  *   Starting guesses; The implicit step, along paths dm/dt = pi(m) p; The solver; Members of an
  *   ensemble; Ensembles
- * body-sha256: 0d7943c20d59f06c0d09e727938095f7016445563edc386159a3edcfae8be343
+ * body-sha256: b03112f37ca83389eeabd7789d70fcc9ba604ac97a17a88beeebe5987a4ecc36
  */
 #include "toda3_quadratic.h"
 #include <float.h>
@@ -153,7 +153,7 @@ static int toda3_quadratic_solve(double matrix[toda3_quadratic_DIM * toda3_quadr
 #define toda3_quadratic_HOPELESS 1e-7
 
 /* equations of the least squares */
-enum { toda3_quadratic_ROWS = toda3_quadratic_REMEMBERED - toda3_quadratic_WINDOW - toda3_quadratic_AHEAD
+enum { toda3_quadratic_ROWS = (int)toda3_quadratic_REMEMBERED - toda3_quadratic_WINDOW - toda3_quadratic_AHEAD
     - toda3_quadratic_CHECKS + 1 };
 
 /* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among
@@ -709,7 +709,10 @@ toda3_quadratic_status toda3_quadratic_init(toda3_quadratic_solver *s, const tod
 {
     if (s == NULL || x0 == NULL) return toda3_quadratic_BAD_ARGUMENT;
     if (params == NULL) params = &toda3_quadratic_default_params;
-    toda3_quadratic_solver fresh = { .h = (double)NAN, .params = *params };
+    toda3_quadratic_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!toda3_quadratic_finite(fresh.x, toda3_quadratic_DIM)) return toda3_quadratic_BAD_ARGUMENT;
     *s = fresh;
@@ -834,6 +837,20 @@ typedef struct {
     unsigned char *status; /* NULL for none */
 } toda3_quadratic_members;
 
+static toda3_quadratic_members toda3_quadratic_asked(const toda3_quadratic_params *params, double *x,
+    size_t members, const double *h, size_t steps, unsigned char *status)
+{
+    toda3_quadratic_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
+
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 static toda3_quadratic_status toda3_quadratic_begin_member(const toda3_quadratic_members *all, size_t m,
     const double x[toda3_quadratic_DIM], toda3_quadratic_solver *s)
@@ -909,8 +926,7 @@ toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *pa
     size_t members, double h, size_t steps, unsigned char *status)
 {
     const toda3_quadratic_params shared = params != NULL ? *params : toda3_quadratic_default_params;
-    toda3_quadratic_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h,
-        .status = status };
+    toda3_quadratic_members all = toda3_quadratic_asked(&shared, x, members, &h, steps, status);
     if (x == NULL && members > 0) return toda3_quadratic_BAD_ARGUMENT;
     const toda3_quadratic_status result = toda3_quadratic_run(&all);
     return isfinite(h) ? result : toda3_quadratic_BAD_ARGUMENT;
@@ -919,13 +935,12 @@ toda3_quadratic_status toda3_quadratic_ensemble(const toda3_quadratic_params *pa
 toda3_quadratic_status toda3_quadratic_ensemble_each(const toda3_quadratic_params *params, double *x,
     size_t members, const double *h, size_t steps, size_t stride, double *frames, unsigned char *status)
 {
-    toda3_quadratic_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params,
-        .h = h };
+    toda3_quadratic_members all = toda3_quadratic_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return toda3_quadratic_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return toda3_quadratic_BAD_ARGUMENT;
+    all.own = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
-    all.status = status;
     return toda3_quadratic_run(&all);
 }
 

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: e4d1c881806f3f58c48b1ebf774c2ef0e527f2c439c547bb88c18e51aff0ef48
+ * body-sha256: 3298084f468cf7dd1cdc8327896b8270074c56632f5afb4ff12eebe4b0536ff6
  */
 #include "volterra5.h"
 #include <float.h>
@@ -350,7 +350,10 @@ volterra5_status volterra5_init(volterra5_solver *s, const volterra5_params *par
 {
     if (s == NULL || x0 == NULL) return volterra5_BAD_ARGUMENT;
     if (params == NULL) params = &volterra5_default_params;
-    volterra5_solver fresh = { .h = (double)NAN, .params = *params };
+    volterra5_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!volterra5_finite(fresh.x, volterra5_DIM)) return volterra5_BAD_ARGUMENT;
     *s = fresh;

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 05f793e8b3a105e537c0bc7bbb4a7428c6ad438d9a0782d23eed2bb764f651f5
+ * body-sha256: 93db90059bfb02b0a4584821f76c52f90edbcc5c96c63ebebbd7cff30b27ef09
  */
 #include "vortices3.h"
 #include <float.h>
@@ -914,7 +914,10 @@ vortices3_status vortices3_init(vortices3_solver *s, const vortices3_params *par
 {
     if (s == NULL || x0 == NULL) return vortices3_BAD_ARGUMENT;
     if (params == NULL) params = &vortices3_default_params;
-    vortices3_solver fresh = { .h = (double)NAN, .params = *params };
+    vortices3_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     if (!vortices3_finite(fresh.x, vortices3_DIM)) return vortices3_BAD_ARGUMENT;
     *s = fresh;

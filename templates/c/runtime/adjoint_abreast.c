@@ -26,7 +26,7 @@ typedef struct {
     phi_lanes kept[PHI_SEGMENT][PHI_FLOWS][PHI_BACK_PACKS][PHI_DIM];
 } phi_back_group;
 #else
-enum { PHI_BACK_GROUP = PHI_BACK_PACKS * PHI_LANES };
+enum { PHI_BACK_GROUP = (int)PHI_BACK_PACKS * PHI_LANES };
 
 /* What is pulled back, as in phi_cotangent. */
 typedef struct {

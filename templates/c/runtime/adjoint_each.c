@@ -1,5 +1,7 @@
 #ifndef PHI_FILE_ADJOINT_EACH
 #define PHI_FILE_ADJOINT_EACH
+#include <string.h>
+
 #include "model.h"
 #if PHI_ABREAST
 #include "adjoint_groups.c"
@@ -27,26 +29,26 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
 #if PHI_TIMED
     if (members > 0 && t0 == NULL) return PHI_BAD_ARGUMENT;
 #endif
-    const phi_pulled all = {
-        .params = params,
-        .x0 = x0,
-        .h = h,
-        .rows_bar = rows_bar,
+    phi_pulled all;
+    memset(&all, 0, sizeof all);
+    all.params = params;
+    all.x0 = x0;
+    all.h = h;
+    all.rows_bar = rows_bar;
 #if PHI_TIMED
-        .t0 = t0,
+    all.t0 = t0;
 #elif PHI_GAUGE
-        .gauge = gauge,
+    all.gauge = gauge;
 #endif
-        .members = members,
-        .steps = steps,
-        .stride = stride,
-        .each = stride > 0 ? (steps + stride - 1) / stride * PHI_DIM : 0,
-        .rows = rows,
-        .x0_bar = x0_bar,
-        .trail = trail,
-        .params_bar = params_bar,
-        .status = status,
-    };
+    all.members = members;
+    all.steps = steps;
+    all.stride = stride;
+    all.each = stride > 0 ? (steps + stride - 1) / stride * PHI_DIM : 0;
+    all.rows = rows;
+    all.x0_bar = x0_bar;
+    all.trail = trail;
+    all.params_bar = params_bar;
+    all.status = status;
 #if PHI_ABREAST
     for (size_t m = 0; m < members; m += PHI_BACK_GROUP) {
         const phi_status member = phi_pull_group(&all, m);

@@ -29,7 +29,10 @@ static int phi_pull_end(const phi_back_group *bar, int m, const phi_pulled *all,
     memcpy(all->x0_bar + at * PHI_DIM, own.x, sizeof own.x);
 #if PHI_PARAMETERS || PHI_MONITOR
     phi_params *own_bar = all->params_bar != NULL ? all->params_bar + at : NULL;
-    phi_solver s = { .h = all->h[at], .params = all->params != NULL ? all->params[at] : phi_default_params };
+    phi_solver s;
+    memset(&s, 0, sizeof s);
+    s.h = all->h[at];
+    s.params = all->params != NULL ? all->params[at] : phi_default_params;
 #if PHI_GAUGE
     memcpy(s.gauge, group->gauge[m], sizeof s.gauge);
 #endif

@@ -54,7 +54,7 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
 #endif
     size_t stride, double *frames, double *attitudes, unsigned char *status)
 {
-    phi_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params, .attitude = attitude };
+    phi_members all = phi_asked(params, x, members, h, steps, status);
     phi_status worst = PHI_OK;
     size_t earliest = members;
     if (members > 0 && (x == NULL || attitude == NULL || h == NULL)) return PHI_BAD_ARGUMENT;
@@ -70,11 +70,11 @@ phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *a
     all.first_member = first_member;
     all.first_step = first_step;
 #endif
-    all.h = h;
+    all.own = 1;
     all.stride = frames != NULL || attitudes != NULL ? stride : 0;
     all.frames = frames;
+    all.attitude = attitude;
     all.attitudes = attitudes;
-    all.status = status;
 #ifdef _OPENMP
 #pragma omp parallel for schedule(dynamic, 16)
 #endif

@@ -69,7 +69,7 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 #endif
 {
     const phi_params shared = params != NULL ? *params : phi_default_params;
-    phi_members all = { .x = x, .members = members, .steps = steps, .params = &shared, .h = &h, .status = status };
+    phi_members all = phi_asked(&shared, x, members, &h, steps, status);
     if (x == NULL && members > 0) return PHI_BAD_ARGUMENT;
 #if PHI_TIMED
     all.t0 = &t0;
@@ -169,7 +169,7 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
     size_t stride, double *frames, unsigned char *status)
 #endif
 {
-    phi_members all = { .x = x, .members = members, .steps = steps, .own = 1, .params = params, .h = h };
+    phi_members all = phi_asked(params, x, members, h, steps, status);
     if (members > 0 && (x == NULL || h == NULL)) return PHI_BAD_ARGUMENT;
     if (frames != NULL && stride == 0) return PHI_BAD_ARGUMENT;
 #if PHI_TIMED
@@ -179,9 +179,9 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
 #if PHI_GAUGE
     all.gauge = gauge;
 #endif
+    all.own = 1;
     all.stride = frames != NULL ? stride : 0;
     all.frames = frames;
-    all.status = status;
     return phi_run(&all);
 }
 #endif

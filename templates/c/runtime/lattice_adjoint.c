@@ -242,8 +242,9 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
     if (size < phi_trail_size(s, 1)) return PHI_BAD_ARGUMENT;
     phi_status status = phi_set_step(s, h);
     if (status != PHI_OK) return status;
-    phi_transpose g = { 0 };
+    phi_transpose g;
     double coef_bar[PHI_SUMS];
+    memset(&g, 0, sizeof g);
 #if PHI_UNDONE
     g.leg = PHI_STRETCH;
 #if !PHI_NEAR

@@ -82,7 +82,7 @@ static void phi_put_entry(const phi_matrix *m, ptrdiff_t i, ptrdiff_t j, double 
 static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, int now, ptrdiff_t first, ptrdiff_t count, int f)
 {
     const ptrdiff_t sites = s->length, apart = 2 * PHI_REACH + 1;
-    const ptrdiff_t reach = sites < apart ? sites / 2 : PHI_REACH;
+    const ptrdiff_t reach = sites < apart ? sites / 2 : (ptrdiff_t)PHI_REACH;
     for (int k = 0; k < PHI_DIM; ++k) {
         for (ptrdiff_t i = PHI_LEAST_COPY; i < PHI_AND_COPIES(sites); ++i) s->v[k][i] = 0.0;
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;

@@ -129,7 +129,7 @@ static void phi_steps(const phi_solver *s, size_t steps)
 #if PHI_NOISE
     for (size_t step = s->steps; step < s->steps + steps; ++step) {
         for (int flow = 0; flow < PHI_FLOWS; ++flow) {
-            if (flow == 0 || flow == PHI_FLOWS - PHI_SOURCES) phi_draw(s, step, flow > 0);
+            if (flow == 0 || flow == PHI_FLOWS - (int)PHI_SOURCES) phi_draw(s, step, flow > 0);
 #if PHI_RENEWED
             phi_make_flow(s, step, flow);
 #else

@@ -57,7 +57,7 @@ typedef struct phi_transpose {
 
 #if PHI_SERIES
 /* The numbers that a step keeps. */
-static size_t phi_numbers_kept(const phi_solver *s) { return PHI_ALL_STAGES(PHI_KEPT) * PHI_DIM * phi_block(s->rows, s->width); }
+static size_t phi_numbers_kept(const phi_solver *s) { return PHI_ALL_STAGES((size_t)PHI_KEPT) * PHI_DIM * phi_block(s->rows, s->width); }
 
 /* Stand after so many steps. */
 static void phi_stand(phi_solver *s, size_t steps)

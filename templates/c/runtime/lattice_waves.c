@@ -30,7 +30,7 @@ static size_t phi_depth(const phi_solver *s)
     if (s->vectors > 0) return 1;
 #endif
     if (bytes <= PHI_CACHE || depth < 2) return 1;
-    return depth < PHI_DEEPEST ? depth : PHI_DEEPEST;
+    return depth < PHI_DEEPEST ? depth : (size_t)PHI_DEEPEST;
 }
 
 static void phi_make_slices(const phi_solver *s, const phi_flow *flow, size_t from, size_t to)

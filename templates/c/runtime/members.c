@@ -1,6 +1,7 @@
 #ifndef PHI_FILE_MEMBERS
 #define PHI_FILE_MEMBERS
 #include <math.h>
+#include <string.h>
 
 #include "solver.h"
 #include "model.h"
@@ -36,6 +37,20 @@ typedef struct {
     double *frames; /* NULL for none */
     unsigned char *status; /* NULL for none */
 } phi_members;
+
+static phi_members phi_asked(const phi_params *params, double *x, size_t members, const double *h, size_t steps,
+    unsigned char *status)
+{
+    phi_members all;
+    memset(&all, 0, sizeof all);
+    all.x = x;
+    all.members = members;
+    all.steps = steps;
+    all.params = params;
+    all.h = h;
+    all.status = status;
+    return all;
+}
 
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
 #if PHI_GAUGE

@@ -16,7 +16,7 @@
    or the step long, and other guesses are as good. */
 #define PHI_HOPELESS 1e-7
 
-enum { PHI_ROWS = PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least squares */
+enum { PHI_ROWS = (int)PHI_REMEMBERED - PHI_WINDOW - PHI_AHEAD - PHI_CHECKS + 1 }; /* equations of the least squares */
 
 /* Make eight columns orthogonal to one, by the multiples of it that are put into r. Where that one is among the eight, those
    up to it stay as they are, and inverse becomes one over its squared length. The number of rows is even. */

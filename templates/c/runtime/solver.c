@@ -50,7 +50,10 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
     if (s == NULL || x0 == NULL) return PHI_BAD_ARGUMENT;
 #endif
     if (params == NULL) params = &phi_default_params;
-    phi_solver fresh = { .h = (double)NAN, .params = *params };
+    phi_solver fresh;
+    memset(&fresh, 0, sizeof fresh);
+    fresh.h = (double)NAN;
+    fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
 #if PHI_TIMED
     fresh.t = t0;

@@ -269,8 +269,9 @@ def _read(step: Sweeps, kernels: Iterable[Kernel]) -> set[str]:
 
 def _sums(program: Program, step: Sweeps) -> str:
     """How many sums there are of each piece of a row."""
-    beside = f" + {program.name}_NUMBERS" * bool(step.equation and step.partners)
-    return f"{program.name}_COEFFICIENTS{beside}"
+    if step.equation and step.partners:
+        return f"(int){program.name}_COEFFICIENTS + {program.name}_NUMBERS"
+    return f"{program.name}_COEFFICIENTS"
 
 
 def _givers(program: Program) -> list[str]:

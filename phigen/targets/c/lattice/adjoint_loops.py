@@ -141,7 +141,7 @@ def _looped(
     inner = [f"const ptrdiff_t end = row->to - begin < {name}_ADDED ? row->to : begin + {name}_ADDED;"]
     inner += loop
     count = "row->to - row->from"
-    lines = [f"const ptrdiff_t apart = {count} < {name}_ADDED ? {count} : {name}_ADDED;", f"double {kept};"]
+    lines = [f"const ptrdiff_t apart = {count} < {name}_ADDED ? {count} : (ptrdiff_t){name}_ADDED;", f"double {kept};"]
     lines += [f"memset(share{k}, 0, (size_t)apart * sizeof *share{k});" for k in range(len(shares))]
     lines.append(f"for (ptrdiff_t begin = row->from; begin < row->to; begin += {name}_ADDED) {{")
     lines += [*(f"    {line}" for line in inner), "}"]
