@@ -116,7 +116,9 @@ def without_compiler(monkeypatch, tmp_path_factory):
     monkeypatch.setattr(toolchain, "find_spec", lambda name: None)
 
 
-def pytest_terminal_summary(terminalreporter):
+def pytest_terminal_summary(terminalreporter, exitstatus, config):
+    if exitstatus == pytest.ExitCode.NO_TESTS_COLLECTED and not config.option.all:
+        terminalreporter.write_line("no test, or none that is quick: --all runs the slow ones too")
     skipped = [report.longrepr[2] for report in terminalreporter.stats.get("skipped", [])]
     if skipped:
         terminalreporter.section("what was not tested")
