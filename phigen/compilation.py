@@ -83,6 +83,17 @@ class Compilation:
             return f"{self.sweeps.realisation.kind}, on a lattice"
         return "splitting of a lattice"
 
+    @property
+    def described(self) -> dict[str, Any]:
+        """The method for machines; of a lattice its colours too, and why it is the series, or has more of them, where
+        sizes of runs ask it."""
+        if self.sweeps is None:
+            return {"scheme": "splitting" if self.splitting else "series"}
+        from phigen.lattice.series import SeriesPlan
+
+        scheme = "series" if isinstance(self.sweeps, SeriesPlan) else "splitting"
+        return {"scheme": scheme, "colours": self.sweeps.colouring.count, "since": self.sweeps.since or None}
+
     def told(self, method: str) -> str:
         """A line that names the method, and why it is the series, or has more colours, where sizes of runs ask it."""
         if self.sweeps is None or not self.sweeps.since:

@@ -177,6 +177,7 @@ def _described(examination: Examination) -> dict[str, object]:
     return {
         "name": examination.spec.name,
         "file": examination.spec.file,
+        **(examination.compilation.described if examination.compilation else {}),
         "refuted": len(examination.refuted),
         "statements": listed,
         "obstacles": obstacle,

@@ -83,7 +83,7 @@ def run_lattice(
     if as_json:
         sizes = {"sizes": list(start.sizes), "frames": len(made)}
         method = {"target": solver.target, "order": solver.order, "step": made.h, "steps": made.steps}
-        told = {"name": spec.name, "run": run.name, **sizes, **method, "errors": largest}
+        told = {"name": spec.name, "run": run.name, **sizes, **method, **compilation.described, "errors": largest}
         out_json(finite(told | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
         told_method = compilation.told(f"{compilation.label}, order {solver.order}, target {solver.target}")

@@ -96,7 +96,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "target": solver.target,
         "order": solver.order,
         "birealisation": compilation.realisation.kind if compilation.realisation else None,
-        "scheme": "splitting" if compilation.splitting else "series",
+        **compilation.described,
         "exact": compilation.exact,
         "step": experiment.h,
         "steps": recorder.steps,

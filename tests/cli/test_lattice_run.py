@@ -58,6 +58,12 @@ def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
     assert f"Bi-realisation (constant in logarithms){said}" in phigen("check", spec).stdout
     assert f"order 4, target numpy{said}" in phigen("run", spec, "-t", "numpy").stdout
     assert "since" not in phigen("run", spec, "-t", "numpy", "--sizes", "6").stdout
+    why = {"scheme": "series", "colours": 1, "since": said.removeprefix(": the series, since ").strip()}
+    (checked,) = json.loads(phigen("check", spec, "--json").stdout)
+    assert why.items() <= checked.items()
+    assert why.items() <= json.loads(phigen("run", spec, "-t", "numpy", "--json").stdout).items()
+    split = json.loads(phigen("run", spec, "-t", "numpy", "--sizes", "6", "--json").stdout)
+    assert {"scheme": "splitting", "colours": 3, "since": None}.items() <= split.items()
 
 
 def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours(phigen, tmp_path):
