@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import zipfile
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import click
 import numpy as np
 
-from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
-from phigen.runtime.ending import End, at_time, where_zero
 from phigen.runtime.interface import BackendError, Draws, Floats, Interface
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Column
 from phigen.runtime.trajectory import element_columns, trajectory_columns
-from phigen.study.sections import function_of
 
-#: How many times may be asked for.
-_MOST_TIMES = 10_000_000
 #: Times apart by less of all that has passed are one.
 _EQUAL = 1e-9
 
@@ -127,89 +120,3 @@ def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
         message = f"{path} ends with a part of a step, at t = {past.t!r}, which the means of members are not told of"
         raise click.BadParameter(f"{message}: make the run anew, to its new end", param_hint="--extend")
     return found
-
-
-def ended(experiment: Experiment, solver: Solver, console: Console) -> Experiment:
-    """The experiment with its end, where that is at a time, or where ``stop`` passes through zero."""
-    run, h = experiment.run, experiment.h
-    end: End | None = None
-    if run.until is not None:
-        span = float(run.until) - experiment.begin
-        if span * h <= 0:
-            message = f"{float(run.until)!r} is never reached from {experiment.begin!r}"
-            raise click.BadParameter(message, param_hint="--until")
-        end = at_time(begun(solver, experiment), h, span)
-    if run.stop is not None:
-        end = _stopped(experiment, solver, console, end) or end
-    if end is None:
-        return experiment
-    stride = max(1, min(run.stride, end.steps))
-    return replace(experiment, run=replace(run, steps=end.steps, stride=stride), end=end)
-
-
-def _stopped(experiment: Experiment, solver: Solver, console: Console, end: End | None) -> End | None:
-    """Where ``stop`` is met, if that is before the end."""
-    run, names, h = experiment.run, solver.interface, experiment.h
-    assert run.stop is not None
-    g = function_of(run.stop, names.coordinates, experiment.parameters, names.time)
-    most = end.steps + 1 if end else run.steps
-    found = where_zero(begun(solver, experiment), h, most, g, experiment.begin, timed=bool(names.time))
-    if found is None:
-        console.note("stop: is not met")
-        return None
-    if end is None or found.steps < end.steps:
-        return found
-    start = begun(solver, experiment)
-    start.advance(h, end.steps)
-    return found if found.finish(start)[1] < end.finish(start)[1] else None
-
-
-def timed(experiment: Experiment, solver: Solver, every: float | None, at: str | None) -> Experiment:
-    """The experiment with the times of the states that are stored: every so often, or those listed, up to the end."""
-    run, begin, sign = experiment.run, experiment.begin, math.copysign(1.0, experiment.h)
-    if every is None and at is None:
-        every = float(run.every) if run.every is not None else None
-    if every is None and at is None:
-        return experiment
-    if experiment.end is None and solver.interface.monitored:
-        raise click.UsageError("steps are equal in τ here: say where the run ends in time, by --until or until:")
-    end = experiment.until
-    if at is not None:
-        times = _listed(at)
-        beyond = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
-        stopped = experiment.end is not None and experiment.end.stopped
-        outside = [t for t in times if (t - begin) * sign < 0] + ([] if stopped else beyond)
-        if outside:
-            raise click.BadParameter(f"{outside[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
-        times = sorted({*times} - {begin, *beyond}, reverse=sign < 0)
-        _expect_whole(experiment, solver, times, "--at")
-        return replace(experiment, times=tuple(times))
-    assert every is not None
-    if not every > 0 or not math.isfinite(every):
-        raise click.BadParameter("the time between states must be positive", param_hint="--every")
-    count = abs(end - experiment.t0) / every * (1 + 1e-12)
-    if count > _MOST_TIMES:
-        raise click.BadParameter(f"that would be {count:.3g} states", param_hint="--every")
-    times = [experiment.t0 + sign * every * k for k in range(1, int(count) + 1)]
-    _expect_whole(experiment, solver, times, "--every")
-    return replace(experiment, times=tuple(t for t in times if (t - begin) * sign > 0))
-
-
-def _expect_whole(experiment: Experiment, solver: Solver, times: Sequence[float], option: str) -> None:
-    """That a path of the noise is known at these times: at the ends of its steps, and nowhere between."""
-    for time in times if solver.interface.noise else ():
-        steps = (time - experiment.begin) / experiment.h
-        if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):
-            message = f"with noise states are known after whole steps of {abs(experiment.h)!r}, and {time!r} is not"
-            raise click.BadParameter(f"{message} at the end of one", param_hint=option)
-
-
-def _listed(at: str) -> list[float]:
-    text: Any = Path(at).read_text(encoding="utf-8") if Path(at).is_file() else at
-    try:
-        times = [float(word) for word in text.replace(",", " ").split()]
-    except ValueError as error:
-        raise click.BadParameter(f"times are numbers, or a file of them: {error}", param_hint="--at") from None
-    if not times or not all(map(math.isfinite, times)):
-        raise click.BadParameter("times are finite numbers, at least one", param_hint="--at")
-    return times

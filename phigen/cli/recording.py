@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -123,7 +123,9 @@ class Recorder:
     @property
     def spectrum(self) -> Spectrum | None:
         """The Lyapunov exponents so far, if they were asked for and a step was made."""
-        return self.growth.spectrum() if self.growth and self.steps else None
+        if self.growth is None or not self.steps:
+            return None
+        return replace(self.growth.spectrum(), clock="τ" if self.solver.interface.monitored else "t")
 
     def start(self) -> None:
         """Stand at the initial state, with new files."""
@@ -271,7 +273,8 @@ class Recorder:
     def trajectory(self, broken: bool) -> Trajectory:
         """As many rows as a figure can show; ``broken`` marks the end of a run that failed."""
         names, about = self.solver.interface, self.experiment
-        return self.sketch.trajectory(names.coordinates, names.casimirs, about.h, about.parameters, broken)
+        made = about.h, self.steps, about.parameters
+        return self.sketch.trajectory(names.coordinates, names.casimirs, *made, broken)
 
     def _parts(self) -> dict[str, Any]:
         parts = {"watch": self.watch, "sketch": self.sketch, "points": self.points, "growth": self.growth}
@@ -432,4 +435,4 @@ def compared(
                 progress(int(numbers[-1]))
     console.detail(f"{method}: {time.perf_counter() - start:.3f} s")
     broken = int(watch.state["good"]) < rows.count
-    return watch, sketch.trajectory(names.coordinates, names.casimirs, h, parameters, broken)
+    return watch, sketch.trajectory(names.coordinates, names.casimirs, h, run.steps, parameters, broken)

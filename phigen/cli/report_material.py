@@ -38,12 +38,16 @@ def gathered(
     console: Console,
 ) -> tuple[Material, list[PhigenError]]:
     """What the page is made of, and what failed on the way."""
+    from phigen.cli.endings import ended, timed
+
     material = Material(found, compilation, written)
     if experiment is None:
         note = "The spec has no runs: nothing was measured. Add one under runs: with initial, step and steps."
         return replace(material, notes=(note,)), []
     material = replace(material, live=_live(compilation, experiment, scheme, console))
-    material, failures = _integrated(material, experiment, lyapunov, console)
+    solver = loaded(compilation, "auto", console)
+    experiment = timed(ended(experiment, solver, console), solver)
+    material, failures = _integrated(material, solver, experiment, lyapunov, console)
     if failures:
         return material, failures
     verification = _verified(compilation, experiment, quick, console)
@@ -68,13 +72,13 @@ def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, 
 
 
 def _integrated(
-    material: Material, experiment: Experiment, lyapunov: bool, console: Console
+    material: Material, solver: Solver, experiment: Experiment, lyapunov: bool, console: Console
 ) -> tuple[Material, list[PhigenError]]:
     """With the trajectories of the solver and of the methods that the run compares with."""
     from phigen.cli.recording import Files, Recorder, compared
+    from phigen.cli.run_summary import told_steps
 
     compilation, run = material.compilation, experiment.run
-    solver = loaded(compilation, "auto", console)
     console.note(f"{compilation.spec.name}: run {run.name}, {run.steps} steps")
     recorder = Recorder(compilation, solver, experiment, Files(), lyapunov)
     failure = _recorded(recorder, console)
@@ -87,6 +91,7 @@ def _integrated(
     made = replace(
         material,
         run=run,
+        steps=told_steps(recorder),
         opening=opening,
         methods=methods,
         summaries=tuple(summaries),
@@ -114,10 +119,11 @@ def _opening(
     """Every one of the first steps, by the solver and by other methods; nothing if the run has no more."""
     from phigen.cli.recording import Files, Recorder, compared
 
-    run = experiment.run
-    if run.stride == 1 and run.steps <= _OPENING:
+    run, short = experiment.run, experiment.run.steps <= _OPENING
+    if run.stride == 1 and short and experiment.times is None:
         return {}
-    first = replace(experiment, run=replace(run, steps=min(run.steps, _OPENING), stride=1, section=None))
+    opening = replace(run, steps=min(run.steps, _OPENING), stride=1, section=None)
+    first = replace(experiment, run=opening, end=experiment.end if short else None, times=None)
     recorder = Recorder(compilation, solver, first, Files(), lyapunov=False)
     failure = _recorded(recorder, console)
     beside = {method: compared(compilation, solver, first, method, console, recorder.time)[1] for method in others}

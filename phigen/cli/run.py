@@ -101,7 +101,8 @@ def command(
     written while the run goes on; one that is interrupted keeps what it has, and goes on with --resume.
     """
     from phigen.api import compilation_of
-    from phigen.cli.past import ended, extended, past_of, started_from, timed
+    from phigen.cli.endings import ended, timed
+    from phigen.cli.past import extended, past_of, started_from
     from phigen.cli.recording import Files, Recorder, compared, opened_recorder, record
     from phigen.cli.verify import with_tangent
 

@@ -19,14 +19,12 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     """The table of a run: one column for each method; then crossings and exponents, if asked for."""
     from phigen.study.conservation import stated
 
-    run, solver, steps = recorder.experiment.run, recorder.solver, recorder.steps
+    run, solver = recorder.experiment.run, recorder.solver
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
-    unit = " in τ" if solver.interface.monitored else ""
     times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
-    part = " and a part of one" if recorder.number > steps else ""
     past = " beyond what there was" if recorder.experiment.past else ""
-    out(f"  {steps} steps of {float(run.step):.9g}{unit}{part}{past}, t = {times}; {chosen}")
+    out(f"  {told_steps(recorder)}{past}, t = {times}; {chosen}")
     state = recorder.session.state().tolist()
     final = ", ".join(f"{c} = {v:.9g}" for c, v in zip(solver.coordinates, state, strict=True))
     out(f"  final state: {final}\n")
@@ -44,9 +42,16 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         out(f"\n  {count} of the section {recorder.section_text} = 0")
     if spectrum := recorder.spectrum:
         changed = f"the second half changed them by {spectrum.uncertainty:.1g}"
-        clock = "τ" if solver.interface.monitored else "t"
+        clock = spectrum.clock
         out(f"\n  Lyapunov exponents after {clock} = {spectrum.t:.9g}, per unit of {clock}; {changed}")
         out(f"  {', '.join(f'{value:.4g}' for value in spectrum.exponents.tolist())};  sum {spectrum.total:.1g}")
+
+
+def told_steps(recorder: Recorder) -> str:
+    """``60 steps of 0.1 in τ and a part of one``."""
+    unit = " in τ" if recorder.solver.interface.monitored else ""
+    part = " and a part of one" if recorder.number > recorder.steps else ""
+    return f"{recorder.steps} steps of {recorder.experiment.h:.9g}{unit}{part}"
 
 
 def _rows(summaries: Sequence[Summary]) -> list[list[str]]:

@@ -10,7 +10,7 @@ import click
 
 from phigen.cli.arguments import FIGURES, file_ending, one_spec, run_option, settings_option
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import prepared, run_of
+from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.sources import load_one
 from phigen.cli.tune_summary import described, print_monitors, print_tuning, unreached
 from phigen.errors import CheckError, SpecError
@@ -18,7 +18,6 @@ from phigen.errors import CheckError, SpecError
 if TYPE_CHECKING:
     from phigen.cli.experiment import Experiment
     from phigen.compilation import Compilation
-    from phigen.geometry.system import System
     from phigen.spec.model import Run
     from phigen.tuning.problem import Problem
 
@@ -34,7 +33,9 @@ if TYPE_CHECKING:
     "--measure", type=click.Choice(["energy", "orbit"]), default="energy", show_default=True,
     help="Error of the energy on the way, or distance from a reference solution.",
 )  # fmt: skip
-@click.option("--horizon", type=float, metavar="T", help="How long a run is.  [default: as in the spec]")
+@click.option(
+    "--horizon", type=float, metavar="T", help="How long a run is, with a monitor in τ.  [default: as in the spec]"
+)
 @settings_option
 @click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to search.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
@@ -86,7 +87,7 @@ def command(
     compilation = compile_proved(spec)
     chosen_target("auto", console.note)
     if experiment:
-        run, problem = experiment.run, problem_of(compilation.system, experiment, horizon)
+        run, problem = experiment.run, problem_of(compilation, experiment, horizon, console)
     else:
         problem = _of_lattice(console, compilation, run, settings, horizon, measure)
     found = tune(compilation, problem, measure, accuracy, budget, console.note)
@@ -110,14 +111,19 @@ def _expect_positive(value: float | None, option: str) -> None:
         raise click.BadParameter(f"{value!r} is not a positive number", param_hint=option)
 
 
-def problem_of(system: System, experiment: Experiment, horizon: float | None) -> Problem:
-    """The initial value problem of an experiment, over its own duration unless another is given."""
+def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:
+    """The initial value problem of an experiment, as long as its run is unless that is given; with a monitor in τ."""
     import numpy as np
 
+    from phigen.cli.endings import ended, length
     from phigen.tuning.problem import Problem
 
-    start = np.array(experiment.initial)
-    return Problem(system, start, experiment.parameters, *_times(experiment.run, horizon))
+    run, start = experiment.run, np.array(experiment.initial)
+    if horizon is None and (run.until is not None or run.stop is not None):
+        solver = loaded(compilation, "auto", console)
+        horizon = length(ended(experiment, solver, console), solver)
+    clock = "t" if compilation.spec.monitor is None else "τ"
+    return Problem(compilation.system, start, experiment.parameters, *_times(run, horizon), clock=clock)
 
 
 def _of_lattice(

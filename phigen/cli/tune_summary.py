@@ -29,9 +29,8 @@ _ROWS = 1000
 def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
     """The table, what it rests on, and the lines to paste."""
     what = "energy error" if found.measure == "energy" else "error of the orbit"
-    out(
-        heading(f"{spec.name}, run {run.name}") + f": {what} at most {found.accuracy:g} up to t = {found.horizon:.9g}\n"
-    )
+    bound = f"{what} at most {found.accuracy:g} up to {found.clock} = {found.horizon:.9g}"
+    out(heading(f"{spec.name}, run {run.name}") + f": {bound}\n")
     rows = [["", "order", "gauge", "scheme", "step", "error", "ns/step", "run, ms", "ratio"]]
     rows += [_row(f, label, found) for label, f in listed(found)]
     for line in table(rows, right=[1, 4, 5, 6, 7, 8]):
@@ -46,7 +45,7 @@ def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
     assert found.winner is not None
     out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
     out("\n".join(lines_of(found.winner)))
-    out(f"\nand into its run {run.name}, instead of step, stride, and steps or duration:\n")
+    out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
     out("\n".join(f"    {line}" for line in run_lines_of(found, run)))
     if found.monitors:
         print_monitors(found.monitors, found, run)
@@ -75,7 +74,7 @@ def print_monitors(monitors: Monitors, found: Tuning, run: Run) -> None:
         best = gaining[0]
         out("\nTo paste into the spec" + ", in place of what is above" * bool(found.winner) + ":\n")
         out("\n".join(monitored_lines(best)))
-        out(f"\nand into its run {run.name}, instead of step, stride, and steps or duration:\n")
+        out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
         step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(found.horizon, run.step)
         out(f"    step: {step!r}\n    until: {end!r}")
     else:
@@ -139,23 +138,23 @@ def remarks(found: Tuning) -> Iterator[str]:
 
     best = found.winner
     assert best is not None
-    over, whole = best.point.time, found.horizon
+    over, whole = f"{found.clock} = {best.point.time:.4g}", f"{found.clock} = {found.horizon:.6g}"
     if is_measured(best, found):
         yield "Errors were measured up to there" + _extrapolated(found)
     elif found.measure == "energy" and not best.curve.bounded:
-        yield f"Errors were measured up to t = {over:.4g}, and extrapolated (~) as they were seen to grow."
+        yield f"Errors were measured up to {over}, and extrapolated (~) as they were seen to grow."
     elif found.measure == "energy":
-        yield f"Errors were measured up to t = {over:.4g}. Beyond, phigen's stay bounded but for rounding (~)."
+        yield f"Errors were measured up to {over}. Beyond, phigen's stay bounded but for rounding (~)."
     else:
-        yield f"Errors were measured up to t = {over:.4g}; phigen's grow linearly, and so does ~ up to t = {whole:.6g}."
+        yield f"Errors were measured up to {over}; phigen's grow linearly, and so does ~ up to {whole}."
     if found.measure == "energy":
         yield stated({ENERGY: found.unit})
     if best.point.error * _SLACK < found.accuracy and best.point.step > 0.9 * best.curve.largest:
         yield "The accuracy would allow a larger step, but none can be made, or it would not show the motion."
     if found.orbit_error is not None:
         yield (
-            f"The orbit itself is off by {found.orbit_error:.1e} of its size at most up to t = {found.piece:.4g}: "
-            "--measure orbit bounds that."
+            f"The orbit itself is off by {found.orbit_error:.1e} of its size at most up to {found.clock} = "
+            f"{found.piece:.4g}: --measure orbit bounds that."
         )
     if found.sizes:
         sites = "×".join(map(str, found.sizes))
@@ -197,10 +196,13 @@ def lines_of(finalist: Finalist) -> list[str]:
 
 
 def run_lines_of(found: Tuning, run: Run) -> list[str]:
-    """The lines of the run, up to the horizon; long enough strides let a solver take its steps in blocks."""
+    """The lines of the run, up to the horizon, and a step beyond it where a ``stop`` is to be met there.
+
+    Long enough strides let a solver take its steps in blocks.
+    """
     assert found.winner is not None
     step = found.winner.point.step
-    steps = max(1, round(found.horizon / step))
+    steps = max(1, round(found.horizon / step)) + (run.stop is not None)
     rows = max(1, run.steps // run.stride) if found.sizes else _ROWS  # states of lattices are large
     return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // rows)}"]
 
@@ -218,8 +220,8 @@ def unreached(found: Tuning) -> str:
         why = "smaller steps would take longer than the budget allows"
         hint = "a larger --budget, or less accuracy"
     return (
-        f"no setting reaches {found.accuracy:g} up to t = {found.horizon:.6g}: the smallest error is {point.error:.1e} "
-        f"({told}, step {point.step:.3g}); {why}\n  hint: {hint}"
+        f"no setting reaches {found.accuracy:g} up to {found.clock} = {found.horizon:.6g}: the smallest error is "
+        f"{point.error:.1e} ({told}, step {point.step:.3g}); {why}\n  hint: {hint}"
     )
 
 

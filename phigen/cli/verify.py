@@ -127,22 +127,23 @@ def verified(
 ) -> Verification:
     """The verification of a compilation with its tangent map on a run of its spec; of the spec's targets by default.
 
-    Targets that Python cannot run are left out.
+    Targets that Python cannot run are left out. Of a run that ends between two steps all whole ones are made, or one.
     """
     from phigen.api import chosen_target, solver_of
+    from phigen.cli.endings import ended
     from phigen.study.verification import verify
 
     spec = compilation.spec
-    experiment = prepared(spec, name)
-    run = experiment.run
     chosen = loadable(targets or spec.targets) or (chosen_target("auto"),)
     single = solver_of(compilation, "c") if compilation.program.single and "c" in chosen else None
     compilation = compilation.in_double
     solvers = {target: solver_of(compilation, target) for target in chosen}
     console.detail(f"{spec.name}: built {', '.join(solvers)}")
+    experiment = ended(prepared(spec, name), next(iter(solvers.values())), console)
+    run = experiment.run
     return verify(
-        compilation, solvers, run.name, experiment.initial, experiment.parameters, float(run.step), run.steps,
-        run.compare or ("rk4",), t0=float(run.start), quick=quick, single=single,
+        compilation, solvers, run.name, experiment.initial, experiment.parameters, experiment.h, max(1, run.steps),
+        run.compare or ("rk4",), t0=experiment.t0, quick=quick, single=single,
     )  # fmt: skip
 
 
@@ -179,7 +180,7 @@ def print_table(v: Verification) -> None:
     from phigen.study.conservation import stated
 
     out(heading(f"{v.name}, run {v.run}") + f": {v.label}")
-    out(f"  {v.steps} steps of {v.step:.9g}, targets {', '.join(v.targets)}")
+    out(f"  {v.made}, targets {', '.join(v.targets)}")
     rows = [["", "phigen", "required", "", *v.compared]]
     rows += [_row(check, v.compared) for check in v.checks]
     for line in table(rows, right=[1, *range(4, 4 + len(v.compared))]):

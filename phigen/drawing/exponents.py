@@ -25,5 +25,5 @@ def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
     late = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
     height = 1.2 * float(np.max(late)) or 1.0
     axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))
-    axes.set(xscale="log", xlabel="t", title=f"Lyapunov exponents; the largest is {spectrum.largest:.3g}")
+    axes.set(xscale="log", xlabel=spectrum.clock, title=f"Lyapunov exponents; the largest is {spectrum.largest:.3g}")
     axes.grid(True)

@@ -19,7 +19,7 @@ def draw_convergence(axes: Any, study: Study) -> None:
         slope = f"slope {curve.slope:.2f}" if math.isfinite(curve.slope) else "slope unknown"
         _draw(axes, place, [p.step for p in curve.points], [p.error for p in curve.points], f"{label(curve)}: {slope}")
     _draw_slope(axes, study.curves[0])
-    axes.set(xlabel="step h", ylabel=f"relative error at t = {study.time:.4g}")
+    axes.set(xlabel="step h", ylabel=f"relative error at {study.clock} = {study.time:.4g}")
     _finish(axes, study.floor)
 
 
@@ -27,7 +27,7 @@ def draw_work(axes: Any, study: Study) -> None:
     """Error of the solution against the seconds of a run."""
     for place, curve in enumerate(study.curves):
         _draw(axes, place, [p.seconds for p in curve.points], [p.error for p in curve.points], label(curve))
-    axes.set(xlabel="seconds of the run", title=f"relative error of the solution at t = {study.time:.4g}")
+    axes.set(xlabel="seconds of the run", title=f"relative error of the solution at {study.clock} = {study.time:.4g}")
     _finish(axes, study.floor)
 
 
@@ -35,7 +35,7 @@ def draw_conserved(axes: Any, study: Study) -> None:
     """The largest error of a Casimir against the seconds of a run."""
     for place, curve in enumerate(study.curves):
         _draw(axes, place, [p.seconds for p in curve.points], [p.casimirs for p in curve.points], label(curve))
-    axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at t = {study.time:.4g}")
+    axes.set(xlabel="seconds of the run", title=f"relative error of the Casimirs at {study.clock} = {study.time:.4g}")
     _finish(axes)
 
 

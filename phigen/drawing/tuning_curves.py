@@ -40,7 +40,7 @@ def draw_tuning(axes: Any, found: Tuning) -> None:
     what = "energy error" if found.measure == "energy" else "error of the orbit"
     axes.set(
         xscale="log", yscale="log", xlabel="CPU time of the run, ms",
-        ylabel=f"{what} up to t = {found.horizon:.4g}", title=_basis(found),
+        ylabel=f"{what} up to {found.clock} = {found.horizon:.4g}", title=_basis(found),
     )  # fmt: skip
     axes.grid(True)
     axes.minorticks_off()
@@ -58,5 +58,5 @@ def _basis(found: Tuning) -> str:
         return "measured over all of it"
     best = found.winner
     farther = best is not None and best.point.time > 1.01 * found.piece
-    over = f"; stars: measured to t = {best.point.time:.4g}" if best and farther else ""
-    return f"measured to t = {found.piece:.4g} and extrapolated{over}"
+    over = f"; stars: measured to {found.clock} = {best.point.time:.4g}" if best and farther else ""
+    return f"measured to {found.clock} = {found.piece:.4g} and extrapolated{over}"

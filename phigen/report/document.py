@@ -69,16 +69,17 @@ def _run(material: Material) -> Iterator[Markup]:
     last = int(np.flatnonzero(np.isfinite(first.x).all(axis=1))[-1])
     start, end = (_values(dict(zip(first.coordinates, first.x[row].tolist(), strict=True))) for row in (0, last))
     stored = "all stored" if run.stride == 1 else f"one in {run.stride} stored"
+    stored = stored if run.every is None else f"states stored at times {float(run.every):.9g} apart"
     pairs = [("run", run.name), ("start", start)]
     if run.description:
         pairs.insert(1, ("description", run.description))
     if first.parameters:
         pairs.append(("parameters", _values(first.parameters)))
-    pairs += [("steps", f"{first.steps} of {first.h:.9g}, {stored}"), (f"t = {first.t[last]:.9g}", end)]
+    pairs += [("integrated", f"{material.steps}, {stored}"), (f"t = {first.t[last]:.9g}", end)]
     yield page.facts(pairs)
     yield evidence.summary_table(material.summaries)
     if material.spectrum:
-        yield evidence.lyapunov_paragraph(material.spectrum, "τ" if material.compilation.monitor is not None else "t")
+        yield evidence.lyapunov_paragraph(material.spectrum)
     if not drawable():
         yield page.paragraph(NO_FIGURES, "note")
         yield viewer(material.methods, material.opening, material.compilation.system.casimirs)

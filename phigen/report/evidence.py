@@ -80,7 +80,7 @@ def measured_section(v: Verification) -> Markup:
     columns += [("number", method) for method in v.compared]
     rows = [_check(check, v.compared) for check in v.checks]
     targets = " and ".join(TARGETS[t].title for t in v.targets)
-    said = f"Run {v.run}: {v.steps} steps of {v.step:.9g}, generated for {targets}. Solver: {v.label}."
+    said = f"Run {v.run}: {v.made}, generated for {targets}. Solver: {v.label}."
     meanings = dict.fromkeys(meaning_of(check.name) for check in v.checks)
     title = "What the solver shows" + ", and classical methods beside it" * bool(v.compared)
     rows_explained = page.facts((m.row, page.typeset(_meaning(m))) for m in meanings)
@@ -111,16 +111,14 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
     return page.joined([listed, page.paragraph(page.typeset(stated(first.units)), "note")])
 
 
-def lyapunov_paragraph(spectrum: Spectrum, clock: str = "t") -> Markup:
-    """The exponents, and how well they are known; ``clock`` is what their steps are equal in."""
+def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
+    """The exponents, and how well they are known."""
     found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
-    late = page.scientific(spectrum.uncertainty)
+    late, after = page.scientific(spectrum.uncertainty), f"{spectrum.clock} = {spectrum.t:.9g}"
     if len(spectrum.exponents) == 1:
-        said = f"The largest Lyapunov exponent after t = {spectrum.t:.9g} is {found}."
+        said = f"The largest Lyapunov exponent after {after} is {found}."
         return page.paragraph(f"{said} The second half of the time changed it by {late}.")
-    said = (
-        f"Lyapunov exponents after {clock} = {spectrum.t:.9g}: {found}; their sum is {page.scientific(spectrum.total)}."
-    )
+    said = f"Lyapunov exponents after {after}: {found}; their sum is {page.scientific(spectrum.total)}."
     known = f"The second half of the time changed them by {late}, at most."
     return page.paragraph(f"{said} {known}")
 
@@ -156,7 +154,7 @@ def _measured_tiles(v: Verification) -> Iterator[Tile]:
     judged = [c for c in v.checks if c.limit]
     passed = sum(c.passed for c in judged)
     kind = _GOOD if passed == len(judged) else _BAD
-    yield kind, f"{passed} of {len(judged)}", "measured properties hold", f"{v.steps} steps of {v.step:.9g}"
+    yield kind, f"{passed} of {len(judged)}", "measured properties hold", v.made
     casimirs = [c for c in v.checks if c.name.startswith("Casimir") and "largest" in c.name]
     if casimirs:
         worst = max(casimirs, key=lambda c: c.value)

@@ -22,9 +22,9 @@ from phigen.symbolic.arrays import Floats
 class Material:
     """What was proved, and what was measured on one run; what could not be had is None, and ``notes`` say why.
 
-    ``methods`` are trajectories by their labels, the solver's first; ``opening`` has each of the first steps, where
-    ``methods`` do not have all. ``section`` is what its Poincaré section is the zero of, some of its points
-    (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
+    ``steps`` are those of the run, in words. ``methods`` are trajectories by their labels, the solver's first;
+    ``opening`` has each of the first steps, where ``methods`` do not have all. ``section`` is what its Poincaré section
+    is the zero of, some of its points (rows, DIM), and how many there are; ``spectrum`` are its Lyapunov exponents.
     ``constancy`` is that of the modified Hamiltonian; ``no_constancy`` says why there is none.
     ``environment`` says what the times depend on. ``command`` makes the page again.
     """
@@ -33,6 +33,7 @@ class Material:
     compilation: Compilation
     command: str
     run: Run | None = None
+    steps: str = ""
     methods: Mapping[str, Trajectory] = field(default_factory=dict)
     opening: Mapping[str, Trajectory] = field(default_factory=dict)
     summaries: tuple[Summary, ...] = ()

@@ -31,7 +31,7 @@ def trajectory_picture(compilation: Compilation, trajectory: Trajectory) -> Mark
     """The trajectory in phase space."""
     names = ", ".join(trajectory.coordinates)
     figure = figures.trajectory_figure(_thinned(trajectory), compilation.system.casimirs)
-    caption = f"The trajectory of {names}, from the dot at t = 0 to t = {trajectory.t[-1]:.9g}."
+    caption = f"The trajectory of {names}, from the dot at t = {trajectory.t[0]:.9g} to t = {trajectory.t[-1]:.9g}."
     # Three coordinates are what the viewer shows, but on paper and without scripts.
     instead = "instead" if len(trajectory.coordinates) == 3 else ""
     return picture("trajectory", figure, "Trajectory in phase space", caption, caption, instead)
@@ -72,7 +72,7 @@ def constancy_picture(found: Constancy) -> Markup:
 
 def lyapunov_picture(spectrum: Spectrum) -> Markup:
     """How the Lyapunov exponents converged."""
-    caption = f"How the Lyapunov exponents converge, up to t = {spectrum.t:.9g}."
+    caption = f"How the Lyapunov exponents converge, up to {spectrum.clock} = {spectrum.t:.9g}."
     found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     return picture(
         "lyapunov", figures.lyapunov_figure(spectrum), "Lyapunov exponents", f"At the end: {found}.", caption
@@ -82,7 +82,8 @@ def lyapunov_picture(spectrum: Spectrum) -> Markup:
 def convergence_picture(study: Study) -> Markup:
     """Error against step size."""
     slopes = page.listed({f"{c.label} (order {c.order})": c.slope for c in study.curves})
-    caption = f"Error at t = {study.time:.4g} against the step. The thin line has the slope of the stated order."
+    caption = f"Error at {study.clock} = {study.time:.4g} against the step. "
+    caption += "The thin line has the slope of the stated order."
     return picture(
         "convergence", figures.convergence_figure(study), "Convergence", f"Observed orders: {slopes}.", caption
     )
@@ -92,7 +93,7 @@ def work_picture(study: Study) -> Markup:
     """Error against time."""
     figure = figures.work_precision_figure(study)
     words = "; ".join(_fastest(study, tolerance) for tolerance in (1e-3, 1e-6, 1e-9))
-    caption = f"Error at t = {study.time:.4g} against the time of the run (measured)."
+    caption = f"Error at {study.clock} = {study.time:.4g} against the time of the run (measured)."
     return picture("work", figure, "Work and precision", f"Seconds needed: {words}.", caption)
 
 

@@ -15,9 +15,9 @@ TOLERANCES = (1e-3, 1e-6, 1e-9, 1e-12)
 def precision_section(study: Study) -> Markup:
     """Convergence, work and precision, and under which conditions they were measured."""
     said = (
-        f"All methods solve the same problem up to t = {study.time:.9g}, {study.steps} steps of the run, with steps up "
-        f"to 64 times larger and 128 times smaller. Errors are relative, against {study.reference}, which is good to "
-        f"{page.scientific(study.floor)}."
+        f"All methods solve the same problem up to {study.clock} = {study.time:.9g}, {study.steps} steps of the run, "
+        "with steps up to 64 times larger and 128 times smaller. Errors are relative, against "
+        f"{study.reference}, which is good to {page.scientific(study.floor)}."
     )
     blocks = [page.paragraph(said)]
     if drawable():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,6 +44,16 @@ def at_time(session: Session, h: float, span: float) -> End:
         return there, steps + size / h
 
     return End(steps, finish, span, part)
+
+
+def after_steps(session: Session, h: float, steps: int) -> End:
+    """The end after so many whole steps, of a session that tells their time: it stands at its start, and goes on.
+
+    Where one fails, the time is that before it.
+    """
+    with suppress(BackendError):  # which the run itself will tell
+        session.advance(h, steps)
+    return End(steps, lambda here: (here, float(steps)), session.time(), part=False)
 
 
 def where_zero(session: Session, h: float, most: int, g: Function, t0: float, *, timed: bool) -> End | None:

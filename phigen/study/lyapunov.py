@@ -29,12 +29,14 @@ _SPACING = 2 ** (1 / 8)
 class Spectrum:
     """The exponents of a trajectory after the time ``t``, the largest first, and how they converged.
 
-    ``history`` (rows, DIM) holds the exponents at the times ``times`` (rows,), which grow geometrically.
+    ``history`` (rows, DIM) holds the exponents at the times ``times`` (rows,), which grow geometrically. The ``clock``
+    is what steps are equal in: with a monitor all is in τ.
     """
 
     exponents: Floats
     times: Floats
     history: Floats
+    clock: str = "t"
 
     @property
     def largest(self) -> float:

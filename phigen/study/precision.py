@@ -53,10 +53,11 @@ class Curve:
 
 @dataclass(frozen=True)
 class Study:
-    """What was measured from 0 to ``time``; errors below ``floor`` are those of the ``reference``.
+    """What was measured from 0 to ``time`` of the ``clock``, t or τ.
 
-    ``set_up`` are the seconds that the solver takes once per trajectory; those of the points do not contain it.
-    ``language`` is that of all methods, ``rounds`` the number of repetitions.
+    Errors below ``floor`` are those of the ``reference``. ``set_up`` are the seconds that the solver takes once per
+    trajectory; those of the points do not contain it. ``language`` is that of all methods, ``rounds`` the number of
+    repetitions.
     """
 
     time: float
@@ -67,6 +68,7 @@ class Study:
     language: str
     rounds: int
     curves: tuple[Curve, ...]
+    clock: str = "t"
 
     @property
     def has_casimirs(self) -> bool:
@@ -108,7 +110,7 @@ def study(
         )
         curves.append(Curve(label, orders[label], points, slopes[label]))
     reference = "the closed form" if solution else "DOP853 at small steps"
-    return Study(h * span, span, floor, reference, seconds["", 0], race.language, rounds, tuple(curves))
+    return Study(h * span, span, floor, reference, seconds["", 0], race.language, rounds, tuple(curves), race.clock)
 
 
 def error_of(state: Floats, target: Floats) -> float:

@@ -19,6 +19,7 @@ from phigen.runtime import cache
 from phigen.runtime.solver import Solver
 from phigen.study import classical, dop853
 from phigen.study.methods import extended, field_of
+from phigen.study.monitored import field_in_tau
 from phigen.symbolic.arrays import Floats
 
 #: The label of the solver among the methods.
@@ -40,18 +41,19 @@ Runner = Callable[[float, int, int], Floats | None]
 class Race:
     """The runners by their labels, and ``set_up``: what the solver does once per trajectory, so many times over.
 
-    ``language`` is what all of them are written in: ``C`` or ``Python``.
+    ``language`` is what all of them are written in: ``C`` or ``Python``. The ``clock`` is what steps are equal in.
     """
 
     runners: Mapping[str, Runner]
     set_up: Callable[[int], object]
     language: str
+    clock: str = "t"
 
 
 def compiled(
     compilation: Compilation, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """The solver and those of the methods that are explicit, in C. Raises `ToolchainError`."""
+    """The solver and those of the methods that are explicit, in C, with a monitor all in τ. Raises `ToolchainError`."""
     from phigen.targets.rendering import render
 
     name = compilation.program.name
@@ -59,6 +61,8 @@ def compiled(
     explicit = [m for m in methods if m in TABLEAUX]
     timed = bool(compilation.program.time)
     values: dict[str, object] = {"name": name, "methods": [_printed(m, timed=timed) for m in explicit], "time": timed}
+    monitored = compilation.program.monitor is not None
+    values |= {"monitored": monitored, "field": f"{name}_race_field" if monitored else f"{name}_vector_field"}
     values |= {"start": f", {t0!r}" * timed, "now": f"{t0!r} + (double)n * h, " * timed}
     source = render("timing", "race.c", values)
     library = cache.load({f"{name}.h": files[f"{name}.h"], f"{name}.inc": files[f"{name}.c"], f"{name}_race.c": source})
@@ -85,13 +89,13 @@ def compiled(
         return run
 
     own = runner(OWN, begun) if set_up(1) == 0 else lambda h, steps, repeats: None
-    return Race({OWN: own, **{m: runner(m, packed) for m in explicit}}, set_up, "C")
+    return Race({OWN: own, **{m: runner(m, packed) for m in explicit}}, set_up, "C", "τ" if monitored else "t")
 
 
 def interpreted(
     solver: Solver, methods: Sequence[str], start: Floats, parameters: Mapping[str, float], t0: float = 0.0
 ) -> Race:
-    """The solver and the methods as Python runs them."""
+    """The solver and the methods as Python runs them, with a monitor all in τ."""
 
     begin = t0 if solver.interface.time else None
 
@@ -103,7 +107,8 @@ def interpreted(
             return None
         return found
 
-    field, first = field_of(solver, parameters), extended(solver, start, t0)
+    field = field_in_tau(solver, parameters) if solver.interface.monitored else field_of(solver, parameters)
+    first = extended(solver, start, t0)
 
     def runner(method: str) -> Runner:
         def run(h: float, steps: int, repeats: int) -> Floats | None:
@@ -114,7 +119,7 @@ def interpreted(
         return run
 
     runners = {OWN: own, **{method: runner(method) for method in methods}}
-    return Race(runners, lambda repeats: None, "Python")
+    return Race(runners, lambda repeats: None, "Python", "τ" if solver.interface.monitored else "t")
 
 
 def _printed(method: str, *, timed: bool) -> tuple[str, int, list[tuple[int, str, str]], str]:

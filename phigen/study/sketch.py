@@ -107,6 +107,7 @@ class Sketch:
         coordinates: tuple[str, ...],
         casimirs: tuple[str, ...],
         h: float,
+        steps: int,
         parameters: Mapping[str, float],
         broken: bool = False,
     ) -> Trajectory:
@@ -126,7 +127,7 @@ class Sketch:
             x=x,
             energy=rows[:, 1 + self._dimension],
             casimirs=dict(zip(casimirs, values, strict=True)),
-            steps=round(float(t[-1]) / h),
+            steps=steps,
             h=h,
             parameters=parameters,
             coordinates=coordinates,

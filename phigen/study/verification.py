@@ -65,7 +65,7 @@ class Check:
 class Verification:
     """All checks of one spec on one run; ``label`` says what the solver claims to be, ``units`` what errors are in.
 
-    Of a lattice ``said`` does that in words.
+    Of a lattice ``said`` does that in words. The ``clock`` is what steps are equal in, t or τ.
     """
 
     name: str
@@ -78,6 +78,12 @@ class Verification:
     checks: tuple[Check, ...]
     units: Mapping[str, Unit]
     said: str = ""
+    clock: str = "t"
+
+    @property
+    def made(self) -> str:
+        """What was made, in words."""
+        return f"{self.steps} steps of {self.step:.9g}" + " in τ" * (self.clock == "τ")
 
     @property
     def failures(self) -> list[str]:
@@ -169,6 +175,7 @@ def verify(
             },
         ),
         units_of(compilation.system, {**parameters, **dict.fromkeys(compilation.system.times, t0)}, x),
+        clock="t" if compilation.program.monitor is None else "τ",
     )
 
 

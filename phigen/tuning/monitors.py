@@ -35,7 +35,7 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.numeric import DomainError
 from phigen.tuning.building import Built, Refusal, build_all
 from phigen.tuning.problem import ROWS, Problem
-from phigen.tuning.scales import MOST_TURN, fastest_rate
+from phigen.tuning.scales import MOST_TURN, fastest_rate, motion
 from phigen.tuning.settings import SPLITTING, Setting
 from phigen.tuning.trials import ROUNDING
 
@@ -196,12 +196,7 @@ def _trial(
 
 def _largest(solver: Solver, problem: Problem, states: Floats) -> float:
     """The largest step that shows the motion, in whose fastest turn it is."""
-    backend, given = solver.backend, problem.parameters
-
-    def moving(x: Floats) -> Floats:
-        rate = backend.rate(x, given)[:, np.newaxis] if solver.interface.monitored else 1.0
-        return np.asarray(rate * backend.vector_field(x, given))
-
+    moving = motion(solver.backend, problem.parameters, monitored=solver.interface.monitored)
     return MOST_TURN / max(fastest_rate(moving, states[:: max(1, len(states) // 64)]), 1e-300)
 
 

@@ -27,7 +27,8 @@ ROWS = 8_000
 class Problem:
     """What is solved: the numbers of a run, and for how long. ``step`` is that of the run, a first guess.
 
-    Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice.
+    Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice. All
+    times are those of the ``clock``: of τ where there is a monitor, which all methods have then.
     """
 
     system: System
@@ -37,6 +38,7 @@ class Problem:
     horizon: float
     direction: float = 1.0
     sizes: tuple[int, ...] = ()
+    clock: str = "t"
 
     @property
     def unit(self) -> Unit:

@@ -32,6 +32,7 @@ class Reference:
     method: Method
     step: float
     uncertainty: float
+    clock: str = "t"
     _known: dict[tuple[float, int], Floats] = field(default_factory=dict)
 
     def __call__(self, spacing: float, count: int) -> Floats:
@@ -40,12 +41,14 @@ class Reference:
             stride = math.ceil(spacing / self.step)
             found = self.method.rows(spacing / stride, stride * count, stride)
             if found is None:
-                raise CheckError(f"the reference solution cannot be followed to t = {spacing * count:.6g}")
+                raise CheckError(f"the reference solution cannot be followed to {self.clock} = {spacing * count:.6g}")
             self._known[key] = found
         return self._known[key]
 
 
-def agreed(first: Method, second: Method, step: float, span: float, accuracy: float, seconds: float) -> Reference:
+def agreed(
+    first: Method, second: Method, step: float, span: float, accuracy: float, seconds: float, clock: str = "t"
+) -> Reference:
     """The reference over a time span by the first method, confirmed by the second.
 
     ``accuracy`` is the error that is to be measured, relative to the largest coordinate; each method may take so many
@@ -56,7 +59,7 @@ def agreed(first: Method, second: Method, step: float, span: float, accuracy: fl
     for method in (first, second):
         converged = _converged(method, min(step, spacing), spacing, MARKS, accuracy, time.perf_counter() + seconds)
         if converged is None:
-            raise CheckError(f"no reference solution: a method fails before t = {span:.6g}")
+            raise CheckError(f"no reference solution: a method fails before {clock} = {span:.6g}")
         found.append(converged)
     (states, h, _), (others, _, _) = found
     difference = distance(states, others)
@@ -65,11 +68,11 @@ def agreed(first: Method, second: Method, step: float, span: float, accuracy: fl
         apart = np.max(np.abs(states - others), axis=1) > AGREED * accuracy * size
         raise CheckError(
             f"no reference solution for the orbit: an error of {accuracy:.1e} is to be measured, but two methods at "
-            f"small steps agree to that only up to t = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
+            f"small steps agree to that only up to {clock} = {spacing * int(np.argmax(apart)):.4g} of {span:.6g}\n"
             "  hint: chaotic motion and rounding both do that; ask for a shorter --horizon or less accuracy, or "
             "let --measure be energy"
         )
-    return Reference(first, h, difference)
+    return Reference(first, h, difference, clock)
 
 
 def orbit_error(states: Floats, spacing: float, other: Method, step: float, seconds: float) -> float | None:

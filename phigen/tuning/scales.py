@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
 
+from phigen.runtime.backend import Backend
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
@@ -30,8 +32,18 @@ def scales(problem: Problem, method: Candidate) -> tuple[float, float]:
         return problem.horizon, problem.horizon / LEAST_STEPS
     nanoseconds = nanoseconds_per_step(method, h, few)
     steps = min(max(1e9 * PIECE_SECONDS / nanoseconds, 500), PIECE_STEPS)
-    rate = fastest_rate(lambda x: method.solver.vector_field(x, problem.parameters), states)
+    rate = fastest_rate(motion(method.solver, problem.parameters, monitored=problem.clock == "τ"), states)
     return min(problem.horizon, steps * h), min(MOST_TURN / max(rate, 1e-300), problem.horizon / LEAST_STEPS)
+
+
+def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -> Callable[[Floats], Floats]:
+    """The vector field at states (rows, DIM), in what steps are equal in: in τ, or in t."""
+
+    def slope(x: Floats) -> Floats:
+        found: Floats = solver.vector_field(x, parameters)
+        return solver.rate(x, parameters)[:, np.newaxis] * found if monitored else found
+
+    return slope
 
 
 def fastest_rate(field: Callable[[Floats], Floats], states: Floats) -> float:

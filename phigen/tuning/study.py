@@ -56,6 +56,7 @@ class Tuning:
     trying; ``orbit_error`` that of the best over the piece where the energy was measured, None if that is unknown.
     ``unit`` is what errors of the energy are counted in; ``monitors`` what monitors would gain, where the spec has none
     and the motion is fast at times. ``sizes`` are those of the lattice that was measured, nothing of other systems.
+    Times are those of the ``clock``, t or τ.
     """
 
     measure: str
@@ -73,6 +74,7 @@ class Tuning:
     unit: Unit = field(default_factory=Unit)
     monitors: Monitors | None = None
     sizes: tuple[int, ...] = ()
+    clock: str = "t"
 
     @property
     def winner(self) -> Finalist | None:
@@ -112,7 +114,7 @@ def tune(
         next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
         {s: why for s, why in tuner.refused.items() if why}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
-        monitored(tuner, own), problem.sizes,
+        monitored(tuner, own), problem.sizes, problem.clock,
     )  # fmt: skip
 
 

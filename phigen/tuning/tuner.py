@@ -204,7 +204,8 @@ class Tuner:
             known = [self._made[s] for s in others if s in self._made]
             method = problem.method(known[-1].solver()) if known else method
         reference = self._reference(method)
-        self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over t = 0 … {self.piece:.6g}")
+        over = f"{problem.clock} = 0 … {self.piece:.6g}"
+        self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over {over}")
         self.referring = True
         self.measures = {own: orbit_measure(problem, reference, bounded=own) for own in (True, False)}
         if self.piece < 0.99 * problem.horizon:
@@ -213,10 +214,11 @@ class Tuner:
     def _reference(self, method: Method) -> Reference:
         """The reference over the piece, which becomes shorter where rounding or chaos do not allow so much."""
         problem, other, seconds = self.problem, self._classical("dop853"), REFERRING * self.clock.budget
+        step, clock = problem.step, problem.clock
         for shorter in (1, 4, 16):
             span = self.piece / shorter
             try:
-                found = agreed(method, other, problem.step, span, self.accuracy * span / problem.horizon, seconds)
+                found = agreed(method, other, step, span, self.accuracy * span / problem.horizon, seconds, clock)
             except CheckError as error:
                 failure = error
                 continue
@@ -229,23 +231,24 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
     """The error about a run that no step of the spec's own setting follows to its end."""
     h = problem.step / 16
     until, status = method.reach(h, steps_in(problem.horizon, h))
+    clock = problem.clock
     return StepError(
-        f"{problem.system.name}: the run cannot be followed to t = {problem.horizon:.6g}: with steps of {h:.3g} it "
-        f"ends at t = {until:.6g} ({status})\n  hint: the solution itself may end there; see --horizon",
+        f"{problem.system.name}: the run cannot be followed to {clock} = {problem.horizon:.6g}: with steps of {h:.3g} "
+        f"it ends at {clock} = {until:.6g} ({status})\n  hint: the solution itself may end there; see --horizon",
         step=round(until / h), status=status,
     )  # fmt: skip
 
 
 def _expect_linear(measure: Measure, method: Method, problem: Problem, piece: float) -> None:
     """Raise CheckError if the error of the orbit grows too fast to say anything about a longer run."""
-    h = problem.step
+    h, clock = problem.step, problem.clock
     for _ in range(12):
         point = measure(method, h, piece)
         if point and 1e-11 < point.measured < 1e-3:
             if point.growth > LINEAR:
                 raise CheckError(
-                    f"the error of the orbit grows like t^{point.growth:.1f}: the motion is chaotic, and what is "
-                    f"measured over t = 0 … {piece:.6g} says nothing about a longer run\n"
+                    f"the error of the orbit grows like {clock}^{point.growth:.1f}: the motion is chaotic, and what is "
+                    f"measured over {clock} = 0 … {piece:.6g} says nothing about a longer run\n"
                     f"  hint: --horizon {piece:.6g}, or --measure energy"
                 )
             return

@@ -234,8 +234,119 @@ def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, s
     assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
 
 
+@pytest.mark.parametrize(("name", "steps"), [("until", 60), ("stopped", 10), ("back", 31), ("never", 20)])
+def test_verify_makes_the_whole_steps_of_the_run(phigen, swing, name, steps):
+    (told,) = json.loads(phigen("verify", swing, "--run", name, "--quick", "--json", "-q").stdout)
+    assert (told["steps"], told["clock"]) == (steps, "t")
+
+
+def test_verify_makes_one_step_of_a_run_that_is_shorter(phigen, write):
+    spec = write("spec.yaml", SWING.replace("until: 6.05, stride: 10", "until: 0.03"))
+    (told,) = json.loads(phigen("verify", spec, "--run", "until", "--quick", "--json", "-q").stdout)
+    assert told["steps"] == 1
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """What a command asks of the function that measures, in place of which it stops."""
+
+    def asked_of(phigen, place, *args):
+        given = []
+
+        def stop(*arguments, **options):
+            given.extend(arguments)
+            raise SystemExit(0)
+
+        monkeypatch.setattr(place, stop)
+        assert phigen(*args).exit_code == 0
+        return given
+
+    return asked_of
+
+
+def test_verify_makes_steps_in_tau_up_to_a_physical_time(phigen, write, asked):
+    """As many as the run: 5 of t are 6.63 of τ."""
+    spec = write("spec.yaml", BODY)
+    assert json.loads(ran(phigen, spec, "--json").stdout)["steps"] == 132
+    given = asked(phigen, "phigen.study.verification.verify", "verify", spec)
+    assert given[5:7] == [0.05, 132]
+
+
+@pytest.mark.slow
+def test_verify_says_that_steps_are_in_tau(phigen, write):
+    done = phigen("verify", write("spec.yaml", BODY), "--quick", "-q")
+    assert done.exit_code == 0
+    assert "132 steps of 0.05 in τ" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "horizon", "clock"),
+    [(SWING, "until", 6.05, "t"), (SWING, "stopped", np.pi / 3, "t"), (BODY, "tumbling", 6.6319085, "τ")],
+)
+def test_tune_measures_up_to_the_end_of_the_run(phigen, write, asked, text, name, horizon, clock):
+    _, problem, *_ = asked(phigen, "phigen.tuning.study.tune", "tune", write("spec.yaml", text), "--run", name)
+    assert (problem.horizon, problem.clock) == (pytest.approx(horizon, abs=1e-7), clock)
+
+
+@pytest.mark.slow
+def test_tune_finds_an_orbit_in_tau_and_tells_lines_for_the_run(phigen, write):
+    """All methods make their steps in τ, so that an orbit can be compared."""
+    spec = write("spec.yaml", BODY.replace("stride: 5", "stop: x1 + 10"))
+    done = phigen("tune", spec, "--accuracy", 0.001, "--budget", 3, "--measure", "orbit", "--json")
+    assert done.exit_code == 0, done.stderr
+    assert "over τ = 0 … 6.63191" in done.stderr
+    told = json.loads(done.stdout)
+    step, steps = (float(line.split(": ")[1]) for line in told["run_lines"][:2])
+    assert 6.6319 < step * steps < 6.6319 + 2 * step
+    assert {c["method"] for c in told["classical"]} == {"RK4 in C", "DOP853 in C"}
+    assert "up to τ = 6.6319" in phigen("tune", spec, "--budget", 2, "-q", "--accuracy", 1e-3).stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "name", "said"),
+    [
+        (SWING, "stopped", "10 steps of 0.1 and a part of one, states stored at times 0.3 apart"),
+        (SWING, "until", "60 steps of 0.1 and a part of one, one in 10 stored"),
+        pytest.param(
+            BODY, "tumbling", "132 steps of 0.05 in τ and a part of one, one in 5 stored", marks=pytest.mark.slow
+        ),
+    ],
+)
+def test_report_shows_the_run_up_to_its_end(phigen, write, monkeypatch, text, name, said):
+    monkeypatch.setattr("phigen.report.drawable.find_spec", lambda name: None)
+    monkeypatch.setattr("phigen.cli.report_material.studied", lambda *given: (None, ""))
+    done = phigen("report", write("spec.yaml", text), "--run", name, "--quick", "-q", "-o", "a.html")
+    assert done.exit_code == 0, done.stderr
+    page = Path("a.html").read_text(encoding="utf-8")
+    assert said in page
+
+
+def test_states_are_stored_at_equal_times_of_a_run_of_so_many_steps_in_tau(phigen, write):
+    """Its end is known when all steps are made."""
+    spec = write("spec.yaml", BODY.replace("until: 5, stride: 5}", "steps: 100, every: 0.5}"))
+    ran(phigen, spec, "-o", "a.csv")
+    rows = table("a.csv")
+    assert rows[:-1, 0] == pytest.approx(np.arange(0, 3.6, 0.5), abs=1e-12)
+    ran(phigen, spec, "--at", "3.5", "-o", "c.csv")
+    assert rows[-2] == pytest.approx(table("c.csv")[1], abs=1e-15)
+    assert rows[-1, :2].tolist() == pytest.approx([table("c.csv")[-1, 0], 5.0], rel=1e-15)
+    ran(phigen, spec, "--until", 3.5, "--every", 0.5, "-o", "b.csv")
+    assert rows[:-1] == pytest.approx(table("b.csv"), abs=1e-13)
+
+
+def test_a_run_in_tau_that_fails_stores_the_times_before(phigen, write):
+    """A motion that becomes infinite, in a finite τ as well."""
+    falling = SWING.split("runs:")[0].replace("(p**2 + q**2)/2\norder: 8", "p**2/2 - q**4\norder: 2")
+    falling += "monitor: 1/(1 + p**2)**(1/8)\nruns: {far: {initial: [1, 0], step: 0.1, steps: 400, every: 0.1}}\n"
+    done = phigen("run", write("spec.yaml", falling), "-t", "numpy", "-o", "a.csv")
+    assert (done.exit_code, "failed" in done.stderr) == (7, True)
+    times = table("a.csv")[:, 0]
+    assert len(times) > 5
+    assert np.diff(times[:-1]) == pytest.approx(0.1, abs=1e-9)
+
+
 def test_what_does_not_fit_is_told(phigen, write):
-    swing, body = write("swing.yaml", SWING), write("body.yaml", BODY)
+    swing = write("swing.yaml", SWING)
     ran(phigen, swing, "-o", "a.csv")
     Path("words.csv").write_text("some,words\n1,2\n")
     Path("empty.npz").touch()
@@ -255,7 +366,6 @@ def test_what_does_not_fit_is_told(phigen, write):
         ((swing, "--from", "empty.npz"), "no file of a run of swing: No data left in file"),
         ((swing, "--from", "half.npz"), "no file of a run of swing: File is not a zip file"),
         ((swing, "--from", "other.npz"), "no file of a run of swing: it has no column 't'"),
-        ((body, "--every", 0.5, "--steps", 10), "say where the run ends in time"),
     ):
         done = phigen("run", *args, "-t", "numpy")
         assert (done.exit_code, said in done.stderr) == (2, True), (args, done.stderr)

@@ -44,6 +44,17 @@ def test_solver_in_the_race_is_the_solver(body, in_c):
     assert in_c.runners[race.OWN](0.05, 40, 2) == pytest.approx(expected, rel=1e-13)
 
 
+@pytest.mark.parametrize("make", ["c", "python"])
+def test_with_a_monitor_all_methods_make_their_steps_in_tau(make):
+    """So that they end where the solver does."""
+    made = compiled("kepler_eccentric", 8)
+    start, at = np.array([0.3, 0.0, 0.0, 2.3]), {"oblateness": 1e-3}
+    found = race.compiled(made, ["rk4"], start, at) if make == "c" else race.interpreted(
+        solver(made, "numpy"), ["rk4"], start, at)  # fmt: skip
+    assert found.clock == "τ"
+    assert found.runners["rk4"](0.005, 400, 1) == pytest.approx(found.runners[race.OWN](0.01, 200, 1), abs=1e-8)
+
+
 def test_a_step_that_cannot_be_made_has_no_result(in_c):
     assert in_c.runners[race.OWN](1e6, 3, 1) is None
     assert in_c.runners["rk4"](1e200, 3, 1) is None

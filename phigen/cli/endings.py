@@ -1,0 +1,138 @@
+"""Where runs end, and which of their states are stored: the one reading of steps, until, stop, every and stride."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import click
+
+from phigen.cli.console import Console
+from phigen.cli.experiment import Experiment
+from phigen.cli.past import begun
+from phigen.runtime.ending import End, after_steps, at_time, where_zero
+from phigen.runtime.interface import BackendError
+from phigen.runtime.solver import Solver
+from phigen.study.sections import function_of
+
+#: How many times may be asked for.
+_MOST_TIMES = 10_000_000
+
+
+def ended(experiment: Experiment, solver: Solver, console: Console) -> Experiment:
+    """The experiment with its end, where that is at a time, or where ``stop`` passes through zero."""
+    run, h = experiment.run, experiment.h
+    end: End | None = None
+    if run.until is not None:
+        span = float(run.until) - experiment.begin
+        if span * h <= 0:
+            message = f"the end, {float(run.until)!r}, is never reached from {experiment.begin!r} by steps of {h!r}"
+            raise click.UsageError(f"{message}: --until T gives another")
+        end = at_time(begun(solver, experiment), h, span)
+    if run.stop is not None:
+        end = _stopped(experiment, solver, console, end) or end
+    if end is None:
+        return experiment
+    stride = max(1, min(run.stride, end.steps))
+    return replace(experiment, run=replace(run, steps=end.steps, stride=stride), end=end)
+
+
+def _stopped(experiment: Experiment, solver: Solver, console: Console, end: End | None) -> End | None:
+    """Where ``stop`` is met, if that is before the end."""
+    run, names, h = experiment.run, solver.interface, experiment.h
+    assert run.stop is not None
+    g = function_of(run.stop, names.coordinates, experiment.parameters, names.time)
+    most = end.steps + 1 if end else run.steps
+    found = where_zero(begun(solver, experiment), h, most, g, experiment.begin, timed=bool(names.time))
+    if found is None:
+        console.note("stop: is not met")
+        return None
+    if end is None or found.steps < end.steps:
+        return found
+    try:
+        last = _count(experiment, solver, end)
+    except BackendError:  # the part of a step fails that the run would make without a stop before it
+        return found
+    return found if _count(experiment, solver, found) < last else None
+
+
+def _count(experiment: Experiment, solver: Solver, end: End) -> float:
+    """How many steps there are up to an end, with the part of one. Raises `BackendError`."""
+    if not end.part:
+        return float(end.steps)
+    session = begun(solver, experiment)
+    session.advance(experiment.h, end.steps)
+    return end.finish(session)[1]
+
+
+def length(experiment: Experiment, solver: Solver) -> float:
+    """How long a run with its end is in what its steps are equal in: in τ, or in t. Raises `StepError`."""
+    if experiment.end is None:
+        return abs(experiment.h) * experiment.run.steps
+    try:
+        return abs(experiment.h) * _count(experiment, solver, experiment.end)
+    except BackendError as error:
+        raise solver.failure(error, experiment.h, None, experiment.parameters) from error
+
+
+def timed(experiment: Experiment, solver: Solver, every: float | None = None, at: str | None = None) -> Experiment:
+    """The experiment with the times of the states that are stored: every so often, or those listed, up to the end."""
+    if every is None and at is None and experiment.run.every is not None:
+        every = float(experiment.run.every)
+    if every is None and at is None:
+        return experiment
+    if experiment.end is None and solver.interface.monitored:  # how much time its steps take, they tell
+        whole = after_steps(begun(solver, experiment), experiment.h, experiment.run.steps)
+        experiment = replace(experiment, end=whole)
+    times = _regular(experiment, solver, every) if every is not None else _chosen(experiment, solver, str(at))
+    return replace(experiment, times=tuple(times))
+
+
+def _chosen(experiment: Experiment, solver: Solver, at: str) -> list[float]:
+    """The times that are listed, in the order in which they come, none of them the start or beyond a stop."""
+    begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
+    times = _listed(at)
+    beyond = [t for t in times if (t - end) * sign > 1e-9 * abs(end - begin)]
+    stopped = experiment.end is not None and experiment.end.stopped
+    outside = [t for t in times if (t - begin) * sign < 0] + ([] if stopped else beyond)
+    if outside:
+        raise click.BadParameter(f"{outside[0]!r} is not between {begin!r} and {end!r}", param_hint="--at")
+    times = sorted({*times} - {begin, *beyond}, reverse=sign < 0)
+    _expect_whole(experiment, solver, times, "--at")
+    return times
+
+
+def _regular(experiment: Experiment, solver: Solver, every: float) -> list[float]:
+    """Times so far apart, counted from the start."""
+    begin, end, sign = experiment.begin, experiment.until, math.copysign(1.0, experiment.h)
+    if not every > 0 or not math.isfinite(every):
+        raise click.BadParameter("the time between states must be positive", param_hint="--every")
+    count = abs(end - experiment.t0) / every * (1 + 1e-12)
+    if count > _MOST_TIMES:
+        raise click.UsageError(f"states at times {every!r} apart would be {count:.3g}: --every DT takes fewer")
+    times = [experiment.t0 + sign * every * k for k in range(1, int(count) + 1)]
+    _expect_whole(experiment, solver, times, "--every")
+    return [t for t in times if (t - begin) * sign > 0]
+
+
+def _expect_whole(experiment: Experiment, solver: Solver, times: Sequence[float], option: str) -> None:
+    """That a path of the noise is known at these times: at the ends of its steps, and nowhere between."""
+    for time in times if solver.interface.noise else ():
+        steps = (time - experiment.begin) / experiment.h
+        if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):
+            message = f"with noise states are known after whole steps of {abs(experiment.h)!r}, and {time!r} is not"
+            raise click.BadParameter(f"{message} at the end of one", param_hint=option)
+
+
+def _listed(at: str) -> list[float]:
+    text: Any = Path(at).read_text(encoding="utf-8") if Path(at).is_file() else at
+    try:
+        times = [float(word) for word in text.replace(",", " ").split()]
+    except ValueError as error:
+        raise click.BadParameter(f"times are numbers, or a file of them: {error}", param_hint="--at") from None
+    if not times or not all(map(math.isfinite, times)):
+        raise click.BadParameter("times are finite numbers, at least one", param_hint="--at")
+    return times
