@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: ed5d531517aae24468aa8a223592f760fc697e7710110fdb51d3fcd867b58ecf
+ * body-sha256: d47b3b705d38317aefb1eddbbf5b3807a4e4078e93ef2ef87c02cb441881028d
  */
 #include "dzhanibekov.h"
 #include <float.h>
@@ -441,7 +441,7 @@ static int dzhanibekov_plausible(const dzhanibekov_solver *s, const double incre
 
 /* ---- Attitude ---- */
 /* The product of two quaternions. */
-static inline void dzhanibekov_quaternion_product(const double a[4], const double b[4], double product[4])
+static inline void dzhanibekov_group_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
     product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);
@@ -456,20 +456,6 @@ static void dzhanibekov_rotation(const double q[4], const double v[3], double ch
     change[0] = 2.0 * (q[0] * x + (q[2] * z - q[3] * y));
     change[1] = 2.0 * (q[0] * y + (q[3] * x - q[1] * z));
     change[2] = 2.0 * (q[0] * z + (q[1] * y - q[2] * x));
-}
-
-/* What a factor of a step adds to an element. The quaternion of the factor is given less 1. */
-static inline void dzhanibekov_added(const double element[dzhanibekov_ELEMENT],
-    const double turn[dzhanibekov_ELEMENT], double change[dzhanibekov_ELEMENT])
-{
-    dzhanibekov_quaternion_product(element, turn, change);
-}
-
-/* The same for one from the other side. */
-static inline void dzhanibekov_added_aside(const double element[dzhanibekov_ELEMENT],
-    const double turn[dzhanibekov_ELEMENT], double change[dzhanibekov_ELEMENT])
-{
-    dzhanibekov_quaternion_product(turn, element, change);
 }
 
 /* The element, less 1, of the motion with a constant rate, for some time. */
@@ -520,11 +506,11 @@ static inline void dzhanibekov_turn_by(dzhanibekov_solver *s, double factor[dzha
     memcpy(carry, s->turned_carry, sizeof carry);
     dzhanibekov_normalise(element, factor);
     if (aside != NULL) {
-        dzhanibekov_added_aside(s->turned, aside, change);
+        dzhanibekov_group_product(aside, s->turned, change);
         for (int i = 0; i < dzhanibekov_ELEMENT; ++i) element[i] += change[i];
         for (int i = 0; i < dzhanibekov_ELEMENT; ++i) carry[i] += change[i];
     }
-    dzhanibekov_added(element, factor, change);
+    dzhanibekov_group_product(element, factor, change);
     for (int i = 0; i < dzhanibekov_ELEMENT; ++i) {
         const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
         s->turned_carry[i] = moved - (sum - s->turned[i]);

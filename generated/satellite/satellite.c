@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; Attitude; The implicit
  *   step, by Newton's method; The solver; Members of an ensemble; Members with attitudes
- * body-sha256: 7be4afd66376601e4e8a17a344eb64e3d93978a5c1b18df872e39d060d26dbba
+ * body-sha256: c7f475fc720f0502571f0e4213232189e6ba3a2afc636e1a19604e6a507e2738
  */
 #include "satellite.h"
 #include <float.h>
@@ -1005,19 +1005,12 @@ static int satellite_plausible(const satellite_solver *s, int stage, const doubl
 
 /* ---- Attitude ---- */
 /* The product of two quaternions. */
-static inline void satellite_quaternion_product(const double a[4], const double b[4], double product[4])
+static inline void satellite_group_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
     product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);
     product[2] = (a[0] * b[2] + a[2] * b[0]) + (a[3] * b[1] - a[1] * b[3]);
     product[3] = (a[0] * b[3] + a[3] * b[0]) + (a[1] * b[2] - a[2] * b[1]);
-}
-
-/* What a factor of a step adds to an element. The quaternion of the factor is given less 1. */
-static inline void satellite_added(const double element[satellite_ELEMENT],
-    const double turn[satellite_ELEMENT], double change[satellite_ELEMENT])
-{
-    satellite_quaternion_product(element, turn, change);
 }
 
 /* By how much the square of the length of a quaternion is more than 1. What rounding leaves of that has no
@@ -1042,7 +1035,7 @@ static inline void satellite_turn_by(satellite_solver *s, double factor[satellit
     memcpy(element, s->turned, sizeof element);
     memcpy(carry, s->turned_carry, sizeof carry);
     satellite_normalise(element, factor);
-    satellite_added(element, factor, change);
+    satellite_group_product(element, factor, change);
     for (int i = 0; i < satellite_ELEMENT; ++i) {
         const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
         s->turned_carry[i] = moved - (sum - s->turned[i]);

@@ -4,12 +4,13 @@
 #include <math.h>
 #include <string.h>
 
+#include "macros/attitude.h"
 #include "model.h"
 
 /* ---- Attitude ---- */
 #if PHI_MATRICES
 /* The product of two square matrices. */
-static void phi_matrix_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
+static void phi_group_product(const double a[PHI_ELEMENT], const double b[PHI_ELEMENT], double product[PHI_ELEMENT])
 {
     enum { N = PHI_ROWS_OF_ATTITUDE };
     for (int i = 0; i < N; ++i)
@@ -18,16 +19,6 @@ static void phi_matrix_product(const double a[PHI_ELEMENT], const double b[PHI_E
             for (int k = 0; k < N; ++k) sum += a[i * N + k] * b[k * N + j];
             product[i * N + j] = sum;
         }
-}
-
-/* What a factor of a step, given less 1, adds to an element. */
-static void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
-{
-#if PHI_SPATIAL
-    phi_matrix_product(turn, element, change);
-#else
-    phi_matrix_product(element, turn, change);
-#endif
 }
 
 #if PHI_NORMALISE
@@ -46,7 +37,7 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
 #endif
             excess[i * N + j] = 0.5 * sum;
         }
-    phi_added(excess, factor, change);
+    PHI_ADDED(excess, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
@@ -77,7 +68,7 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
     for (int i = 0; i < PHI_COVECTOR; ++i) small[i] = ldexp(p[i], -doublings);
     phi_exponential(small, element);
     for (; doublings > 0; --doublings) {
-        phi_matrix_product(element, element, square);
+        phi_group_product(element, element, square);
         for (int i = 0; i < PHI_ELEMENT; ++i) element[i] = 2.0 * element[i] + square[i];
 #if PHI_NORMALISE
         memcpy(square, element, sizeof square);
@@ -89,17 +80,6 @@ static void phi_matrix_exponential(const double p[PHI_COVECTOR], double element[
 
 #endif
 #if PHI_RATE_OF_GAUGE
-/* The same for one from the other side. */
-static void phi_added_aside(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT],
-    double change[PHI_ELEMENT])
-{
-#if PHI_SPATIAL
-    phi_matrix_product(element, turn, change);
-#else
-    phi_matrix_product(turn, element, change);
-#endif
-}
-
 /* The element, less 1, of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
@@ -112,7 +92,7 @@ static void phi_uniform(const double rate[PHI_RATE], double t, double element[PH
 #endif
 #else
 /* The product of two quaternions. */
-static inline void phi_quaternion_product(const double a[4], const double b[4], double product[4])
+static inline void phi_group_product(const double a[4], const double b[4], double product[4])
 {
     product[0] = (a[0] * b[0] - a[1] * b[1]) - (a[2] * b[2] + a[3] * b[3]);
     product[1] = (a[0] * b[1] + a[1] * b[0]) + (a[2] * b[3] - a[3] * b[2]);
@@ -131,44 +111,30 @@ static void phi_rotation(const double q[4], const double v[3], double change[3])
 }
 
 #endif
-/* What a factor of a step adds to an element. The quaternion of the factor is given less 1. */
-static inline void phi_added(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT], double change[PHI_ELEMENT])
-{
-#if PHI_SPATIAL
-    phi_quaternion_product(turn, element, change);
-#else
-    phi_quaternion_product(element, turn, change);
-#endif
-#if PHI_POSITION && PHI_SPATIAL
-    const double q[4] = { 1.0 + turn[0], turn[1], turn[2], turn[3] };
-    phi_rotation(q, element + 4, change + 4);
-    for (int i = 4; i < 7; ++i) change[i] += turn[i];
-#elif PHI_POSITION
-    phi_rotation(element, turn + 4, change + 4);
-    for (int i = 4; i < 7; ++i) change[i] += turn[i];
-#endif
-}
-
-#if PHI_RATE_OF_GAUGE
-/* The same for one from the other side. */
-static inline void phi_added_aside(const double element[PHI_ELEMENT], const double turn[PHI_ELEMENT],
+#if PHI_POSITION && PHI_SPATIAL || PHI_POSITION && PHI_RATE_OF_GAUGE
+/* What a factor from the left adds to an element. The quaternion of the factor is given less 1. */
+static inline void phi_added_left(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
     double change[PHI_ELEMENT])
 {
-#if PHI_SPATIAL
-    phi_quaternion_product(element, turn, change);
-#else
-    phi_quaternion_product(turn, element, change);
-#endif
-#if PHI_POSITION && !PHI_SPATIAL
-    const double q[4] = { 1.0 + turn[0], turn[1], turn[2], turn[3] };
+    const double q[4] = { 1.0 + factor[0], factor[1], factor[2], factor[3] };
+    phi_group_product(factor, element, change);
     phi_rotation(q, element + 4, change + 4);
-    for (int i = 4; i < 7; ++i) change[i] += turn[i];
-#elif PHI_POSITION
-    phi_rotation(element, turn + 4, change + 4);
-    for (int i = 4; i < 7; ++i) change[i] += turn[i];
-#endif
+    for (int i = 4; i < 7; ++i) change[i] += factor[i];
 }
 
+#endif
+#if PHI_POSITION && !PHI_SPATIAL || PHI_POSITION && PHI_RATE_OF_GAUGE
+/* What a factor from the right adds to an element. The quaternion of the factor is given less 1. */
+static inline void phi_added_right(const double element[PHI_ELEMENT], const double factor[PHI_ELEMENT],
+    double change[PHI_ELEMENT])
+{
+    phi_group_product(element, factor, change);
+    phi_rotation(element, factor + 4, change + 4);
+    for (int i = 4; i < 7; ++i) change[i] += factor[i];
+}
+
+#endif
+#if PHI_RATE_OF_GAUGE
 /* The element, less 1, of the motion with a constant rate, for some time. */
 static void phi_uniform(const double rate[PHI_RATE], double t, double element[PHI_ELEMENT])
 {
@@ -260,12 +226,12 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT])
 #endif
 #if PHI_RATE_OF_GAUGE
     if (aside != NULL) {
-        phi_added_aside(s->turned, aside, change);
+        PHI_ADDED_ASIDE(s->turned, aside, change);
         for (int i = 0; i < PHI_ELEMENT; ++i) element[i] += change[i];
         for (int i = 0; i < PHI_ELEMENT; ++i) carry[i] += change[i];
     }
 #endif
-    phi_added(element, factor, change);
+    PHI_ADDED(element, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) {
         const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
         s->turned_carry[i] = moved - (sum - s->turned[i]);
@@ -309,7 +275,7 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
 #else
     whole[0] += 1.0;
 #endif
-    phi_added(whole, second, change);
+    PHI_ADDED(whole, second, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
@@ -330,9 +296,9 @@ static void phi_turn_sequence(phi_solver *s, double sequence[][PHI_ELEMENT], int
 static void phi_read_attitude(phi_solver *s)
 {
 #if PHI_MATRICES && PHI_SPATIAL
-    phi_matrix_product(s->turned, s->first, s->attitude);
+    phi_group_product(s->turned, s->first, s->attitude);
 #elif PHI_MATRICES
-    phi_matrix_product(s->first, s->turned, s->attitude);
+    phi_group_product(s->first, s->turned, s->attitude);
 #else
     memcpy(s->attitude, s->turned, sizeof s->attitude);
 #endif
