@@ -20,7 +20,10 @@ from phigen.runtime.members import Members
 #: What counts of steps have to fit into.
 _MOST = int(np.iinfo(np.int64).max)
 
-#: The same of what chooses random numbers.
+#: The largest number of the C of ``real: float``.
+LARGEST_SINGLE = float(np.finfo(np.float32).max)
+
+#: What counts have to fit into that choose random numbers.
 _LARGEST = {"seed": 2**64 - 1, "member": 2**32 - 1, "step0": _MOST}
 
 
@@ -319,6 +322,15 @@ def _shown(value: Any) -> str:
     if isinstance(value, int) and abs(value) > _MOST:
         return f"an integer of {int(math.log10(abs(value))) + 1} digits"
     return shortened(value)
+
+
+def beyond_single(numbers: Mapping[str, Any]) -> str:
+    """Which of some numbers, or arrays of them, has no place in single precision, in words; nothing if all have."""
+    for name, value in numbers.items():
+        largest = max(np.ravel(value).tolist(), key=abs, default=0.0)
+        if abs(largest) > LARGEST_SINGLE:
+            return f"{name} = {largest!r} is too large for single precision, which ends at {LARGEST_SINGLE:.2g}"
+    return ""
 
 
 def expect_known(names: Iterable[str], known: Mapping[str, float]) -> None:

@@ -128,8 +128,9 @@ class CLatticeSession:
         self._beside = np.zeros(0, dtype=np.uint8)  # for tangent vectors
         self._work = np.zeros(max(needed, 64), dtype=np.uint8)
         self._address = self._struct.ctypes.data
-        first = np.ascontiguousarray(x0, dtype=self._real)
-        packed, kept = _packed(interface, parameters, x0.shape[1:], len(bonds))
+        with np.errstate(over="ignore"):  # which is found infinite
+            first = np.ascontiguousarray(x0, dtype=self._real)
+            packed, kept = _packed(interface, parameters, x0.shape[1:], len(bonds))
         arrays = [a.ctypes.data for a in (packed, sizes, *([given] if interface.graph else []), first)]
         begin, last = (functions.init_at, (t0,)) if interface.time else (functions.init, ())
         status = begin(self._address, *arrays, *last, self._work.ctypes.data)
@@ -277,7 +278,8 @@ class CLatticeSession:
 
     def put_planes(self, field: int, first: int, end: int, values: Floats) -> None:
         """Put other values of a field in place of those of some planes."""
-        values = np.ascontiguousarray(values, dtype=self._real)
+        with np.errstate(over="ignore"):
+            values = np.ascontiguousarray(values, dtype=self._real)
         self._expect_done(self._c.put_planes(self._address, field, first, end, values.ctypes.data))
 
     def holds(self, first: int, end: int) -> bool:

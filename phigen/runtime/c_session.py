@@ -115,7 +115,8 @@ class CSession:
     def _moved(self, function: str, by: Floats) -> None:
         if not hasattr(self._c, function):
             raise TypeError("the solver was compiled without kicks: its spec leaves them out")
-        given = np.ascontiguousarray(by, dtype=self._real)
+        with np.errstate(over="ignore"):  # which is found infinite
+            given = np.ascontiguousarray(by, dtype=self._real)
         status = getattr(self._c, function)(self.address, given.ctypes.data)
         if status:
             raise BackendError(status_name(status), self.steps, self._x.reshape(1, -1).astype(np.float64))

@@ -108,7 +108,7 @@ class CSolver:
         frames = members.frames() if members.stride else None
 
         def make(part: slice) -> None:
-            x = np.array(members.x0[part].T, dtype=self._real, order="C")  # x[DIM][members]
+            x = self._own(members.x0[part].T)  # x[DIM][members]
             if alike:
                 self._alike(members.part(part), x, status[part])
             else:
@@ -174,7 +174,7 @@ class CSolver:
 
         def make(part: slice) -> None:
             some = members.part(part)
-            x, element = (np.array(a[part].T, dtype=self._real, order="C") for a in (final, last))
+            x, element = (self._own(a[part].T) for a in (final, last))
             rows, elements = (np.empty((made, *a.shape), self._real) for a in (x, element))
             self._all_turned(some, (x, element), (rows, elements), status[part])
             final[part], last[part] = x.T, element.T
@@ -214,16 +214,16 @@ class CSolver:
     def _given(self, members: Members) -> tuple[Floats, list[Floats | None], Floats]:
         """Of each member the parameters (members, parameters), the time or the gauge, where there is one, the step."""
         count, width = len(members), max(1, len(members.parameters))
-        packed = np.empty((count, width), self._real)
+        packed = np.empty((count, width))
         for k, value in enumerate(members.parameters.values()):
             packed[:, k] = value
         own: list[Floats | None] = []
         if self.interface.time:
-            own = [np.full(count, members.t0, self._real)]
+            own = [self._own(np.full(count, members.t0))]
         elif hasattr(self._c, "init_gauge"):
             gauge = self._gauge
             own = [None if gauge is None else np.array(np.broadcast_to(gauge, (count, gauge.shape[-1])))]
-        return packed, own, np.full(count, members.h, self._real)
+        return self._own(packed), own, self._own(np.full(count, members.h))
 
     def pullback(self, members: Members, bars: Floats, threads: int | None = None) -> tuple[Floats, Floats, Floats]:
         """See `phigen.runtime.backend.Backend`."""
@@ -364,11 +364,14 @@ class CSolver:
 
     def _packed(self, parameters: Mapping[str, float]) -> Floats:
         # A struct without parameters has one unused char, which the zero covers.
-        return np.array(list(parameters.values()) or [0.0], dtype=self._real)
+        return self._own(np.array(list(parameters.values()) or [0.0]))
 
     def _own(self, values: Floats) -> NDArray[Any]:
-        """In the numbers of the code."""
-        return np.ascontiguousarray(values, dtype=self._real)
+        """A copy in the numbers of the code, where those that are too large for it are infinite."""
+        if not self.interface.single:
+            return np.array(values, dtype=np.float64, order="C")
+        with np.errstate(over="ignore"):
+            return np.array(values, dtype=np.float32, order="C")
 
 
 def _times(t: Floats | None) -> list[list[float]]:

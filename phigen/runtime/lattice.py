@@ -567,12 +567,17 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         try:
             return self.backend.start(at.x, at.values, at.t0, at.draws)
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values) from error
+            raise self.failure(error, at.h, None, at.values, at.x) from error
 
-    def failure(self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any]) -> StepError:
+    def failure(
+        self, error: BackendError, h: float, so_far: Any, values: Mapping[str, Any], start: Floats | None = None
+    ) -> StepError:
         name = self.interface.name
         told = {"step": error.step, "status": error.status, "trajectory": so_far, "members": error.members}
         if error.status == "BAD_ARGUMENT":
+            state = {} if start is None else dict(zip(self.coordinates, start, strict=True))
+            if wrong := self.interface.single and arguments.beyond_single({**state, **values, "the step h": h}):
+                return ParameterError(f"{name}: {wrong}", **{**told, "step": 0})
             given = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
             message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"
             return ParameterError(message, **{**told, "step": 0})

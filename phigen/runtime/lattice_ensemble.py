@@ -67,10 +67,13 @@ def ensemble(
     if failures:
         failed = tuple(sorted(failures))
         shown = ", ".join(map(str, failed[:5])) + (", …" if len(failed) > 5 else "")
-        status = failures[failed[0]]
+        m, status = failed[0], failures[failed[0]]
         message = (
             f"{solver.interface.name}: a step failed for {len(failed)} member(s) of the ensemble ({shown}): {status}"
         )
+        given = dict(zip(solver.coordinates, start[m], strict=True)) | values[m] | {"the step h": sizes[m]}
+        if wrong := solver.interface.single and arguments.beyond_single(given):
+            message += f", {wrong}"
         raise StepError(message, step=-1, status=status, trajectory=found, members=failed)
     return found
 

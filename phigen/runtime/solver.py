@@ -532,14 +532,15 @@ class Solver(Named[Backend, Interface]):
         try:
             return make(asked, most)
         except BackendError as error:
-            h, values, _ = asked.numbers(error.members[0] if error.members else 0)
-            raise self.failure(error, h, error.states, values) from error
+            m = error.members[0] if error.members else 0
+            h, values, _ = asked.numbers(m)
+            raise self.failure(error, h, error.states, values, asked.x0[m] if len(asked) else None) from error
 
     def _started(self, at: Beginning) -> Session:
         try:
             return self.backend.start(at.x, at.values, at.t0, at.first, at.draws)
         except BackendError as error:
-            raise self.failure(error, at.h, None, at.values) from error
+            raise self.failure(error, at.h, None, at.values, at.x) from error
 
     def _with_tangent(self, session: Session, at: Beginning) -> Floats:
         try:
@@ -560,10 +561,20 @@ class Solver(Named[Backend, Interface]):
         h: float,
         trajectory: Trajectory | Section | Floats | None,
         parameters: Mapping[str, float],
+        start: Floats | None = None,
     ) -> StepError:
-        """What the user is told of a failure in the back end, with his step, what was computed, and his parameters."""
+        """What the user is told of a failure in the back end, with his step, what was computed, and his parameters.
+
+        ``start`` (DIM,) is the state that it began at, of the first member that failed.
+        """
         name = self.interface.name
         if error.status == "BAD_ARGUMENT":
+            state = {} if start is None else dict(zip(self.coordinates, start.tolist(), strict=True))
+            if wrong := self.interface.single and arguments.beyond_single({**state, **parameters, "the step h": h}):
+                message = f"{name}: {wrong}" + (f", as of member {error.members[0]}" if error.members else "")
+                return ParameterError(
+                    message, step=0, status=error.status, trajectory=trajectory, members=error.members
+                )
             # The other arguments were checked.
             given = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"

@@ -1,6 +1,7 @@
 """C in single precision: what is written, what it computes, and what is refused."""
 
 import re
+import warnings
 from dataclasses import replace
 from functools import cache
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from support import as_given, first_run, run, setting, slow_but, small, solver, spec_of, tool, write
 
+import phigen
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec, emit
 from phigen.lattice.states import start_of
@@ -131,3 +133,48 @@ def test_it_stays_on_the_leaf_for_a_million_steps():
     at, given = numbers(made)
     found = solver(made, "c").integrate(at.x, at.h, 1_000_000, stride=10_000, **given)
     assert np.ptp(found.casimirs["C"]) / np.abs(found.casimirs["C"]).max() < 1e-6
+
+
+LARGE = """phigen: 1
+name: large
+coordinates: [q, p]
+parameters: {k: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: (p**2 + k*q**2)/2
+order: 2
+real: float
+"""
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"), [({"x": 1e39}, "q = 1e+39"), ({"k": -1e39}, "k = -1e+39"), ({"h": 1e39}, "the step h = 1e+39")]
+)
+def test_a_number_beyond_single_precision_is_named_and_costs_its_member_alone(tmp_path, wrong, said):
+    """And numpy does not warn of its own."""
+    (tmp_path / "large.yaml").write_text(LARGE, encoding="utf-8")
+    made = phigen.compile(tmp_path / "large.yaml", target="c")
+    given = {"x": 1.0, "k": 1.0, "h": 0.1} | wrong
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(phigen.ParameterError, match=re.escape(said)):
+            made.integrate([given["x"], 0], given["h"], 3, k=given["k"])
+        k, h = np.array([1, given["k"], 2]), np.array([0.1, given["h"], 0.2])
+        with pytest.raises(phigen.ParameterError, match=f"{re.escape(said)}.*as of member 1") as failure:
+            made.ensemble([[1, 0], [given["x"], 0], [0.5, 0]], h, 3, k=k)
+    assert failure.value.members == (1,)
+    ends = made.ensemble([[1, 0], [0.5, 0]], h[::2], 3, k=k[::2])
+    assert failure.value.trajectory[::2] == pytest.approx(ends, rel=1e-6)
+
+
+def test_a_site_beyond_single_precision_is_named():
+    made = lattice_solver_of(in_single("toda")[0], "c")
+    x = np.ones((2, 8))
+    x[1, 3] = -1e39
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        with pytest.raises(phigen.ParameterError, match=r"b = -1e\+39 is too large for single precision"):
+            made.integrate(x, 0.1, 1)
+        with pytest.raises(phigen.StepError, match=r"1 member\(s\).*b = -1e\+39 is too large") as failure:
+            made.ensemble(np.array([np.ones((2, 8)), x]), 0.1, 1)
+    assert failure.value.members == (1,)
+    assert np.isfinite(failure.value.trajectory[0]).all()
