@@ -112,9 +112,9 @@ def examine(
         if refuted(groups):
             return Examination(spec, groups, unexamined=UNEXAMINED)
         groups = groups | clock.timed("proofs", lambda: statements.integrals(source))
-        monitor = statements.monitor(source, spec)
-        groups = groups | monitor
-        if refuted(monitor):
+        signs = statements.monitor(source, spec) | statements.damping_of(source, spec)
+        groups = groups | signs
+        if refuted(signs):
             return Examination(spec, groups, unexamined="the method")
         try:
             asked = spec.asked(extras, profile)
@@ -183,8 +183,10 @@ def _examine_lattice(
         except SpecError as error:
             raise located(error, spec) from None
         groups = clock.timed("proofs", lambda: lattices.lattice(cell))
+        rests = UNEXAMINED if len(groups) == 1 else ""
+        groups = groups | statements.damping_of_lattice(spec)
         if refuted(groups):
-            return Examination(spec, groups, unexamined=UNEXAMINED if len(groups) == 1 else "")
+            return Examination(spec, groups, unexamined=rests)
         try:
             compilation = _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
         except SpecError as error:

@@ -1,4 +1,4 @@
-"""Whether an expression is positive: by its form, or at the points where runs start."""
+"""Whether an expression is positive, or not negative: by its form, or at the points where runs start."""
 
 from __future__ import annotations
 
@@ -35,6 +35,24 @@ def positivity(name: str, e: Expression, positive: Collection[str], starts: Sequ
     if starts:
         return Statement(name, CHECKED, f"where runs start, {len(starts)}; a step on which it is not fails")
     return Statement(name, UNDECIDED, "no run starts anywhere; a step on which it is not fails")
+
+
+def not_negative(
+    name: str, e: Expression, positive: Collection[str], points: Sequence[Mapping[str, float]]
+) -> Statement | None:
+    """Whether ``e`` is nowhere negative: by its form alone, else at ``points``; None where neither tells."""
+    if _sign_of_negative(e, positive) == POSITIVE:
+        return Statement(name, REFUTED, "negative by its form", shortened(e))
+    if sign_of(e, positive):
+        return Statement(name, PROVED, "by its form")
+    for point in points:
+        try:
+            (value,) = evaluate([e], point)
+        except DomainError:
+            return Statement(name, REFUTED, "no value where a run starts", shortened(e))
+        if value < 0:
+            return Statement(name, REFUTED, f"{value:.6g} where a run starts", shortened(e))
+    return Statement(name, CHECKED, f"where runs start, {len(points)}") if points else None
 
 
 def _sign_of_negative(e: Expression, positive: Collection[str]) -> str | None:

@@ -7,7 +7,17 @@ from dataclasses import dataclass, replace
 from phigen.compilation import Compilation
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.definedness import start_is_defined
-from phigen.proofs.statements import ATTITUDE, CASIMIRS, DEFINEDNESS, INVARIANTS, METHOD, MONITOR, SPLITTING, Groups
+from phigen.proofs.statements import (
+    ATTITUDE,
+    CASIMIRS,
+    DAMPING,
+    DEFINEDNESS,
+    INVARIANTS,
+    METHOD,
+    MONITOR,
+    SPLITTING,
+    Groups,
+)
 from phigen.spec.model import LieAlgebraForm, Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
@@ -16,6 +26,7 @@ UNEXAMINED = "Casimirs, invariants, the method"
 
 #: Where a spec says what a group of statements is about.
 _PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
+_PLACES |= {DAMPING: ("damping",)}
 
 
 @dataclass(frozen=True)
@@ -66,7 +77,7 @@ def refutation(found: Examination) -> str:
     """What is refuted, for a message, each with its place in the spec."""
     rest = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
     return "\n".join(
-        str(found.spec.diagnostic(_place(found.spec, group, s), str(s), rest or hint_of(found.spec, group)))
+        str(found.spec.diagnostic(_place(found.spec, group, s), str(s), hint_of(found.spec, group) or rest))
         for group, s in found.mistakes
     )
 
@@ -77,6 +88,8 @@ def hint_of(spec: Spec, group: str) -> str:
     Of Casimirs it is that coordinates are in another order than the basis of the algebra that is named.
     """
     form = spec.poisson
+    if group == DAMPING:
+        return "what adds energy is a force: forces: {covector: …}, or {vector: …}"
     if group != CASIMIRS or not isinstance(form, LieAlgebraForm) or not form.family:
         return ""
     return (

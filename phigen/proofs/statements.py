@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 from phigen.compilation import Compilation
 from phigen.geometry import checks
 from phigen.geometry.definedness import undefined_parts, undefined_starts
 from phigen.geometry.jacobi import jacobi_identity
-from phigen.geometry.positivity import positivity
+from phigen.geometry.positivity import not_negative, positivity
 from phigen.geometry.system import System
 from phigen.realisations import axioms
 from phigen.scheme.noise import noise_flows
 from phigen.series.hamilton_jacobi import residual
-from phigen.spec.model import Spec
+from phigen.spec.model import Run, Spec
 from phigen.splitting.statements import check as check_splitting
+from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_elements
 
 #: Statements by the part of the mathematics they belong to, in the order of the pipeline.
@@ -24,7 +26,7 @@ Groups = Mapping[str, tuple[Statement, ...]]
 PREFIX = "bi-realisation: "
 DEFINEDNESS, CASIMIRS, FORCES, INVARIANTS = "Definedness", "Casimirs", "Forces", "Invariants"
 NOISE = "Noise"
-MONITOR = "Monitor"
+MONITOR, DAMPING = "Monitor", "Damping"
 METHOD, SPLITTING, ATTITUDE = "Bi-realisation", "Splitting", "Attitude"
 
 
@@ -51,6 +53,36 @@ def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
     return {MONITOR: (positivity("g > 0", spec.monitor, system.positive, _starts(system, spec)),)}
+
+
+def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tuple[Statement, ...]]:
+    """λ of the damping is not negative; nothing where there is none, or where nothing tells."""
+    rate = spec.forces.damping
+    if rate is None:
+        return {}
+    positive = [p.name for p in spec.parameters if p.positive]
+    stated = not_negative("λ ≥ 0, so that damping takes energy: dH/dt ≤ 0", rate, positive, starts)
+    return {DAMPING: (stated,)} if stated else {}
+
+
+def damping_of(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
+    """`damping` where runs start, or with the defaults of the parameters if it depends on these only."""
+    return damping(spec, _starts(system, spec) or _defaults(spec))
+
+
+def damping_of_lattice(spec: Spec) -> dict[str, tuple[Statement, ...]]:
+    """`damping` of a lattice, with the parameters that are one number."""
+    return damping(spec, _defaults(spec, *spec.runs.values()))
+
+
+def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
+    """The parameters of runs, or their defaults, if the damping depends on nothing else."""
+    numbers = {p.name for p in spec.parameters if p.at == "all"}
+    rate = spec.forces.damping
+    if rate is None or not set(symbols_of(rate)) <= numbers:
+        return []
+    bare = Run("", (), Fraction(1), 1)
+    return [spec.parameters_of(run) for run in runs or (bare,)]
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:

@@ -7,8 +7,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import COMMAND, compile_text, javascript, slow_but, solver
 
+from phigen import resources
 from phigen.compiler import emit, examine
 from phigen.errors import SpecError
+from phigen.proofs.examination import refutation
+from phigen.spec import load, loads
 from phigen.study.summary import summarise
 from phigen.study.verification import verify
 
@@ -201,6 +204,51 @@ def test_what_is_proved_of_forces():
     (rate, _) = examine(made("vector").spec).groups["Forces"]
     assert rate.name.startswith("dC/dt = ")
     assert rate.name.endswith(", by the vector force")
+
+
+TURNING = """phigen: 1
+name: damped
+coordinates: [m1, m2, m3]
+parameters: {k: 0.1, s: {value: 2, positive: true}}
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: m3
+damping: RATE
+"""
+RUNS = "runs: {one: {initial: [1, 0, 0], step: 0.1, steps: 5}, two: {initial: [1, 0, 0], step: 0.1, steps: 5, MORE}}\n"
+
+
+@pytest.mark.parametrize(
+    ("rate", "more", "verdict", "detail"),
+    [
+        ("s/2", "", "proved", "by its form"),
+        ("k**2", "", "proved", "by its form"),
+        ("-1", "", "refuted", "negative by its form"),
+        ("-s", "", "refuted", "negative by its form"),
+        ("k", "", "checked numerically", "where runs start, 1"),
+        ("k", RUNS.replace("MORE", "stride: 1"), "checked numerically", "where runs start, 2"),
+        ("k", RUNS.replace("MORE", "parameters: {k: -0.5}"), "refuted", "-0.5 where a run starts"),
+        ("k*m1", RUNS.replace("[1", "[-2").replace("MORE", "stride: 1"), "refuted", "-0.2 where a run starts"),
+    ],
+)
+def test_damping_takes_energy_where_its_rate_is_not_negative(rate, more, verdict, detail):
+    found = examine(loads(TURNING.replace("RATE", rate) + more, "a.yaml"))
+    (stated,) = found.groups["Damping"]
+    assert (stated.verdict, stated.detail) == (verdict, detail)
+    if verdict == "refuted":
+        assert "a.yaml:7:10: error: λ ≥ 0" in refutation(found)
+        assert "what adds energy is a force" in refutation(found)
+
+
+def test_damping_of_which_nothing_is_known_has_no_statement():
+    assert "Damping" not in examine(loads(TURNING.replace("RATE", "k*m1"), "a.yaml")).groups
+
+
+def test_damping_at_the_sites_of_a_lattice_is_looked_at_too():
+    spec = resources.bundled_specs() / "lattices" / "thermal_heisenberg.yaml"
+    (stated,) = examine(load(spec)).groups["Damping"]
+    assert stated.verdict == "proved"
+    text = spec.read_text(encoding="utf-8").replace("damping: lambda\n", "damping: -lambda\n")
+    assert [s.verdict for s in examine(loads(text, "a.yaml")).groups["Damping"]] == ["refuted"]
 
 
 def test_the_code_does_not_claim_a_poisson_map():
