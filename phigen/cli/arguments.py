@@ -26,6 +26,9 @@ CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
 
 order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
 
+#: Which random numbers a run with noise takes.
+SEED = click.IntRange(0, limits.SEED)
+
 #: What runs are made with.
 target_option = click.option(
     "-t", "--target", type=click.Choice(["auto", *LOADABLE]), default="auto", show_default=True

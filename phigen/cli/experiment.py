@@ -136,6 +136,15 @@ def with_steps(run: Run, step: float | None, steps: int | None) -> Run:
     return run if steps is None else replace(run, steps=steps, stride=min(run.stride, steps), until=None)
 
 
+def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
+    """The run with the seed that the command line says."""
+    if seed is None:
+        return run
+    if not spec.noise:
+        raise click.BadParameter(f"{spec.name} has no noise", param_hint="--seed")
+    return replace(run, seed=seed)
+
+
 def expect_positive(spec: Spec, parameters: Mapping[str, Any]) -> None:
     """Refuse numbers for parameters that the spec says are positive; arrays are looked at elsewhere."""
     for p in spec.parameters:

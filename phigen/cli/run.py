@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import click
 from phigen.cli.arguments import (
     FIGURES,
     FILMS,
+    SEED,
     file_ending,
     one_spec,
     order_option,
@@ -19,7 +21,7 @@ from phigen.cli.arguments import (
     target_option,
 )
 from phigen.cli.console import Console, out_json, pass_console, verbosity
-from phigen.cli.experiment import loaded, prepared, run_of, with_steps
+from phigen.cli.experiment import loaded, prepared, run_of, with_seed, with_steps
 from phigen.cli.interruption import InterruptedRunError
 from phigen.cli.lattice_run import expect_no, run_lattice
 from phigen.cli.resizing import resized, sizes_option
@@ -48,6 +50,7 @@ _TABLES = (".csv", ".npz")
     "--every", metavar="DT", type=float, help="Store states at times so far apart, instead of every stride-th."
 )
 @click.option("--at", metavar="T,…", help="Store states at these times, or at those in a file.")
+@click.option("--seed", metavar="N", type=SEED, help="Which random numbers the noise takes, instead of the run's.")
 @click.option("--from", "source", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Start at the last state of another run: FILE.csv or FILE.npz.")  # fmt: skip
 @click.option("--extend", is_flag=True, help="Go on beyond the end of the finished run in the file of --output.")
@@ -85,6 +88,7 @@ def command(
     until: float | None,
     every: float | None,
     at: str | None,
+    seed: int | None,
     source: Path | None,
     extend: bool,
     settings: tuple[str, ...],
@@ -114,7 +118,7 @@ def command(
     if spec.lattice:
         expect_no(section=section, until=until, every=every, at=at, extend=extend)
         expect_no(**{"from": source})
-        chosen = with_steps(run_of(spec, name), step, steps)
+        chosen = with_seed(spec, with_steps(run_of(spec, name), step, steps), seed)
         given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
         run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json, lyapunov=lyapunov)
         return
@@ -125,6 +129,7 @@ def command(
         {"--steps": steps, "--from": source, "--section": section, "--lyapunov": lyapunov},
     )
     experiment = prepared(spec, name, step, steps, settings, until)
+    experiment = replace(experiment, run=with_seed(spec, experiment.run, seed))
     if section and experiment.run.section is None:
         raise click.BadParameter(f"the run {experiment.run.name} has no section: in the spec", param_hint="--section")
     compilation = compilation_of(spec, order, with_tangent(spec) if lyapunov else None, scheme=scheme)

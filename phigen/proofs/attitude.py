@@ -70,9 +70,17 @@ def check(compilation: Compilation) -> Iterator[Statement]:
         )
         yield from islice(stated, 1 if pushed else None)
     if not compilation.splitting:
-        first = compilation.series.polynomial(1)
-        slope = gradient(first.tower.expression(first.terms[0]), system.coordinates)
+        slope = gradient(_first_term(compilation), system.coordinates)
         yield rate_statement(system, attitude, slope, None if system.forces else compilation.monitor)
+
+
+def _first_term(compilation: Compilation) -> Expression:
+    """S_1, unexpanded where it has too many terms."""
+    try:
+        first = compilation.series.polynomial(1)
+    except OverflowError:
+        return compilation.series.graph(1)[0]
+    return first.tower.expression(first.terms[0])
 
 
 def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from phigen.registry import TARGETS
 from phigen.spec import limits
 from phigen.spec.kinds import (
@@ -39,6 +41,7 @@ from phigen.spec.yaml_source import Mapping, Scalar, Sequence
 FORMAT_VERSION = 1
 
 NAME = Name(IDENTIFIER, "a name", "names are ASCII letters, digits and _, and start with a letter or _")
+TIME = replace(NAME, expected="the name of the time", example="time: t declares it")
 RUN_NAME = Name(r"[A-Za-z0-9_][A-Za-z0-9_-]*", "the name of a run", "use ASCII letters, digits, _ and -")
 NEIGHBOUR = Name(IDENTIFIER + r" *(\[[^\[\]]*\])?", NAME.expected, NAME.hint)
 FORMULA, CONSTANT, INLINE, PROSE = Formula(), Formula(constant=True), Text(), Text(lines=True)
@@ -305,7 +308,7 @@ SPEC = Record(
             MapOf(NAME, Either({Scalar: CONSTANT, Mapping: PARAMETER})),
             "run-time arguments of the generated code, with defaults",
         ),
-        Field("time", NAME, "the name of the time, for a Hamiltonian that depends on it"),
+        Field("time", TIME, "the name of the time, for a Hamiltonian that depends on it"),
         Field("definitions", FORMULAS, "named sub-expressions, usable in every expression"),
         Field("lattice", LATTICE, "how many like sites are related; the coordinates are those of every site"),
         Field("poisson", POISSON, "the Poisson structure, in one of its forms", required=True),

@@ -98,16 +98,19 @@ class Text(Kind):
 
 @dataclass(frozen=True)
 class Name(Kind):
-    """A text of a certain shape."""
+    """A text of a certain shape; the ``example`` is told where something else stands in its place."""
 
     pattern: str
     expected: str = "a name"
     hint: str = ""
     longest: int = limits.NAME_LENGTH
+    example: str = ""
 
     def read(self, node: Node, path: Path, reader: Reader) -> Scalar | None:
         if not isinstance(node, Scalar) or node.is_null:
-            return self.mismatch(node, path, reader)
+            return self.mismatch(node, path, reader, self.example)
+        if node.boolean is not None:
+            return self.mismatch(node, path, reader, self.example or f"quotes make it a name: '{node.text}'")
         return node if self.accepts(node, reader) else None
 
     def accepts(self, node: Scalar, reader: Reader) -> bool:

@@ -90,6 +90,9 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     if name not in known and not declared.incomplete:
         declared.reader.error(key, f"over: {shown(name)} is not a parameter or a coordinate", did_you_mean(name, known))
         return []
+    if name == "start" and name not in (*declared.parameters, *declared.coordinates) and not declared.time:
+        declared.reader.error(key, "over: start: this system has no time", "time: t declares the name of the time")
+        return []
     if isinstance(value, Scalar):
         declared.reader.error(
             value, f"over: {name} has one value", "give a range, {from: 1, to: 3, count: 100}, or a list"

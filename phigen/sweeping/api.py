@@ -161,6 +161,8 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
     known = [*(p.name for p in spec.parameters), *(() if spec.lattice else spec.coordinates), *SWEEP_NAMES]
     if name not in known:
         raise ValueError(f"over: {name!r} is not a parameter or a coordinate; there are {', '.join(known)}")
+    if name == "start" and name not in known[: -len(SWEEP_NAMES)] and not spec.time:
+        raise ValueError("over: start: this system has no time")
     if isinstance(value, Mapping):
         ends = (float(value.get("from", 0)), float(value.get("to", 0)))
         return Axis(name, (), ends, int(value.get("count", 0)), str(value.get("scale", "linear")))

@@ -21,7 +21,6 @@ from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.memory import expect_room
 from phigen.spec.model import Extras, Run, Spec, Sweep
-from phigen.spec.names import SWEEP_NAMES
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
 
@@ -193,7 +192,8 @@ def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:
     except (OSError, ValueError) as error:
         raise FileError(f"{path}: expected a line of names, and lines of numbers: {error}") from None
     names = [name.strip() for name in names]
-    known = {*(spec.coordinates if not spec.lattice else ()), *(p.name for p in spec.parameters), *SWEEP_NAMES[:2]}
+    known = {*(spec.coordinates if not spec.lattice else ()), *(p.name for p in spec.parameters), "step"}
+    known |= {"start"} if spec.time else set()
     strange = [name for name in names if name not in known]
     if strange or len(set(names)) < len(names) or not len(rows):
         why = f"{strange[0]!r} is not a parameter or a coordinate" if strange else "no members, or a name twice"

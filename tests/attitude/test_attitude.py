@@ -20,6 +20,7 @@ from phigen.proofs.statements import ATTITUDE
 from phigen.runtime.crossings import CrossingFinder
 from phigen.runtime.march import march
 from phigen.runtime.solver import Solver
+from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.symbolic.expression import topological
 from phigen.symbolic.verdict import PROVED, REFUTED
 
@@ -128,6 +129,16 @@ def test_elements_leave_the_other_momentum_as_it_is_and_turn_as_h_says(case):
         assert [s.verdict for s in found].count(PROVED) >= 2
     else:
         assert [s.verdict for s in found] == [PROVED] * len(found)
+
+
+def test_what_has_too_many_terms_to_expand_is_stated_of_the_formula(monkeypatch):
+    expanded = statements(made("body"))
+
+    def large(self, terms):
+        raise OverflowError
+
+    monkeypatch.setattr(HamiltonJacobi, "polynomial", large)
+    assert statements(made("body")) == expanded
 
 
 def test_a_flow_and_its_element_take_each_function_of_an_angle_once():

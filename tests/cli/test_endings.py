@@ -212,6 +212,27 @@ def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, sche
     assert (refused.exit_code, "ends with a part of a step" in refused.stderr) == (2, True)
 
 
+@pytest.mark.parametrize("members", [1, 2])
+def test_another_seed_is_that_of_a_spec_with_it(phigen, write, members):
+    spec = write("spec.yaml", NOISY.replace("steps: 60}", f"steps: 60, members: {members}}}"))
+    other = write("other.yaml", NOISY.replace("steps: 60}", f"steps: 60, members: {members}, seed: 7}}"))
+
+    def told(*args):
+        found = json.loads(ran(phigen, *args, "--json").stdout)
+        return found["seed"], found["final"], found.get("means")
+
+    assert told(spec, "--seed", 7) == told(other) == told(other, "--seed", 7)
+    assert told(other, "--seed", 0) == told(spec) != told(other)
+
+
+def test_an_extension_with_the_same_seed_goes_on_along_its_path(phigen, write):
+    spec = write("spec.yaml", NOISY)
+    ran(phigen, spec, "--seed", 7, "-o", "a.csv")
+    ran(phigen, spec, "--seed", 7, "--steps", 20, "-o", "b.csv")
+    ran(phigen, spec, "--seed", 7, "--steps", 40, "--extend", "-o", "b.csv")
+    assert table("b.csv") == pytest.approx(table("a.csv"), abs=1e-13)
+
+
 def test_noise_after_a_part_of_a_step_is_new(phigen, write):
     """The part has used up the numbers of its step, whatever its size."""
     still = NOISY.replace("(p**2 + q**2)/2", "p - p").replace("hamiltonian: p - p", "hamiltonian: 0")
@@ -359,6 +380,7 @@ def test_what_does_not_fit_is_told(phigen, write):
         ((swing, "--at", "7"), "not between 0.0 and 6.0"),
         ((swing, "--at", "soon"), "times are numbers"),
         ((swing, "--every", "-1"), "must be positive"),
+        ((swing, "--seed", 3), "swing has no noise"),
         ((swing, "--extend"), "name its file by --output"),
         ((swing, "--extend", "-o", "a.csv", "--set", "q=2"), "of another run"),
         ((swing, "--extend", "-o", "a.csv", "--until", 5), "never reached from 6.0"),

@@ -215,3 +215,20 @@ def test_a_run_of_other_sizes_is_not_gone_on_with(phigen, chain, tmp_path):
         compile(chain, target="numpy").integrate(np.zeros((2, 12)), 0.05, 40, 10, checkpoints=kept, progress=stop)
     asked = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume", "--sizes", "14")
     assert "belongs to another run" in phigen(*asked).stderr
+
+
+def test_another_seed_is_that_of_a_spec_with_it(phigen, chain, tmp_path):
+    noisy = CHAIN.replace("runs:", "noise: {kick: {hamiltonian: q, amplitude: 0.1}}\norder: 2\nruns:")
+    last = []
+    for text, more in ((noisy, ["--seed", 7]), (noisy.replace("stride: 10", "stride: 10, seed: 7"), []), (noisy, [])):
+        chain.write_text(text, encoding="utf-8")
+        done = phigen("run", chain, "-t", "numpy", "-o", tmp_path / "a.npz", *more)
+        assert done.exit_code == 0, done.stderr
+        with np.load(tmp_path / "a.npz") as stored:
+            last.append(stored["x"][-1])
+    assert (last[0] == last[1]).all()
+    assert (last[0] != last[2]).any()
+
+
+def test_a_lattice_without_noise_has_no_seed(phigen, chain):
+    assert "chain has no noise" in phigen("run", chain, "--seed", 7).stderr

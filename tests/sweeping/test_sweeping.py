@@ -277,6 +277,15 @@ def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkey
         phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler="tcp://127.0.0.1:1")
 
 
+def test_a_system_without_a_time_has_no_start_to_vary(spec, tmp_path):
+    with pytest.raises(ValueError, match="over: start: this system has no time"):
+        phigen.sweep(spec, over={"start": [0, 1]})
+    (tmp_path / "members.csv").write_text("x1, start\n0.1, 3\n")
+    (tmp_path / "s.yaml").write_text(BODY + "sweeps: {listed: {over: {file: members.csv}}}\n")
+    with pytest.raises(FileError, match="'start' is not a parameter"):
+        phigen.sweep(tmp_path / "s.yaml", output=tmp_path / "s.zarr")
+
+
 def test_members_of_a_file_are_made_in_its_order(cluster, tmp_path):
     (tmp_path / "members.csv").write_text("x1, I3\n0.1, 3\n0.2, 4\n0.3, 5\n")
     (tmp_path / "s.yaml").write_text(BODY + "sweeps: {listed: {over: {file: members.csv}}}\n")
