@@ -9,13 +9,22 @@
 /* ---- The transpose of sweeps ---- */
 #if PHI_SHARES
 #if !PHI_SWEPT
-/* Before a loop over eight sites, whose sums are in lanes: compilers may not write it out and make vectors of the loop around it. */
+/* Sums over sites, in lanes of eight: compilers may not write a loop over these out and make vectors of the loop around it. Clang
+   would keep such sums in memory: it is told of one loop over all sites, and that it may add in any order. */
+#if defined(__clang__) && __clang_major__ >= 13
+#define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) interleave_count(1)")
+#define PHI_LANES(sites) (sites)
+#define PHI_ADD(sums, l, value) { _Pragma("clang fp reassociate(on)") sums[0] += value; }
+#else
 #if defined(__clang__)
 #define PHI_EACH_LANE _Pragma("clang loop vectorize(assume_safety) unroll(disable)")
 #elif defined(__GNUC__)
 #define PHI_EACH_LANE _Pragma("GCC ivdep") _Pragma("GCC unroll 1")
 #else
 #define PHI_EACH_LANE
+#endif
+#define PHI_LANES(sites) 8
+#define PHI_ADD(sums, l, value) sums[l] += value;
 #endif
 
 #endif

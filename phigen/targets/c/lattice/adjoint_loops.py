@@ -161,16 +161,15 @@ def _in_vectors(
     if not shares:
         return _looped(name, layout, colour, head, body, shares)
 
-    def added(place: str) -> Iterator[str]:
-        yield from body
-        yield from (f"share{k}[{place}] += {value};" for k, (_, value) in enumerate(shares))
-
     lines = [f"double {', '.join(f'share{k}[8] = {{ 0.0 }}' for k in range(len(shares)))};"]
     lines.append("const ptrdiff_t to = row->to, whole = to - (to - row->from) % 8;")
-    lines += ["for (ptrdiff_t j = row->from; j < whole; j += 8) {", f"    {name}_EACH_LANE"]
-    lines += ["    for (ptrdiff_t l = 0; l < 8; ++l) {", "        const ptrdiff_t i = j + l;"]
-    lines += [*(f"        {line}" for line in added("l")), "    }", "}"]
-    lines += ["for (ptrdiff_t i = whole; i < to; ++i) {", *(f"    {line}" for line in added("0")), "}"]
+    lines.append(f"const ptrdiff_t lanes = {name}_LANES(whole - row->from);")
+    lines += ["for (ptrdiff_t j = row->from; j < whole; j += lanes) {", f"    {name}_EACH_LANE"]
+    lines += ["    for (ptrdiff_t l = 0; l < lanes; ++l) {", "        const ptrdiff_t i = j + l;"]
+    lines += [f"        {line}" for line in body]
+    lines += [f"        {name}_ADD(share{k}, l, {value})" for k, (_, value) in enumerate(shares)]
+    lines += ["    }", "}", "for (ptrdiff_t i = whole; i < to; ++i) {", *(f"    {line}" for line in body)]
+    lines += [*(f"    share{k}[0] += {value};" for k, (_, value) in enumerate(shares)), "}"]
     lines += [f"sums[{c}] += {name}_total(share{k});" for k, (c, _) in enumerate(shares)]
     return "\n".join([*head, *(f"    {line}" for line in lines)]) + "\n"
 

@@ -19,7 +19,7 @@ from phigen.targets.reserved import C_RESERVED
 
 #: What the loops call their own.
 _OWN = frozenset(
-    {"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole"}
+    {"coef", "row", "to", "out", "apart", "i", "j", "k", "l", "side", "sums", "begin", "end", "whole", "lanes"}
     | {"at_bonds", "sign", "across", "first", "left", "count"}
 )
 
