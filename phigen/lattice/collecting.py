@@ -36,21 +36,21 @@ def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, back: Kernel) 
     for name, value in given:
         field, offset = sites.places[name]
         taken = _seen_from(sites, names, moved, offset, value)
-        if taken is None or field in moved or field not in back.inputs["site"]:
+        if taken is None or field in moved:
             return None
         sums.setdefault(field, []).append(taken)
-    own = dict(along)
+    own = dict.fromkeys(sums, ZERO) | dict(along)
     if any(not own[field].is_zero for field in moved if field in own):
         return None
     found = {field: _by_cotangents(total([own[field], *terms])) for field, terms in sums.items()}
     beside = {name for name, _ in given}
-    values = [found.get(name, ZERO if name in beside else value) for name, value in along]
-    outputs = [replace(o, values=tuple(values)) if o.name == "site_bar" else o for o in back.outputs]
-    collected = replace(back, outputs=tuple(outputs))
+    values = [found.pop(name, ZERO if name in beside else value) for name, value in along]
+    outputs = [replace(o, values=(*values, *found.values())) if o.name == "site_bar" else o for o in back.outputs]
+    collected = replace(back, inputs={**back.inputs, "site": (*back.inputs["site"], *found)}, outputs=tuple(outputs))
     if _cost(collected.roots) > _cost(back.roots) + HANDING * len({value for _, value in given}):
         return None
     around = tuple(s for s in symbols_of(*collected.roots) if isinstance(s, Symbol) and s.kind == AROUND)
-    return replace(collected, inputs={**back.inputs, AROUND: around})
+    return replace(collected, inputs={**collected.inputs, AROUND: around})
 
 
 def _seen_from(

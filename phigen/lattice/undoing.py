@@ -15,9 +15,20 @@ from phigen.lattice.collecting import collecting
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sites, Sweep, Sweeps
-from phigen.symbolic.expression import ONE, Expression, fold, neg, rebuild, substitute, symbol, symbols_of
+from phigen.symbolic.expression import (
+    ONE,
+    Expression,
+    fold,
+    neg,
+    rebuild,
+    substitute,
+    symbol,
+    symbols_of,
+    topological,
+)
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.symbols import PRESENT, Symbol, coefficient
+from phigen.symbolic.verdict import PROVED, decide_zero
 
 #: The output of a transpose that is the moved fields before the sweep, and the input of those that it reads for that.
 UNDONE = "undone"
@@ -77,7 +88,7 @@ def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kerne
     moved = [program.coordinates[f] for f in sweep.moved]
     changes = _turned_back(sweep.kernel.roots, _of_coefficients(step))
     before = {f: symbol(f) + change for f, change in zip(moved, changes, strict=True)}
-    values = iter(substitute(back.roots, before))
+    values = iter(_substituted(back.roots, before))
     outputs = [replace(o, values=tuple(next(values) for _ in o.values)) for o in back.outputs]
     unread = tuple(f for f in moved if f not in back.inputs["site"])
     return replace(
@@ -85,6 +96,24 @@ def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kerne
         inputs={**back.inputs, UNDONE: unread},
         outputs=(*outputs, Output(UNDONE, tuple(before.values()))),
     )
+
+
+def _substituted(values: Sequence[Expression], before: Mapping[str, Expression]) -> list[Expression]:
+    """Values at the fields before a sweep. Where these are the same in arguments of functions, as |ψ|² is that moves
+    only phases, which is proved, functions are not called once more."""
+    called = dict.fromkeys(e.args[0] for e in topological(values) if e.op in FUNCTIONS and len(e.args) == 1)
+    moved = [e for e in called if not {*before}.isdisjoint(symbols_of(e))]
+    kept = {
+        e: symbol(Symbol("kept", k))
+        for k, (e, other) in enumerate(zip(moved, substitute(moved, before), strict=True))
+        if decide_zero("", [("", other - e)]).verdict == PROVED
+    }
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        return kept.get(e) or rebuild(e, args)
+
+    held = {value.value: e for e, value in kept.items()}
+    return substitute(substitute(fold(values, visit), before), held)
 
 
 def apart(back: Kernel) -> tuple[Kernel, Kernel] | None:

@@ -16,10 +16,11 @@ import phigen
 from phigen import SpecError, StepError
 from phigen.compiler import compile_spec
 from phigen.lanes.lowering import in_lanes
-from phigen.lattice.undoing import can_be_undone
+from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.resources import bundled
 from phigen.runtime import c_lattice
 from phigen.spec.model import Extras
+from phigen.symbolic.expression import topological
 
 H, STEPS, SITES = 0.05, 4, 6
 RING = {"bonds": np.array([[i, (i + 1) % SITES] for i in range(SITES)] + [[0, 2]])}
@@ -149,6 +150,7 @@ OWN = {
 #: In C, and the sizes: time and forces, colours, open ends along two axes with parameters of neighbours; a graph with
 #: colours and parameters at bonds, pairs. The series of several stages, and of a graph and pairs.
 IN_C = {"driven": SITES, "volterra": SITES, "far_open": (4, 3), "food_web": SITES, "outer_planets": SITES}
+IN_C |= {"heisenberg_plane fast": (3, 19), "heisenberg fast": (2, 3, 11), "dnls fast": 11}
 IN_C |= {"heisenberg_plane small": (4, 6), "chiral_magnet small": SITES, "driven_graph": SITES, "rotors fast": SITES}
 IN_C["ablowitz_ladik fast"] = SITES
 IN_C |= {
@@ -346,6 +348,17 @@ def test_derivatives_that_transposes_call_have_the_short_way_of_their_functions(
     assert {"sinroot", "sinroot1"} <= {*rows.near} == {*rows.limited}
 
 
+def test_functions_of_what_sweeps_keep_are_called_once_on_the_way_back():
+    """|ψ|² decides how far a phase turns, and is the same before and after."""
+    program = compile_spec(phigen.spec.load(bundled()["dnls"]), extras=Extras(adjoint=True)).program
+    called = [
+        sum(e.op in ("sin", "versin", "cos") for e in topological(kernel.roots))
+        for part in transposes(program, program.step)
+        for kernel in part
+    ]
+    assert sorted(called) == [0, 0, 2]
+
+
 UNSTABLE = """phigen: 1
 name: unstable
 lattice: {axes: [i], boundary: periodic}
@@ -436,6 +449,7 @@ def test_all_of_a_run_is_kept_where_steps_are_dear(monkeypatch):
 #: Sizes that several threads work at; of "fput", too large for caches, they go back through several flows at once.
 LARGE = {"driven": 6000, "driven composed": 6000, "heisenberg_plane small": (80, 76), "fput": 140_000}
 LARGE |= {"driven_graph": 2000, "paired fast": 513}
+LARGE |= {"heisenberg_plane fast": (80, 76), "heisenberg fast": (40, 40, 40)}
 
 
 @pytest.mark.parametrize("name", LARGE)
