@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 7ea08eee707c9ea7573ef0680d80a9e73c3c4ba0789e7e93e365be3e7a9021cb
+ * body-sha256: c4fd059d5cd06e041b50ce4f0ca2c58826870dc346ed7daf99d1716b3c0d0ab4
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -182,7 +182,8 @@ static inline double heisenberg_plane_sin_lane(double u)
    The flow of H_2 = sum of -(J*(y*y[i+1]) + J*(y*y[j+1])): x, z turned. */
 static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenberg_plane_row *row)
 {
-    const double c0 = coef[0], w2 = row->present[2], w3 = row->present[3];
+    const double c0 = coef[0], there0 = row->present[0], there1 = row->present[1], w2 = row->present[2],
+        w3 = row->present[3];
     const double *restrict x_row = row->x[0] + row->at[0];
     double *y_row = row->x[1] + row->at[0], *z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
@@ -190,8 +191,8 @@ static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenbe
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->s->length ? there0 : 0.0;
+        const double w1 = i - 1 >= 0 ? there1 : 0.0;
         const double t1 = c0 * (w1 * x_row[i - 1] + w0 * x_row[i + 1] + (w3 * x_row1[i] + w2 * x_row2[i]));
         const double t2 = (2.0 * heisenberg_plane_sin_lane(0.5 * (t1)) * heisenberg_plane_sin_lane(0.5
             * (t1)));
@@ -206,7 +207,8 @@ static inline void heisenberg_plane_sweep_y_z(const double *coef, const heisenbe
 /* The flow of H_3 = sum of -(J*(z[i+1]*(delta*z)) + J*(z[j+1]*(delta*z))): x, y turned. */
 static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_plane_row *row)
 {
-    const double c1 = coef[1], w2 = row->present[2], w3 = row->present[3];
+    const double c1 = coef[1], there0 = row->present[0], there1 = row->present[1], w2 = row->present[2],
+        w3 = row->present[3];
     double *x_row = row->x[0] + row->at[0], *y_row = row->x[1] + row->at[0];
     const double *restrict z_row = row->x[2] + row->at[0];
     const double *restrict z_row2 = row->x[2] + row->at[2]; /* i + 1 */
@@ -214,8 +216,8 @@ static inline void heisenberg_plane_sweep3(const double *coef, const heisenberg_
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i];
-        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->s->length ? there0 : 0.0;
+        const double w1 = i - 1 >= 0 ? there1 : 0.0;
         const double t1 = c1 * (w1 * z_row[i - 1] + w0 * z_row[i + 1] + (w3 * z_row1[i] + w2 * z_row2[i]));
         const double t2 = heisenberg_plane_sin_lane(t1);
         const double t3 = (2.0 * heisenberg_plane_sin_lane(0.5 * (t1)) * heisenberg_plane_sin_lane(0.5
@@ -264,7 +266,8 @@ static void heisenberg_plane_sweep_part(const heisenberg_plane_solver *s, int pa
 /* The density of the Hamiltonian, at the sites of a row. */
 static void heisenberg_plane_energy_row(const heisenberg_plane_row *row, double *restrict out)
 {
-    const double J = row->s->params.J, delta = row->s->params.delta, w2 = row->present[2];
+    const double J = row->s->params.J, delta = row->s->params.delta, there0 = row->present[0],
+        w2 = row->present[2];
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
         *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
@@ -273,7 +276,7 @@ static void heisenberg_plane_energy_row(const heisenberg_plane_row *row, double 
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
+        const double w0 = i + 1 < row->s->length ? there0 : 0.0;
         const double t1 = delta * z;
         const double t2 = w0 * (J * (x * x_row[i + 1])) + w2 * (J * (z_row2[i] * t1))
             + (w0 * (J * (y * y_row[i + 1])) + w0 * (J * (z_row[i + 1] * t1)));
@@ -297,8 +300,8 @@ static void heisenberg_plane_casimirs_row(const heisenberg_plane_row *row, doubl
 static void heisenberg_plane_vector_field_row(const heisenberg_plane_row *row, double *restrict out)
 {
     const ptrdiff_t apart = (ptrdiff_t)row->s->sites;
-    const double J = row->s->params.J, delta = row->s->params.delta, w2 = row->present[2],
-        w3 = row->present[3];
+    const double J = row->s->params.J, delta = row->s->params.delta, there0 = row->present[0],
+        there1 = row->present[1], w2 = row->present[2], w3 = row->present[3];
     const double *restrict x_row = row->x[0] + row->at[0], *restrict y_row = row->x[1] + row->at[0],
         *restrict z_row = row->x[2] + row->at[0];
     const double *restrict x_row2 = row->x[0] + row->at[2]; /* i + 1 */
@@ -310,8 +313,8 @@ static void heisenberg_plane_vector_field_row(const heisenberg_plane_row *row, d
     heisenberg_plane_EACH_SITE
     for (ptrdiff_t i = row->from, to = row->to; i < to; ++i) {
         const double x = x_row[i], y = y_row[i], z = z_row[i];
-        const double w0 = i + 1 < row->s->length ? row->present[0] : 0.0;
-        const double w1 = i - 1 >= 0 ? row->present[1] : 0.0;
+        const double w0 = i + 1 < row->s->length ? there0 : 0.0;
+        const double w1 = i - 1 >= 0 ? there1 : 0.0;
         const double t1 = w0 * (delta * (J * z_row[i + 1])) + w1 * (J * (delta * z_row[i - 1]))
             + (w3 * (J * (delta * z_row1[i])) + w2 * (delta * (J * z_row2[i])));
         const double t2 = w3 * (J * y_row1[i]) + w2 * (J * y_row2[i]) + (w0 * (J * y_row[i + 1])

@@ -8,6 +8,7 @@
 #include "lattice_trail.c"
 
 /* ---- The transpose of flows ---- */
+#if !PHI_TAKES
 /* The sweep of that number in a flow; -1 if there are no more. */
 static int phi_sweep_of(const phi_solver *s, int flow, int number)
 {
@@ -39,6 +40,7 @@ static int phi_part_of(const phi_solver *s, int sweep)
 #endif
 }
 
+#endif
 #if PHI_UNDONE
 #include "lattice_undoing.c"
 #else
@@ -57,7 +59,13 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
             size_t count = 0;
             phi_find_flow(s, steps - 1, PHI_FLOWS - 1, &last);
             phi_sweep_part(s, last.part, last.coef PHI_AND_FAR(g->far)); /* to be undone */
+#if PHI_TAKES
+            phi_hand_nothing(s, g, phi_number_of(steps, 0) + 1);
             phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last, &count, 1);
+            phi_hand_last(s, g, phi_number_of(steps, 0), g->row_bar);
+#else
+            phi_flow_back(s, g, steps - 1, PHI_FLOWS - 1, g->row_bar, &last, &count, 1);
+#endif
         }
 #else
         double *x[PHI_ARRAYS];

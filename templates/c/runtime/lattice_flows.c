@@ -52,7 +52,11 @@ typedef struct {
     double own[PHI_ROW];
 #endif
 #if PHI_UNDONE
+#if PHI_TAKES
+    int go;                    /* 0 onward; else back, 1 and 2 in turn, by which of the arrays what is handed goes, with: */
+#else
     int go;                    /* 0 onward; else back, 1 at the sites themselves, and 2 as they are handed something then, with: */
+#endif
     int row;
     const struct phi_transpose *g;
     double *const *bar;

@@ -8,10 +8,53 @@
 #include "lattice_trail.c"
 
 /* ---- Flows that are undone ---- */
+#if PHI_TAKES
+/* The number among all flows of that flow of the step after so many: those that are joined are that of the step after them. */
+static size_t phi_number_of(size_t step, int number) { return step * PHI_OWN_FLOWS + (size_t)(number % PHI_FLOWS); }
+
+/* What flows hand lies in the arrays of every second flow by turns, by their number among all. */
+static double *const *phi_handed_by(const phi_transpose *g, size_t flow) { return g->handed + flow % 2 * (PHI_HANDED / 2); }
+
+/* Before some flows are gone back through: the flow after them, of that number, has handed nothing. */
+static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t flow)
+{
+    size_t first, end = phi_share(phi_units(s), &first);
+    for (size_t unit = first; unit < end; ++unit) {
+        const phi_row row = phi_piece_of(s, unit);
+        for (int k = 0; k < PHI_HANDED / 2; ++k) {
+            double *restrict handed = PHI_HERE(phi_handed_by(g, flow)[k]);
+            for (ptrdiff_t i = row.from; i < row.to; ++i) handed[i] = 0.0;
+#if PHI_HALO
+            phi_ends(handed, s->length, row.from, row.to);
+#endif
+        }
+    }
+    phi_wait();
+}
+
+/* After them: what the last one, of that number, has handed. */
+static void phi_hand_last(const phi_solver *s, const phi_transpose *g, size_t flow, double *const *bar)
+{
+#if PHI_HANDS
+    size_t first, end = phi_share(phi_units(s), &first);
+    phi_hand_rows(s, phi_flow_parts[0], s->x, bar, phi_handed_by(g, flow), first, end);
+    phi_wait();
+#else
+    (void)s, (void)g, (void)flow, (void)bar;
+#endif
+}
+
+/* Pull cotangents back through a flow, and undo it, at pieces of rows. */
+#else
 /* Pull cotangents back through a flow, and undo it, or hand what that has found, at pieces of rows. */
+#endif
 static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end)
 {
     const phi_transpose *g = flow->g;
+#if PHI_TAKES
+    phi_back_rows(s, phi_ways[flow->row], flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, phi_handed_by(g, (size_t)flow->go - 1),
+        phi_handed_by(g, (size_t)flow->go), g->sums + flow->row * PHI_ROW, first, end);
+#else
 #if PHI_HANDS
     if (flow->go > 1) {
 #if PHI_GATHER
@@ -23,6 +66,7 @@ static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first,
     }
 #endif
     phi_back_rows(s, flow->part, flow->coef PHI_AND_FAR(g->far), s->x, flow->bar, g->handed, g->sums + flow->row * PHI_ROW, first, end);
+#endif
 }
 
 /* Go back through some flows, the last first; all threads come here at once. */
@@ -50,6 +94,17 @@ enum { PHI_DEEPEST = 1 }; /* flows at once */
 static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t step, int number, double *const *bar,
     phi_flow *flows, size_t *count, size_t depth)
 {
+#if PHI_TAKES
+    phi_flow *next = flows + *count;
+    phi_find_flow(s, step, number, next);
+    next->go = 1 + (int)(phi_number_of(step, number) % 2);
+    next->row = number;
+    next->g = g;
+    next->bar = bar;
+    if (++*count < depth) return;
+    phi_go_all_back(s, flows, *count);
+    *count = 0;
+#else
     int k = 0;
     while (phi_sweep_of(s, number, k) >= 0) ++k;
     while (k-- > 0)
@@ -66,6 +121,7 @@ static void phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t st
             phi_go_all_back(s, flows, *count);
             *count = 0;
         }
+#endif
 }
 
 /* Pull cotangents back through so many steps, joined, after so many, and undo them: s->x becomes the fields before. */
@@ -78,12 +134,18 @@ static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t b
 #endif
     phi_flow flows[PHI_DEEPEST];
     size_t count = 0;
+#if PHI_TAKES
+    phi_hand_nothing(s, g, phi_number_of(before + steps, 0));
+#endif
     for (size_t left = steps * PHI_OWN_FLOWS; left-- > 0;) {
         const size_t step = before + left / PHI_OWN_FLOWS;
         const int flow = (int)(left % PHI_OWN_FLOWS), number = flow == 0 && step > g->first_step ? PHI_FLOWS : flow;
         phi_flow_back(s, g, step, number, g->bar, flows, &count, depth);
     }
     phi_go_all_back(s, flows, count);
+#if PHI_TAKES
+    phi_hand_last(s, g, phi_number_of(before, 0), g->bar);
+#endif
 }
 
 /* The state that a leg of a segment begins with. */

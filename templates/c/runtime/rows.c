@@ -22,6 +22,9 @@ typedef struct {
 #endif
 #if PHI_ADJOINT
     double *const *bar, *const *handed; /* see phi_transpose */
+#if PHI_TAKES
+    double *const *given;         /* what sites beside have handed before */
+#endif
 #endif
 #if PHI_GIVERS
     ptrdiff_t givers[PHI_LINES];  /* the rows that hand something to this one, where they have been found */
@@ -122,6 +125,9 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
 #endif
 #if PHI_ADJOINT
     row.bar = row.handed = NULL;
+#if PHI_TAKES
+    row.given = NULL;
+#endif
 #endif
 #if PHI_BY_COLOUR
     row.chosen = 0;

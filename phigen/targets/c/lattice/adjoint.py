@@ -2,7 +2,8 @@
 
 A sweep is gone back through in two goes, so that every site is written by itself alone, whatever the threads. In the
 first, each site finds what it gives to the values that it has read. What is its own it adds at once; what belongs to
-others it puts into arrays, one for each value that is ``handed``. In the second, each site adds what it is handed.
+others it puts into arrays, one for each value that is ``handed``. In the second, each site adds what it is handed. On
+grids the second go is made by the same loops as the first one of the flow before, see `layout.takes`.
 So it is with the kernels of the equation of a stage, see `adjoint_stages`.
 """
 
@@ -24,7 +25,7 @@ from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
 from phigen.targets.c.lattice.ends import over_ends
-from phigen.targets.c.lattice.layout import Layout, givers, hands, layout_of, starts_are_read
+from phigen.targets.c.lattice.layout import Layout, givers, handed_apart, layout_of, starts_are_read, takes, ways
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
@@ -48,7 +49,8 @@ class Back:
 class _Pulled:
     """A transposed kernel, where its cotangents are, what is gathered for it, and the transposes of the kernels of
     that, with the parameters that are opposite seen from b; what is called before it, for pieces of rows; the fields
-    that it undoes, or another kernel, from sums that bonds or pairs add up in their transposes."""
+    that it undoes, or another kernel, from sums that bonds or pairs add up in their transposes; what the flow after it
+    has handed, where it takes that."""
 
     kernel: Kernel
     seeds: Seeds
@@ -57,6 +59,7 @@ class _Pulled:
     before: tuple[str, ...] = ()
     undone: tuple[int, ...] = ()
     undo: Kernel | None = None
+    taken: tuple[Handed, ...] = ()
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
@@ -69,9 +72,13 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
         setups: list[tuple[str, ...]] = [_SETUP_OF_STAGES] * len(parts)
     else:
         parts = [*_of_parts(program, layout, rows, kernels)]
-        chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(parts))]
+        chosen = [bool(step.by_colour and step.by_colour[k]) for k in range(len(step.parts))]
         setups = [(*_SETUP, *["row.chosen = colour;"] * own) for own in chosen]
-    found += [loop.text(program) for part in parts for loop in part.loops]
+        if takes(program, step):
+            find = _givers(program)[:1] if givers(step) else []
+            setups = [(*_SETUP, *_SETUP_OF_TAKING, *find)] * len(parts)
+    loops = {loop.name: loop for part in parts for loop in part.loops}
+    found += [loop.text(program) for loop in loops.values()]
     back = [
         Case(p.first, setup, _has_ends(p.first), moved=p.undone, where="x")
         for p, setup in zip(parts, setups, strict=True)
@@ -80,16 +87,20 @@ def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str
     far = bool(rows.limited)
     found.append(_over(program, layout, title, "back_rows", dict(enumerate(back, 1)), far=far))
     where = _givers(program) if givers(step) else []
+    left_out = {_VARIED, *_SETUP_OF_TAKING, *where}
     hand = {
-        k: Case(p.second, [*(line for line in setup if line != _VARIED), *where], beside=False)
+        k: Case(p.second, [*(line for line in setup if line not in left_out), *where], beside=False)
         for k, (p, setup) in enumerate(zip(parts, setups, strict=True), 1)
         if p.second
     }
+    if takes(program, step):
+        hand = dict([*hand.items()][:1])
     found += [_over(program, layout, "What sites are handed", "hand_rows", hand, far=far)] if hand else []
     return "\n".join([_tables(program, step, parts, adjoint.steps), *found, _added(program, step, layout)])
 
 
 _SETUP = ("row.x = x;", "row.bar = bar;", "row.handed = handed;")
+_SETUP_OF_TAKING = ("row.given = given;",)
 _VARIED = "row.varied = v;"
 _SETUP_OF_STAGES = ("row.x = s->y[2];", _VARIED, "row.bar = bar;", "row.handed = s->handed;")
 
@@ -100,7 +111,7 @@ def _has_ends(calls: Sequence[str]) -> bool:
 
 
 def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str, Kernel]) -> Iterator[Back]:
-    """The two goes of all sweeps of each part."""
+    """The two goes of all sweeps of each part, or the one of those that take what the flow after them has handed."""
     undone, back = can_be_undone(program, layout.step), transposes(program, layout.step)
     around = {
         layout.bar(program.coordinates[sweep.moved[int(s.key[0])]])
@@ -109,9 +120,11 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
         for s in kernel.inputs.get(AROUND, ())
         if isinstance(s, Symbol)
     }
-    for number, (part, found) in enumerate(zip(layout.step.parts, back, strict=True), 1):
+    taking, alone = takes(program, layout.step), [(k, k) for k in range(len(back))]
+    for k, after in dict.fromkeys(ways(layout.step)) if taking else alone:
         pulled = list[_Pulled]()
-        for sweep, kernel in zip(part, found, strict=True):
+        taken = tuple(h for kernel in back[after] for h in handed_by(layout, kernel, 0)) if taking else ()
+        for sweep, kernel in zip(layout.step.parts[k], back[k], strict=True):
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
             seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
             ends = tuple(_ends_back(sweep.gather, kernels))
@@ -119,9 +132,12 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
             alike = len(ends) == 1 and ends[0][0].of_all
             own, undo = (alike and apart(kernel)) or (kernel, None)
             before = tuple(_gathered(program, layout, sweep)) if _reads_sums(own) else ()
-            pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo))
-        both = _back(program, layout, rows, f"hand{number}", f"the sweeps of H_{number} have changed", pulled)
-        along = [pair for kernel in found for pair in kernel.along("site")]
+            if taken:
+                own = replace(own, name=f"{own.name}_after{after + 1}")
+            pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo, taken))
+        told = f"the sweeps of H_{k + 1} have changed"
+        both = _back(program, layout, rows, f"hand{k + 1}", told, pulled, apart=handed_apart(program, layout.step)[k])
+        along = [pair for kernel in back[k] for pair in kernel.along("site")]
         written = {layout.bar(layout.step.sites.places[s][0]) for s, e in along if not e.is_zero}
         place = f"{layout.at(0, 'row.')}, s->length, {layout.swept()}"
         copied = tuple(f"{program.name}_ends(row.bar[{k}]{place});" for k in sorted(around & written) if layout.halo)
@@ -146,8 +162,17 @@ def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[
         yield _back(program, layout, rows, name.replace("_back", "_hand"), f"{name} has read", [pulled])
 
 
-def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pulled: Sequence[_Pulled]) -> Back:
-    """The two goes of some kernels, of which the second is ``name``."""
+def _back(
+    program: Program,
+    layout: Layout,
+    rows: Rows,
+    name: str,
+    whom: str,
+    pulled: Sequence[_Pulled],
+    *,
+    apart: bool = True,
+) -> Back:
+    """The two goes of some kernels, of which the second is ``name``, where it is ``apart`` from the next first one."""
     loops, first, second = list[Loop](), list[str](), list[str]()
     beside, given = list[Handed](), 0
 
@@ -160,7 +185,7 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         lines, sums = {}, one.gather.names if one.gather else ()
         for far, calls in call_forms(program, rows, [kernel]).items():
             own = [
-                first_loop(program, layout, k, form + far, one.seeds, sums, listed, given, calls, moved)
+                first_loop(program, layout, k, form + far, one.seeds, sums, listed, given, calls, moved, one.taken)
                 for k, form in forms_of(program, kernel)
             ]
             lines[far] = [called(call.loop, call.sites) for call in calls_over_sites(own)]
@@ -179,7 +204,7 @@ def _back(program: Program, layout: Layout, rows: Rows, name: str, whom: str, pu
         given += len(one.gather.names) if one.gather else 0
         beside += listed
     first += copied_ends(program, layout, beside)
-    if beside:
+    if beside and apart:
         loop = handing(program, layout, name, whom, beside)
         second.append(f"{program.name}_{loop.name}(&row);")
         loops.append(loop)
@@ -222,7 +247,8 @@ def _over(
         if head == "back_rows":
             arguments = f"const double *coef, {'int far, ' * far}double *const *v, double *const *bar, double *sums"
     elif whole:
-        arguments = f"const double *coef, {'int far, ' * far}{arguments}, double *sums"
+        given = ", double *const *given" * (takes(program, layout.step) and head == "back_rows")
+        arguments = f"const double *coef, {'int far, ' * far}{arguments}{given}, double *sums"
     arguments = f"int {'flow' if coloured else 'part'}, {arguments}"
     unused = ["part"] * (len(cases) == 1 and not coloured)
     calls = [call for case in cases.values() for call in case.calls]
@@ -238,6 +264,7 @@ def _over(
         arguments=arguments,
         coloured=coloured,
         unused=unused,
+        back=True,
     )
 
 
@@ -245,6 +272,7 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
     read = _read(step, kernels)
     kept = [{f for sweep in part for f in sweep.moved if program.coordinates[f] in read} for part in step.parts]
     rows = [", ".join(str(int(f in own)) for f in range(program.dimension)) for own in kept]
+    ways_of = ways(step) if takes(program, step) else []
     values = {
         "NAME": program.name,
         "parts": len(parts),
@@ -253,8 +281,9 @@ def _tables(program: Program, step: Sweeps, parts: Sequence[Back], kernels: Iter
         "sums": _sums(program, step),
         "keeps": "" if can_be_undone(program, step) else ", ".join(f"{{ {row} }}" for row in rows),
         "hands": ", ".join(str(int(bool(part.second))) for part in parts),
-        "handing": any(hands(program, step)) or can_be_undone(program, step),
-        "handed": max(1, *(part.handed for part in parts)) if parts else 1,
+        "handing": not ways_of and (any(handed_apart(program, step)) or can_be_undone(program, step)),
+        "handed": max(1, *(part.handed for part in parts)) * (2 if ways_of else 1) if parts else 1,
+        "ways": ", ".join(str(1 + [*dict.fromkeys(ways_of)].index(way)) for way in ways_of),
         "bars": program.dimension + len(step.sites.parameters) + len(step.sites.at_bonds),
         "numbers": max(1, sum(p.at == "all" for p in program.parameters)),
     }

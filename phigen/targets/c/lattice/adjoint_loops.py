@@ -10,7 +10,7 @@ from phigen.lattice.undoing import UNDONE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.symbolic.symbols import COEFFICIENT, Symbol
-from phigen.targets.c.lattice.layout import Layout
+from phigen.targets.c.lattice.layout import Layout, givers
 from phigen.targets.c.lattice.loops import Loop
 from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, beside, told
 from phigen.targets.code import Code, Store, lower
@@ -69,11 +69,13 @@ def first_loop(
     begin: int,
     calls: Mapping[str, str],
     moved: Sequence[str] = (),
+    taken: Sequence[Handed] = (),
 ) -> Loop:
     """The first go of a kernel; cotangents of ``sums`` over bonds or pairs, if it finds any, are handed in arrays from
     ``begin`` on.
 
-    ``moved`` are the fields that it finds as they were before the sweep."""
+    ``moved`` are the fields that it finds as they were before the sweep. What the flow after it has handed is ``taken``
+    before."""
     name, code = program.name, lower(kernel)
     around = [f"row->bar[{k}]" for k in seeds.bars]
     names = SiteNames(
@@ -104,6 +106,8 @@ def first_loop(
     arrays = [*(h.array for h in handed), *range(begin, begin + len(sums) * found)]
     given |= {array: "0.0" for array in arrays if array not in given}
     stores += [f"handed_{array}[i] = {value};" for array, value in given.items()]
+    from_others, added = _added_up(layout, "given", taken)
+    used |= {h.base for h in taken}
     head += seeds.declared(code, layout.at(0))
     head += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sorted(used)]
     for array in given:
@@ -111,9 +115,9 @@ def first_loop(
         if layout.leaves_out(seeds.colour):
             whole = f"(size_t)(row->to - row->from) * sizeof *handed_{array}"
             head.append(f"    memset(handed_{array} + row->from, 0, {whole});")
-    body = names.loaded()
+    body = [*added, *names.loaded()]
     body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    head += [f"    {line}" for line in names.pointers()]
+    head += [f"    {line}" for line in [*from_others, *names.pointers()]]
     looped = _in_vectors if program.profile == "fast" and not layout.leaves_out(seeds.colour) else _looped
     text = looped(name, layout, seeds.colour, head, [*body, *stores], shares)
     return Loop(kernel.name + form, kernel.purpose, f"{told(program)}, double *sums", text)
@@ -195,17 +199,26 @@ def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> I
 
 def handing(program: Program, layout: Layout, name: str, whom: str, handed: Sequence[Handed]) -> Loop:
     """The second go of a part: a site at an offset from another is handed what that has for it."""
+    pointers, added = _added_up(layout, "handed", handed)
+    bars = dict.fromkeys(h.base for h in handed)
+    lines = [f"    {text}" for text in pointers]
+    lines += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in bars]
+    lines += [f"    {program.name}_EACH_SITE", f"    {OVER_SITES} {{", *(f"        {line}" for line in added)]
+    purpose = f"what sites are handed by those around that {whom}"
+    return Loop(name, purpose, told(program, "params"), "\n".join([*lines, "    }"]) + "\n")
+
+
+def _added_up(layout: Layout, called: str, handed: Sequence[Handed]) -> tuple[list[str], list[str]]:
+    """The pointers to what sites around hand to a site, in arrays of rows that are ``called`` so, and its addition."""
     sums: dict[int, list[str]] = {}
     pointers: dict[str, str] = {}
     for h in handed:
         back = tuple(-o for o in h.offset)
         line = layout.line(back)
-        pointer = f"handed_{h.array}" + (f"_{line}" if line else "")
-        pointers[pointer] = f"const double *restrict {pointer} = row->handed[{h.array}]{layout.at(line)};"
+        pointer = f"{called}_{h.array}" + (f"_{line}" if line else "")
+        place = layout.at(line)
+        if called == "given" and givers(layout.step):
+            place = f" + row->givers[{line}]"
+        pointers[pointer] = f"const double *restrict {pointer} = row->{called}[{h.array}]{place};"
         sums.setdefault(h.base, []).append(beside(pointer, back[-1]))
-    lines = [f"    {text}" for text in pointers.values()]
-    lines += [f"    double *restrict bar_{k} = row->bar[{k}]{layout.at(0)};" for k in sums]
-    lines += [f"    {program.name}_EACH_SITE", f"    {OVER_SITES} {{"]
-    lines += [f"        bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]
-    purpose = f"what sites are handed by those around that {whom}"
-    return Loop(name, purpose, told(program, "params"), "\n".join([*lines, "    }"]) + "\n")
+    return [*pointers.values()], [f"bar_{k}[i] += {' + '.join(terms)};" for k, terms in sums.items()]

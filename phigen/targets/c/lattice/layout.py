@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from phigen.lattice.adjoint import BACK
+from phigen.lattice.collecting import AROUND
 from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
@@ -135,7 +136,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "PAIRS": step.partners is not None and not layout.graph,
         "BOND_PARAMETERS": bool(step.sites.at_bonds),
         "NUMBERED": any(p.at == "all" for p in program.parameters),
-        "HANDS": any(hands(program, step)),
+        "HANDS": any(handed_apart(program, step)),
+        "TAKES": takes(program, step),
         "SHARES": shares(step),
         "STARTS": starts_are_read(step),
         "UNDONE": can_be_undone(program, step),
@@ -190,6 +192,30 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)
         found.append(beside or any(sweep.gather for sweep in part))
     return found
+
+
+def takes(program: Program, step: Sweeps) -> bool:
+    """Whether what a flow hands to sites of a grid on the way back is taken by the loop of the next: in long code."""
+    if program.profile == "small" or step.partners or step.sites.colours > 1 or not can_be_undone(program, step):
+        return False
+    kernels = [kernel for part in transposes(program, step) for kernel in part]
+    alone = all(len(part) == 1 for part in step.parts) and not any(kernel.inputs.get(AROUND) for kernel in kernels)
+    return alone and any(hands(program, step))
+
+
+def handed_apart(program: Program, step: Sweeps) -> list[bool]:
+    """Of each part of H whether what its sweeps hand is added by loops of their own: where others take it, that of the
+    first flow only, which is the last on the way back."""
+    first = step.schedule.flows[0][0] if takes(program, step) else None
+    return [found and first in (None, k) for k, found in enumerate(hands(program, step))]
+
+
+def ways(step: Sweeps) -> list[tuple[int, int]]:
+    """Of each flow of a step its part and that of the flow after it, and once more of the first where it is joined to
+    the last of the step before."""
+    parts = [part for part, _ in step.schedule.flows]
+    after = [*parts[1:], parts[1 % len(parts)]]
+    return [*zip(parts, after, strict=True), (parts[0], parts[1 % len(parts)])]
 
 
 def shares(step: Sweeps) -> bool:

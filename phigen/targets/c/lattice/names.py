@@ -57,6 +57,7 @@ class SiteNames:
         called = {word.strip("({") for text in calls.values() for word in text.split("(")}
         shares = {f"share{k}" for k in range(layout.step.row + len(program.parameters))}
         numbered = {f"{word}{k}" for word in ("change", "add", "sum") for k in range(3)} | shares
+        numbered |= {f"there{k}" for k in range(len(layout.weights))}
         numbered |= {f"{word}{k}" for word in ("add", "own") for k in range(len(code.stores))}
         self.scope = Scope(C_RESERVED | _OWN | called | numbered)
         self.show = printer(self.scope, calls)
@@ -161,7 +162,10 @@ class SiteNames:
         low, high = bounds(s)[-1]
         tests = [f"i - {-low} >= 0"] * (low < 0) + [f"i + {high} < row->s->length"] * (high > 0)
         if tests:
-            there = f"row->present[{k}]" if len(self.layout.step.sites.axes) > 1 else "1.0"
+            there = "1.0"
+            if len(self.layout.step.sites.axes) > 1:  # read before the loop, or gcc would not vectorise that
+                there = f"there{k}"
+                self._first.append(f"{there} = row->present[{k}]")
             self._weights.append(f"const double {named} = {' && '.join(tests)} ? {there} : 0.0;")
         else:
             self._first.append(f"{named} = row->present[{k}]")

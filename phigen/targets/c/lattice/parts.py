@@ -388,19 +388,23 @@ def over_rows(
     *,
     alone: bool = False,
     threads: int = 0,
+    back: bool = False,
     **more: object,
 ) -> str:
     """A function that goes over pieces of rows, or ``alone`` over one, or over all, by several threads where there are
     more sites than ``threads`` says, if it does; what it does is one of some ``cases``, or what these call.
 
-    They have the numbers 1, 2, …, or those of ``labels``.
+    They have the numbers 1, 2, …, or those of ``labels``. On the way ``back``, sites beside open ends are whole vectors
+    of 8, so that those between are too.
     """
     last = [bounds(w)[-1] for w in layout.weights]
     low, one_row = max([0, *(-low for low, _ in last)]), len(layout.step.sites.axes) == 1
+    low = (low + 7) // 8 * 8 if back else low
     values = {
         "NAME": program.name,
         "low": low if one_row else f"row.whole ? {low} : s->length",
         "high": max([0, *(high for _, high in last)]),
+        "back": back,
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
         "alone": alone,
         "threads": threads,
