@@ -13,6 +13,8 @@ from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.composition import find, orders
 from phigen.scheme.estimate import SparseRow, may_have, newton_operations, path_operations
 from phigen.scheme.generating import GeneratingFunction, collected_form, forced_form, graph_form
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.lowering import cost
 from phigen.scheme.order import Order
 from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec import limits
@@ -22,6 +24,9 @@ from phigen.symbolic.symbols import STEP
 
 #: Most operations in one kernel.
 MOST_OPERATIONS = limits.OPERATIONS
+
+#: What else than a lower order makes a series smaller.
+_OTHER = "for scheme: splitting, "
 
 #: Below this cost of gradient and Hessian no composition is considered.
 COMPOSE_ABOVE = 2_000
@@ -247,7 +252,14 @@ def _expect_few(
         raise too_large(system, f"the matrices of a step would take more than {MOST_OPERATIONS} operations")
 
 
-def too_large(system: System, reason: str, other: str = "for scheme: splitting, ") -> LimitError:
+def too_large(system: System, reason: str, other: str = _OTHER) -> LimitError:
     """The error for a program beyond the budget; ``other`` is what else than a lower order may help."""
     hint = f"ask for a lower order, {other}or for fewer terms in H"
     return LimitError([Diagnostic(reason, system.locations.get(("order",)), hint)])
+
+
+def expect_few(system: System, kernel: Kernel, other: str = _OTHER) -> None:
+    """Raises `LimitError` for a kernel beyond the budget."""
+    operations = cost(kernel.roots)
+    if operations > MOST_OPERATIONS:
+        raise too_large(system, f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}", other)

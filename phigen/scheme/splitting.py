@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.scheme.adjoint import completed, explicit_adjoint, level_adjoint
+from phigen.scheme.alternation import Schedule
 from phigen.scheme.choosing import Choice
-from phigen.scheme.discretisation import MOST_OPERATIONS, too_large
+from phigen.scheme.discretisation import expect_few
 from phigen.scheme.forces import force_facts
 from phigen.scheme.gathering import staged
 from phigen.scheme.gauge import Gauge
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.kernels import noise_fields, observables
 from phigen.scheme.logarithmic import Logarithmic, trimmed
-from phigen.scheme.lowering import cost, operation_counts
+from phigen.scheme.lowering import operation_counts
 from phigen.scheme.noise import driven, expect_no_adjoint, noise_facts, with_noise
 from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
@@ -46,64 +48,30 @@ def build_splitting(
     profile: str = "fast",
     monitor: Logarithmic | None = None,
 ) -> Program:
-    """The explicit solver as a program. LimitError if a kernel exceeds `MOST_OPERATIONS`."""
+    """The explicit solver as a program. LimitError if a kernel is too large."""
     _expect_no_modified(system, extras)
-    splitting, steps = choice.splitting, choice.schedule()
     sources = driven(system)
     if sources:
         expect_no_adjoint(system, extras.adjoint)
-        steps = with_noise(steps, len(sources))
-    every = [*sources, *splitting.flows]
+    flows = [*sources, *choice.splitting.flows]
     held = (LEVEL,) if monitor else ()
     coefficients = Coefficients([*system.parameter_names, *held, TIME, KICK], [*system.times, *system.increments[:1]])
-    flows = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(every, 1))
-    tangents = tuple(
-        explicit_jacobian(trimmed(flow, system.dimension), system.coordinates, coefficients, f"tangent{k}")
-        for k, flow in enumerate(flows, 1)
-        if extras.tangent
-    )
-    attitude, time_of = None, monitor.time if monitor else None
+    kernels = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(flows, 1))
+    tangents = tuple(_tangents(system, kernels, coefficients)) if extras.tangent else ()
+    attitude = None
     if group:
         from phigen.scheme.attitude import flow_attitude
 
-        moved = [monitor.outputs(flow) if monitor else flow.increment for flow in every]
-        attitude = flow_attitude(system, group, splitting.flows, moved, gauge, coefficients, time_of)
-    inputs = {"t": system.times, "dw": system.increments[:1]}
-    refresh = coefficients.refresh(**{name: symbols for name, symbols in inputs.items() if symbols})
-    prepare = Kernel(
-        "prepare",
-        "everything that depends on parameters and the time of a flow only",
-        {
-            "params": system.parameter_names,
-            **({"gauge": held} if held else {}),
-            "h": (TIME,),
-            **({"kick": (KICK,)} if steps.multiples else {}),
-        },
-        (Output("coef", tuple(coefficients.values)),),
-    )
-    adjoint = None
-    if extras.adjoint:
-        own = [trimmed(flow, system.dimension) for flow in flows]
-        back = [explicit_adjoint(flow, coefficients, f"flow{k}_adjoint") for k, flow in enumerate(own, 1)]
-        adjoint = completed(coefficients, back, prepare, refresh)
-    settled = Splitting(prepare, flows, steps, choice.method.name, tangents, refresh=refresh, adjoint=adjoint)
-    step = coefficients.settled(settled)
+        moved = [monitor.outputs(flow) if monitor else flow.increment for flow in flows]
+        time_of = monitor.time if monitor else None
+        attitude = flow_attitude(system, group, choice.splitting.flows, moved, gauge, coefficients, time_of)
+    schedule = with_noise(choice.schedule(), len(sources)) if sources else choice.schedule()
+    step = _step(system, kernels, schedule, coefficients, held, choice.method.name, tangents, adjoint=extras.adjoint)
     for kernel in step.kernels:
-        operations = cost(kernel.roots)
-        if operations > MOST_OPERATIONS:
-            reason = f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}"
-            raise too_large(system, reason, other="")
+        expect_few(system, kernel, other="")
     level = level_adjoint(system) if monitor and extras.adjoint else None
-    monitored = [monitor.fact] if monitor else []
-    said = (
-        *monitored,
-        *gauge.facts,
-        *facts(choice, step, len(sources)),
-        *force_facts(system, ""),
-        *noise_facts(system, weak=2),
-        _clock(choice),
-        choice.order.note,
-    )
+    said = [*([monitor.fact] if monitor else []), *gauge.facts, *facts(choice, step, len(sources))]
+    said += [*force_facts(system, ""), *noise_facts(system, weak=2), _clock(choice), choice.order.note]
     return Program(
         name=system.name,
         about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
@@ -123,6 +91,50 @@ def build_splitting(
         profile=profile,
         monitor=replace(monitor.monitor(system), level=level) if monitor else None,
     )
+
+
+def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients, monitor: Logarithmic | None) -> Kernel:
+    increment = staged(monitor.outputs(flow) if monitor else flow.increment, coefficients)
+    return Kernel(
+        f"flow{k}",
+        f"the flow of {_named(system, flow, k)}: {flow.manner}".replace(KICK, KICK.kind),
+        {"coef": coefficients.slots, "state": system.coordinates},
+        (Output("increment", tuple(increment)),),
+    )
+
+
+def _tangents(system: System, flows: Iterable[Kernel], coefficients: Coefficients) -> Iterator[Kernel]:
+    for k, flow in enumerate(flows, 1):
+        yield explicit_jacobian(trimmed(flow, system.dimension), system.coordinates, coefficients, f"tangent{k}")
+
+
+def _step(
+    system: System,
+    flows: tuple[Kernel, ...],
+    schedule: Schedule,
+    coefficients: Coefficients,
+    held: tuple[str, ...],
+    method: str,
+    tangents: tuple[Kernel, ...],
+    *,
+    adjoint: bool,
+) -> Splitting:
+    """The step, all whose coefficients are known but for those that are computed anew in each flow."""
+    dated = {"t": system.times, "dw": system.increments[:1]}
+    refresh = coefficients.refresh(**{name: symbols for name, symbols in dated.items() if symbols})
+    inputs = {"gauge": held, "h": (TIME,), "kick": (KICK,) if schedule.multiples else ()}
+    prepare = Kernel(
+        "prepare",
+        "everything that depends on parameters and the time of a flow only",
+        {"params": system.parameter_names, **{name: symbols for name, symbols in inputs.items() if symbols}},
+        (Output("coef", tuple(coefficients.values)),),
+    )
+    step = Splitting(prepare, flows, schedule, method, tangents, refresh=refresh)
+    if adjoint:
+        own = [trimmed(flow, system.dimension) for flow in flows]
+        back = [explicit_adjoint(flow, coefficients, f"flow{k}_adjoint") for k, flow in enumerate(own, 1)]
+        step = replace(step, adjoint=completed(coefficients, back, prepare, refresh))
+    return coefficients.settled(step)
 
 
 def facts(choice: Choice, step: Splitting, sources: int = 0) -> list[str]:
@@ -158,16 +170,6 @@ def _named(system: System, flow: Flow, k: int) -> str:
     if flow.force:
         return f"F_{k - len(sources)}, a force"
     return f"H_{k - len(sources)} = {flow.hamiltonian}"
-
-
-def _flow_kernel(system: System, flow: Flow, k: int, coefficients: Coefficients, monitor: Logarithmic | None) -> Kernel:
-    increment = staged(monitor.outputs(flow) if monitor else flow.increment, coefficients)
-    return Kernel(
-        f"flow{k}",
-        f"the flow of {_named(system, flow, k)}: {flow.manner}".replace(KICK, KICK.kind),
-        {"coef": coefficients.slots, "state": system.coordinates},
-        (Output("increment", tuple(increment)),),
-    )
 
 
 def _operations(step: Splitting) -> dict[str, int]:

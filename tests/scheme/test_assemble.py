@@ -5,7 +5,7 @@ import pytest
 from support import BODY, NAMES, compile_anew, compile_text, compiled, series_of, slow_but, values
 
 from phigen.errors import LimitError
-from phigen.scheme import assemble, discretisation
+from phigen.scheme import discretisation
 from phigen.scheme.collected import collect
 from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, hamilton_jacobi
 from phigen.scheme.generating import STEP, collected_form, graph_form
@@ -104,7 +104,6 @@ def test_collected_polynomials_differentiate_like_the_tower():
 
 def test_a_program_beyond_the_budget_is_refused_with_a_hint(monkeypatch):
     monkeypatch.setattr(discretisation, "MOST_OPERATIONS", 100)
-    monkeypatch.setattr(assemble, "MOST_OPERATIONS", 100)
     with pytest.raises(LimitError) as caught:
         compile_anew(BODY + "order: 6\n")
     assert "order" in str(caught.value)
