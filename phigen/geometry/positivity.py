@@ -84,8 +84,10 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
             return None if None in args else NOT_NEGATIVE if NOT_NEGATIVE in args else POSITIVE
         if e.op == "pow":
             # A fractional power is that of a value which is not negative, and not negative itself.
-            even = Fraction(e.value).denominator % 2 == 0 or Fraction(e.value).numerator % 2 == 0
-            return args[0] or (NOT_NEGATIVE if even else None)
+            exponent = Fraction(e.value)
+            even = exponent.denominator % 2 == 0 or exponent.numerator % 2 == 0
+            sign = args[0] or (NOT_NEGATIVE if even else None)
+            return POSITIVE if sign and exponent < 0 else sign  # 1/0 is no value
         return _ALWAYS.get(e.op)
 
     (found,) = fold([e], visit)

@@ -47,6 +47,11 @@ class CSession:
         """See `Session`."""
         return self._x.astype(np.float64)
 
+    @property
+    def rounding(self) -> float:
+        """See `Session`."""
+        return float(np.finfo(self._real).eps)
+
     def time(self) -> float:
         """See `Session`."""
         return float(self._c.solver_time(self.address)) if hasattr(self._c, "solver_time") else math.nan

@@ -30,6 +30,11 @@ class Given:
         """See `Followed`."""
         return self.session.state()
 
+    @property
+    def rounding(self) -> float:
+        """See `Followed`."""
+        return self.session.rounding
+
     def time(self) -> float:
         """See `Followed`."""
         return self.session.time()

@@ -86,6 +86,11 @@ class NumpySession:
         """See `Session`."""
         return np.array(self._x[0])
 
+    @property
+    def rounding(self) -> float:
+        """See `Session`."""
+        return float(np.finfo(float).eps)
+
     def time(self) -> float:
         """See `Session`."""
         return float((self._passed[0] + self._passed[1])[0]) if hasattr(self._module, "_time_of") else np.nan

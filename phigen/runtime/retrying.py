@@ -27,6 +27,11 @@ class Retrying:
         """A copy of the state (DIM,)."""
         return self.session.state()
 
+    @property
+    def rounding(self) -> float:
+        """See `Followed`."""
+        return self.session.rounding
+
     def time(self) -> float:
         """See `Followed`."""
         return self.session.time()

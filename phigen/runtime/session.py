@@ -40,6 +40,11 @@ class Course(Protocol):
 class Followed(Course, Protocol):
     """A trajectory of a generated solver, with the time and the attitude that it keeps."""
 
+    @property
+    def rounding(self) -> float:
+        """The spacing of the numbers it computes with, beside 1."""
+        ...
+
     def time(self) -> float:
         """The physical time since the start, where steps are equal in τ and the solver keeps it; NaN elsewhere."""
         ...

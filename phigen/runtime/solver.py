@@ -577,16 +577,19 @@ class Solver(Named[Backend, Interface]):
                 )
             # The other arguments were checked.
             given = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
-            message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"
+            message = f"{name}: no step can be made"
+            if given:
+                message += f" with {given}: what is computed from parameters alone is not finite"
             if self.interface.monitored:
-                message += ", or there the monitor is not positive"
+                message += f"{', or' if given else ':'} where it starts the monitor is not positive"
             return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)
         where = f"{name}: step {error.step} of size {h!r} failed" if error.step >= 0 else f"{name}: a step failed"
         if error.members:
             shown = ", ".join(map(str, error.members[:5])) + (", …" if len(error.members) > 5 else "")
             where += f" for {len(error.members)} member(s) of the ensemble ({shown})"
         elif error.step >= 0 and isinstance(trajectory, Trajectory):
-            where += f" at t = {trajectory.t[0] + error.step * h:.12g}"
+            reached = trajectory.t[-1] if self.interface.monitored else trajectory.t[0] + error.step * h
+            where += f" at t = {reached:.12g}"
         message = f"{where}: {error.status}" + (f", {_ADVICE[error.status]}" if error.status in _ADVICE else "")
         return StepError(message, step=error.step, status=error.status, trajectory=trajectory, members=error.members)
 

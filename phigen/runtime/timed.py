@@ -20,6 +20,8 @@ class Clocked(Protocol):
 
     @property
     def steps(self) -> int: ...
+    @property
+    def rounding(self) -> float: ...
     def state(self) -> Floats: ...
     def time(self) -> float: ...
     def advance(self, h: float, steps: int) -> None: ...
@@ -30,8 +32,9 @@ C = TypeVar("C", bound=Clocked)
 
 #: Most secants; they converge in four to seven.
 MOST = 30
-#: Times that differ by less, in their own size, are one.
-EQUAL = float(8 * np.finfo(float).eps)
+#: Times that differ by less, in their own size, are one: so many roundings, here in double precision.
+_ROUNDINGS = 8
+EQUAL = float(_ROUNDINGS * np.finfo(float).eps)
 
 
 def reached(session: C, h: float, span: float) -> tuple[C, float]:
@@ -43,6 +46,7 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
         return _moved(session, span), span
     begin = session.time()
     target = begin + span
+    rounded = _ROUNDINGS * session.rounding * max(abs(begin), abs(span))
     size, before, missed_before = h, 0.0, -span
     while True:  # a step that does not fail, from which to begin
         try:
@@ -64,11 +68,11 @@ def reached(session: C, h: float, span: float) -> tuple[C, float]:
         except BackendError:
             break
         ahead = found.time() - target
-        if abs(ahead) >= abs(missed) and abs(missed) <= EQUAL * max(abs(begin), abs(span)):
+        if abs(ahead) >= abs(missed) and abs(missed) <= rounded:
             break
         before, missed_before = size, missed
         size, missed, copy = following, ahead, found
-    if abs(missed) > 1e-9 * max(abs(begin), abs(span)):
+    if abs(missed) > max(1e-9 * max(abs(begin), abs(span)), rounded):
         raise BackendError("NO_CONVERGENCE", session.steps, session.state()[np.newaxis])
     return copy, size
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from phigen.errors import SpecError
-from phigen.geometry.positivity import POSITIVE, sign_of
+from phigen.geometry.positivity import NOT_NEGATIVE, POSITIVE, sign_of
 from phigen.geometry.system import System
 from phigen.scheme.composition import find
 from phigen.scheme.kernel import Kernel
-from phigen.scheme.monitor import rate_kernel
+from phigen.scheme.monitor import BY_HAND, rate_kernel
 from phigen.scheme.program import Monitor
 from phigen.spec.model import Spec
 from phigen.splitting.flow import Flow
@@ -75,12 +75,14 @@ def logarithmic_of(spec: Spec, system: System, flows: Sequence[Flow]) -> Logarit
     elif not isinstance(spec.gauge, str):
         message = "monitor: log takes no gauge, since the parts of H would not be those of the motion"
     if message:
-        raise SpecError([spec.diagnostic(("monitor",), message, "scheme: series takes an expression for g")])
+        hint = BY_HAND if spec.time else "scheme: series takes an expression for g"
+        raise SpecError([spec.diagnostic(("monitor",), message, hint)])
     found = next((f for f in flows if _below_zero(spec, system, f.hamiltonian)), None)
     if found is None:
         told = ", ".join(str(f.hamiltonian) for f in flows)
         message = f"monitor: log needs a part that is negative, at least where runs start; the parts are {told}"
-        raise SpecError([spec.diagnostic(("monitor",), message, "a constant can be taken from a part, in hamiltonian")])
+        hint = "positive: true of a parameter shows a sign; a constant can be taken from a part, in hamiltonian"
+        raise SpecError([spec.diagnostic(("monitor",), message, hint)])
     return Logarithmic(found.hamiltonian)
 
 
@@ -94,8 +96,9 @@ def composition_of(asked: str, order: int) -> str:
 
 
 def _below_zero(spec: Spec, system: System, e: Expression) -> bool:
-    """Whether an expression is negative: by its form, or else where all runs start."""
-    if sign_of(-e, system.positive) == POSITIVE:
+    """Whether an expression is negative: by its form, or else where all runs start; without runs it may be 0 too."""
+    sign = sign_of(-e, system.positive)
+    if sign == POSITIVE or (sign == NOT_NEGATIVE and not spec.runs):
         return True
     values = []
     for run in spec.runs.values():

@@ -20,6 +20,11 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.spec.model import Spec
 from phigen.symbolic.expression import Expression
 
+#: What there is in its place where H depends on the time: e is no constant then, and with t a coordinate.
+BY_HAND = (
+    "without time: make t and e coordinates too, a canonical pair; hamiltonian: g*(H + e), with e = -H at the start"
+)
+
 
 def elapsed_kernel(system: System, generating: GeneratingFunction) -> Kernel | None:
     """∂S_τ/∂e at the point y of a step; None for a system that is not monitored."""
@@ -60,7 +65,7 @@ def monitor_of(spec: Spec) -> Expression | None:
     for key, given in others.items():
         if given:
             message = f"monitor: not together with {key} e = -H(x0) would not be constant, or nothing would adapt"
-            raise SpecError([spec.diagnostic(("monitor",), message)])
+            raise SpecError([spec.diagnostic(("monitor",), message, BY_HAND if spec.time else "")])
     if spec.forces and not isinstance(spec.gauge, str):
         message = "monitor: with forces no Casimirs are taken from K, as there is none"
         raise SpecError([spec.diagnostic(("gauge",), message, "gauge: none")])

@@ -201,6 +201,31 @@ def test_where_the_monitor_vanishes_the_motion_stops_and_beyond_it_none_begins(t
         made.integrate([-1, 0], 0.1, 1)
 
 
+@pytest.mark.parametrize("order", [2, 4])
+def test_in_single_precision_until_and_at_are_right_to_its_rounding(order):
+    single = solver_of(compiled_text(BODY + "real: float\n", order), "c")
+    double = solver_of(compiled_text(BODY + "gauge: none\n", order), "c")
+    found, times = single.integrate(BODY_START, 0.2, until=7.7), [0.3, 1.0, 5.5]
+    assert found.t[-1] == pytest.approx(7.7, rel=1e-6)
+    exact = double.integrate(BODY_START, 0.2, until=7.7)
+    np.testing.assert_allclose(found.x[-1], exact.x[-1], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(found.at(times), exact.at(times), rtol=0, atol=1e-5)
+
+
+def test_a_failure_tells_the_physical_time_of_the_last_good_state(kepler):
+    with pytest.raises(StepError) as failure:
+        kepler[1]["c"].integrate(START, 3.5, 6)
+    reached = failure.value.trajectory.t[-1]
+    assert reached != failure.value.step * 3.5
+    assert f" at t = {reached:.12g}: " in str(failure.value)
+
+
+def test_without_parameters_a_start_is_refused_for_its_monitor_alone():
+    solver = solver_of(compiled_text(BODY.replace("1/(1 + x1**2)", "x1").split("runs")[0]), "c")
+    with pytest.raises(StepError, match="no step can be made: where it starts the monitor is not positive"):
+        solver.integrate([-0.3, 1, 0.2], 0.1, 10)
+
+
 def test_a_step_that_fails_is_made_in_parts_only_where_that_is_asked(kepler):
     made = kepler[1]["c"]
     with pytest.raises(StepError):
@@ -224,11 +249,35 @@ def test_what_is_not_offered_is_an_error_of_the_spec(monitor, said):
         compile_spec(spec.loads(text))
 
 
+def test_the_hint_for_a_monitor_with_a_time_is_a_spec_that_is_right():
+    driven = KEPLER.replace("- 1/sqrt(q1**2 + q2**2)", "- 1/sqrt(q1**2 + q2**2) + q1*sin(t)/9").replace(
+        "invariants", "#"
+    )
+    with pytest.raises(
+        SpecError, match="make t and e coordinates too, a canonical pair; hamiltonian: g\\*\\(H \\+ e\\)"
+    ):
+        compile_spec(spec.loads(driven + "time: t\n"))
+    solver = solver_of(compiled_text(BY_HAND.replace("+ e)", "+ q1*sin(t)/9 + e)")), "c")
+    start = np.array([0.6, 0.0, 0.3, 0.0, 1.2, 0.0])
+    start[5] = -(1.2**2 / 2 - 1 / 0.6 + 0.6 * np.sin(0.3) / 9)
+    errors = []
+    for steps in (100, 200):
+        end = solver.integrate(start, 6 / steps, steps).x[-1]
+        exact = solve_ivp(
+            lambda t, x: [x[2], x[3], -x[0] / np.hypot(*x[:2]) ** 3 - np.sin(t) / 9, -x[1] / np.hypot(*x[:2]) ** 3],
+            (0.3, end[2]), start[[0, 1, 3, 4]], rtol=1e-12, atol=1e-12, method="DOP853",
+        ).y[:, -1]  # fmt: skip
+        errors.append(np.linalg.norm(end[[0, 1, 3, 4]] - exact))
+    assert errors[1] < errors[0] / 12
+
+
 def test_positivity_is_proved_by_form_and_refuted_at_a_start():
     proved = examine(spec.loads(KEPLER)).groups[statements.MONITOR][0]
     assert proved.verdict == "proved"
     wrong = spec.loads(KEPLER.replace("monitor: (q1**2 + q2**2)**(3/4)", "monitor: q1 - 1"))
     assert examine(wrong).refuted[0].name == "g > 0"
+    inverse = spec.loads(KEPLER.replace("monitor: (q1**2 + q2**2)**(3/4)", "monitor: 1/(q1**2 + q2**2)"))
+    assert examine(inverse).groups[statements.MONITOR][0].detail == "by its form"
     with pytest.raises(CheckError, match="7:10: error: g > 0"):
         compile_proved(wrong)
 

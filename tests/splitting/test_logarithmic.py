@@ -95,6 +95,15 @@ def test_where_minus_b_is_not_positive_nothing_starts_and_a_step_fails(target):
         made.integrate([0.1, 3.0], 0.05, 100)
 
 
+def test_without_runs_the_form_of_a_part_shows_that_it_is_negative():
+    alone = KEPLER[: KEPLER.index("runs:")]
+    ends = [solver_of(compiled_text(text), "numpy").integrate(START, 0.05, 9).x for text in (alone, KEPLER)]
+    np.testing.assert_array_equal(*ends)
+    assert compiled_text(alone.replace("- 1/sqrt(q1**2 + q2**2)", "- q1**4"))
+    with pytest.raises(SpecError, match="a part that is negative"):
+        compiled_text(alone.replace("- 1/sqrt", "- mu/sqrt").replace("scheme:", "parameters: {mu: 1}\nscheme:"))
+
+
 @pytest.mark.parametrize(
     ("change", "said"),
     [
