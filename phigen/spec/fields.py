@@ -211,6 +211,8 @@ _BESIDE_RUNS = {
     for key in ("order", "monitor", "scheme", "damping", "forces", "noise", "coordinates", "hamiltonian", "tangent")
 } | {
     "tolerance": "solver: {tolerance: …} belongs beside runs, to the whole spec",
+    "reconstruct": "reconstruct: belongs beside runs; an attitude starts at the identity, in Python at attitude0=",
+    "retry": "solver.integrate(…, retry=n) in Python makes steps that fail in parts",
     "time": "start is the time at the start of a run, until that at its end",
 }
 
@@ -286,6 +288,7 @@ def _switch(key: str, *words: str) -> Kind:
 #: Keys of runs that are looked for beside them.
 _IN_RUNS = {f.key: f"{f.key}: belongs to a run, runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
 _IN_RUNS["step"] += "; monitor: adapts steps to the motion"
+_IN_RUNS["precision"] = "order: is that of the error; real: float is single precision"
 _IN_RUNS["tolerance"] = "solver: {tolerance: …}; steps have one size, and their error is that of order and step"
 
 SPEC = Record(

@@ -351,7 +351,7 @@ class Record(Kind):
     def _hint(self, name: str, node: MappingNode) -> str:
         """What is meant by the name of a key that is none."""
         meant, known = MEANT.get(name, name), [f.key for f in self.fields]
-        misplaced = "" if meant in known else self.elsewhere.get(name) or self.elsewhere.get(meant, "")
+        misplaced = self.elsewhere.get(name) or ("" if meant in known else self.elsewhere.get(meant, ""))
         found = self._meant(name, node)
         return misplaced or (f"did you mean {found!r}?" if found else "") or self.instructions()
 

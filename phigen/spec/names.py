@@ -24,19 +24,22 @@ ARGUMENT_HINT = "it is the name of an argument of the generated functions"
 #: What other programs call it, and users type here.
 MEANT = {
     "friction": "damping", "dissipation": "damping", "drag": "damping", "force": "forces", "torque": "forces",
-    "forcing": "forces", "drive": "forces", "energy": "hamiltonian", "H": "hamiltonian", "pi": "poisson",
+    "forcing": "forces", "drive": "forces", "driving": "forces", "control": "forces",
+    "energy": "hamiltonian", "H": "hamiltonian", "pi": "poisson",
     "variables": "coordinates", "state": "coordinates", "constants": "parameters", "t": "time", "times": "time",
-    "dt": "step", "h": "step", "x0": "initial", "t_end": "until",
-    "end": "until", "adaptive": "monitor", "event": "stop", "events": "stop",
+    "dt": "step", "h": "step", "x0": "initial", "t0": "start", "t_start": "start", "t_end": "until",
+    "end": "until", "to": "until", "adaptive": "monitor", "event": "stop", "events": "stop",
     "t_eval": "every", "saveat": "every", "tol": "tolerance",
     "algebra": "lie_algebra",
-    "conserved": "invariants", "temperature": "noise", "thermal": "noise", "langevin": "noise", "diffusion": "noise",
+    "conserved": "invariants", "temperature": "noise", "thermal": "noise", "thermostat": "noise",
+    "langevin": "noise", "diffusion": "noise",
     "stochastic": "noise", "noises": "noise", "sigma": "amplitude", "g": "hamiltonian", "random_seed": "seed",
     "realisations": "members", "paths": "members", "samples": "members",
     "attitude": "reconstruct", "attitudes": "reconstruct", "orientation": "reconstruct", "pose": "reconstruct",
     "quaternion": "reconstruct", "rotation": "reconstruct",
     "default": "value", "shape": "sizes",
-    "precision": "order", "method": "scheme", "integrator": "scheme",
+    "precision": "order", "float": "real", "accuracy": "order", "rtol": "tolerance", "atol": "tolerance",
+    "method": "scheme", "integrator": "scheme",
 }  # fmt: skip
 
 _LICENSES = """0BSD AFL-3.0 AGPL-3.0-only AGPL-3.0-or-later Apache-2.0 Artistic-2.0 BSD-1-Clause BSD-2-Clause
