@@ -15,11 +15,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import reduce
 from math import isqrt
 
 from phigen.splitting.closure import LinearMotion
 from phigen.splitting.ring import TIME, Ring
-from phigen.symbolic.expression import Expression, call, number, sqrt, symbol
+from phigen.symbolic.expression import Expression, call, number, sqrt, symbol, topological, total
 from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
@@ -116,27 +117,47 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
         units = [[v / root.scale**k for v in listed] for k, listed in ((a, directed), (a + 1, further))]
         first = [ring.expression(v) for v in images[0]]
         return _circular(first, units, angle, a) if root.positive else _hyperbolic(first, units, angle, a)
-    return _without_quotients(ring, images, -c, a)
+    return _without_quotients(ring, powers[0], images, -c, a)
 
 
-def _without_quotients(ring: Ring, images: Sequence[Sequence[Poly]], c: Poly, a: int) -> Solution | None:
+def _without_quotients(
+    ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
+) -> Solution | None:
     """The same by functions of s = ct²: sin and 1 − cos of the angle √s by those of its half.
 
     With a = 2 only where c is static, since the derivative of arcroot is not available at 0.
     """
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
-    first, second = ([ring.expression(v) for v in images[k]] for k in (0, 1))
-    speed = t * call("sinroot", s / 4)
     if a == 1:
-        cosine = call("cosroot", s / 4)
-        increments = tuple(speed * (cosine * u + _HALF * speed * v) for u, v in zip(first, second, strict=True))
-        return Solution(increments, "turned")
+        return _turned(ring, matrix, images, s)
+    first, second, third = ([ring.expression(v) for v in image] for image in images[:3])
+    speed = t * call("sinroot", s / 4)
     if ring.support(c):
         return None
     versine, rest = _HALF * speed**2, t**3 * call("arcroot", s)
-    third = [ring.expression(v) for v in images[2]]
     increments = tuple(t * u + (versine * v + rest * w) for u, v, w in zip(first, second, third, strict=True))
     return Solution(increments, "turned and shifted")
+
+
+def _turned(ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], s: Expression) -> Solution:
+    """That for a = 1, with A = fM: the static factor f of all entries joins the time.
+
+    M²w is what M makes of Mw where that takes fewer operations than its entries do, as cross products."""
+    factor = _static_factor(ring, matrix)
+    once = [ring.expression(v / factor) for v in images[0]]
+    twice = [ring.expression(v / factor**2) for v in images[1]]
+    rows = [[ring.expression(e / factor) for e in row] for row in matrix]
+    again = [total(e * v for e, v in zip(row, once, strict=True)) for row in rows]
+    twice = min(twice, again, key=lambda found: len(list(topological(found))))
+    speed = symbol(TIME) * ring.expression(factor) * call("sinroot", s / 4)
+    sine, versine = speed * call("cosroot", s / 4), _HALF * speed**2
+    return Solution(tuple(sine * u + versine * v for u, v in zip(once, twice, strict=True)), "turned")
+
+
+def _static_factor(ring: Ring, a: Matrix) -> Poly:
+    """The common factor of all entries of a matrix, if it does not depend on the state; else 1."""
+    factor = reduce(lambda x, y: x.gcd(y), [e for row in a for e in row if e != 0])
+    return ring.tower.constant(1) if ring.support(factor) else factor
 
 
 def _circular(

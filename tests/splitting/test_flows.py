@@ -6,6 +6,7 @@ import pytest
 from support import compile_text
 
 from phigen.errors import SpecError
+from phigen.scheme.lowering import operation_counts
 from phigen.splitting.statements import check
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED
 
@@ -168,3 +169,12 @@ def test_what_has_no_elementary_flow_is_refused_by_name_and_place(text, named):
     assert named in diagnostic.message
     assert "elementary flow" in diagnostic.message
     assert (diagnostic.location.line, diagnostic.hint != "") == (5, True)
+
+
+def test_two_spins_turn_by_two_cross_products():
+    """With their sum, the second takes what the first has found; a factor of all brackets is a factor of the time."""
+    text = SYSTEMS["two spins"][0].replace("a*u + b*v + c*w", "J*(a*u + b*v + c*w)")
+    flow = compile_text(f"parameters: {{J: 1.3}}\n{text}\norder: 2\n", scheme="splitting").program.step.flows[0]
+    counts = operation_counts(flow.roots)
+    assert counts["functions"] == 2
+    assert counts["multiplications"] <= 29
