@@ -21,6 +21,7 @@ from phigen.lanes.functions import (
     operations,
     with_formulas,
 )
+from phigen.lanes.undoing import undoing
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
@@ -83,7 +84,7 @@ class Packs:
 
     ``kernels`` are those of a step, or of the flows of a splitting. ``near`` are the functions that are polynomials
     near 0: where these do not reach, there is a longer way. ``back`` are the transposes of the kernels, if members are
-    pulled back in packs too, so many ``abreast``.
+    pulled back in packs too, so many ``abreast``; where flows are ``undone``, these find the states before them.
     """
 
     kernels: tuple[Kernel, ...]
@@ -91,6 +92,7 @@ class Packs:
     near: tuple[str, ...]
     back: tuple[Kernel, ...] = ()
     abreast: int = 0
+    undone: bool = False
 
 
 @dataclass(frozen=True)
@@ -145,12 +147,16 @@ def _of_steps(program: Program) -> Blocks | Packs | None:
         case Path() as step if step.lanes and (program.offers("recurrences") or not step.adjoint):
             return _paths(program, step, step.lanes)
         case Explicit() as step:
-            return _with_back(_packs(program, (step.increment,), ()), step, 0)
+            back = step.adjoint.steps if step.adjoint else ()
+            return _with_back(_packs(program, (step.increment,), ()), back, 0)
         case Splitting() as step:
             used = operations(step.flows)
             packs = _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
             kept = 2 * _DOUBLE * LANES**2 * program.dimension  # bytes of a segment of one pack
-            return _with_back(packs, step, kept)
+            undone = undoing(program, step)
+            if undone:
+                return _with_back(packs and replace(packs, undone=True), undone, 0)
+            return _with_back(packs, step.adjoint.steps if step.adjoint else (), kept)
     return None
 
 
@@ -262,15 +268,14 @@ def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -
     return Packs(tuple(kernels), with_formulas(ops), near)
 
 
-def _with_back(packs: Packs | None, step: Explicit | Splitting, kept: int) -> Packs | None:
+def _with_back(packs: Packs | None, back: Sequence[Kernel], kept: int) -> Packs | None:
     """Packs that members are pulled back in, if the transposes of the kernels can be computed in lanes too: as many as
     may keep so many bytes on the stack, which grow with the square of their number."""
-    back = step.adjoint.steps if step.adjoint else ()
     ops = operations(back)
     abreast = next((k for k in (PACKS, 2, 1) if 2 * k**2 * kept <= MOST_STACK), 0)
     if packs is None or not abreast or library_calls(ops) or library_powers(back):
         return packs
-    return replace(packs, calls=packs.calls | with_formulas(ops), back=back, abreast=abreast)
+    return replace(packs, calls=packs.calls | with_formulas(ops), back=tuple(back), abreast=abreast)
 
 
 def _block(program: Program, more: int = 0, once: int = 0) -> int:

@@ -289,6 +289,8 @@ def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypat
 FAR = {
     "splitting": (40, 1, True),
     "kicks": (1, 1, True),  # all, after some steps
+    "splitting, saddle": (1, 12, False),  # flows are undone to another state
+    "splitting, damped": (1, 1, True),  # flows are not undone
     "explicit": (1e7, 1, False),
     "newton, gauge": (1, 35, False),
     "path": (1, 15, False),
@@ -300,6 +302,8 @@ FAR = {
 FURTHER = {
     "splitting": f"{TOP}order: 4\n",
     "kicks": f"{SWING}order: 6\n",
+    "splitting, saddle": SWING.replace("g*cos(q)", "g*q**2/50") + "order: 4\n",
+    "splitting, damped": f"{TOP}order: 2\nforces: {{vector: {{x1: -c*x1/9, x3: -I1*x3/7}}}}\n",
     "explicit": f"{SWING}birealisation: {{kind: canonical-euler, side: q}}\norder: 1\n",
 }
 
@@ -308,10 +312,12 @@ FURTHER = {
 def test_members_are_pulled_back_in_lanes(kind, monkeypatch):
     """As each is alone: with rows, and numbers of its own, splittings in segments; one that lanes cannot do to the last
     bit, since it is done by itself. The last group is not full. Long runs are those of segments."""
-    text, scheme = FURTHER.get(kind), "splitting" if kind in ("splitting", "kicks") else None
+    text, scheme = FURTHER.get(kind), "splitting" if kind.startswith(("splitting", "kicks")) else None
     head = "phigen: 1\nname: t\nadjoint: true\n"
     compiled = compile_spec(spec.loads(head + text), scheme=scheme) if text else compilation(kind)
-    assert "t_pull_group(" in files(compiled, "c")["t.c"]
+    code = files(compiled, "c")["t.c"]
+    assert "t_pull_group(" in code
+    assert ("t_pull_arrive(" in code) == (bool(scheme) and "damped" not in kind)
     monkeypatch.setattr(runs, "_REPAID", 1)
     made, rng, count, far = solver(compiled, "c"), np.random.default_rng(3), 43, 5
     first = np.array([0.4, 0.9, 0.3][: compiled.program.dimension])

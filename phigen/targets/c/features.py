@@ -45,6 +45,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("GROUPS", lambda p: not p.time and grouped(p, lanes), ("BLOCKS", "ENSEMBLE"))
     together = "PACKS" if packs else "GROUPS"
     yield Feature("ABREAST", lambda p: packs.back if packs else True, (together, "ADJOINT", "EACH"))
+    yield Feature("UNDONE", lambda p: packs and packs.undone, ("ABREAST",))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
     full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not kept as factors
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))

@@ -94,6 +94,8 @@ def adjoint_in_lanes(
         found.append(function(program, kernel, lanes=True, functions=near))
         if reaches_far(kernel):
             found.append(function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far))
+    own["more"] = ", before" * any(len(kernel.outputs) > 2 for kernel in kernels)
+    own["undone"] = any(len(kernel.outputs) > 2 for kernel in kernels)
     own["linear"] = not any(_read(kernel) for kernel in kernels)
     return [*found, render("c", "adjoint_flows_lanes.c", own)]
 
@@ -114,7 +116,8 @@ def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tu
         kernels.append(replace(kernel, outputs=tuple(outputs)))
         label = f"case {k}" if k < len(back) else "default"
         far = reaches_far(step.flows[k - 1]), reaches_far(kernels[-1])
-        parts.append((label, k, *far, *(list(enumerate(i_s)) for i_s in reached), _read(kernels[-1])))
+        state, row, before = (list(enumerate(i_s)) for i_s in (*reached, [])[:3])
+        parts.append((label, k, *far, state, row, _read(kernels[-1]), before))
     return kernels, {"NAME": program.name, "n": program.dimension, "row": max(1, step.row), "parts": parts}
 
 

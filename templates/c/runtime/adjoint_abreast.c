@@ -16,14 +16,24 @@
 #if PHI_SPLITTING
 enum {
     PHI_BACK_GROUP = PHI_BACK_PACKS * PHI_LANES,
+#if PHI_UNDONE
+    PHI_SEGMENT = 16 + (2 * PHI_BACK_GROUP + PHI_FLOWS - 1) / PHI_FLOWS /* steps; so the trail of one member suffices for all */
+#else
     PHI_SEGMENT = (2 * PHI_BACK_GROUP + PHI_FLOWS - 1) / PHI_FLOWS /* steps; so the trail of one member suffices for all */
+#endif
 };
 
+#if PHI_UNDONE
+/* What is pulled back, as in phi_cotangent; the packs at their starts. */
+#else
 /* What is pulled back, as in phi_cotangent; the packs at their starts, and the states before the flows of a segment. */
+#endif
 typedef struct {
     phi_lanes x[PHI_BACK_PACKS][PHI_DIM], coef[PHI_BACK_PACKS][PHI_COEFFICIENTS];
     phi_pack start[PHI_BACK_PACKS];
+#if !PHI_UNDONE
     phi_lanes kept[PHI_SEGMENT][PHI_FLOWS][PHI_BACK_PACKS][PHI_DIM];
+#endif
 } phi_back_group;
 #else
 enum { PHI_BACK_GROUP = (int)PHI_BACK_PACKS * PHI_LANES };

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from phigen.lattice.collecting import AROUND
-from phigen.lattice.undoing import UNDONE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
+from phigen.scheme.reversal import UNDONE
 from phigen.symbolic.symbols import COEFFICIENT, Symbol
 from phigen.targets.c.lattice.layout import Layout, givers
 from phigen.targets.c.lattice.loops import Loop

@@ -1,0 +1,70 @@
+"""Flows of members are undone on the way back, with the functions that their transposes read."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import compile_text
+
+from phigen import spec
+from phigen.compiler import compile_spec
+from phigen.lanes.undoing import undoing
+from phigen.spec.model import Extras
+from phigen.symbolic.expression import ZERO, topological
+from phigen.symbolic.functions import FUNCTIONS
+from phigen.symbolic.numeric import evaluate
+from phigen.symbolic.symbols import coefficient
+
+SPECS = Path(__file__).parents[2] / "specs"
+TOP = """coordinates: [x1, x2, x3]
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: x1**2/2 + x2**2/4
+scheme: splitting
+order: 2
+adjoint: true
+"""
+
+
+@cache
+def made(name):
+    return compile_spec(spec.load(SPECS / f"{name}.yaml"), scheme="splitting", extras=Extras(adjoint=True)).program
+
+
+@pytest.mark.parametrize("name", ["spin_chain5", "lagrange_top", "kepler", "lotka_volterra"])
+def test_transposes_at_the_end_of_a_flow_are_those_at_its_start_which_they_find(name):
+    """The coefficients are those of some time; cotangents are any."""
+    program, rng = made(name), np.random.default_rng(5)
+    step, n = program.step, program.dimension
+    found = undoing(program, step)
+    values = {**{p.name: p.value for p in program.parameters}, **dict.fromkeys(step.prepare.inputs["h"], 0.3)}
+    values |= dict.fromkeys(step.prepare.inputs.get("kick", ()), 0.01)
+    coef = {coefficient(k): value for k, value in enumerate(evaluate(step.prepare.roots, values))}
+    for flow, back, undone in zip(step.flows, step.adjoint.steps, found, strict=True):
+        start = 0.5 + 0.4 * rng.random(n)
+        before = dict(zip(program.coordinates, start, strict=True))
+        end = start + evaluate(flow.roots, {**coef, **before})
+        bar = dict(zip(back.inputs["increment_bar"], rng.normal(size=n), strict=True))
+        expected = evaluate(back.roots, {**coef, **bar, **before})
+        values = evaluate(undone.roots, {**coef, **bar, **dict(zip(program.coordinates, end, strict=True))})
+        moved = np.array([e is not ZERO for e in undone.outputs[2].values])
+        assert values[: len(expected)] == pytest.approx(expected, rel=1e-13, abs=1e-14)
+        assert np.array(values[len(expected) :])[moved] == pytest.approx(start[moved], rel=1e-14, abs=1e-14)
+        assert np.array_equal(end[~moved], start[~moved])
+
+
+@pytest.mark.parametrize("name", ["spin_chain5", "rigid_body", "pendulum"])
+def test_flows_are_undone_with_the_functions_that_their_transposes_call(name):
+    def calls(kernel):
+        return {e for e in topological(kernel.roots) if e.op in FUNCTIONS}
+
+    step = made(name).step
+    for flow, back, undone in zip(step.flows, step.adjoint.steps, undoing(made(name), step), strict=True):
+        assert calls(undone) <= calls(flow) | calls(back)
+
+
+def test_flows_that_damp_are_not_undone():
+    program = compile_text(TOP).program
+    assert len(undoing(program, program.step)) == 2
+    program = compile_text(f"{TOP}damping: 1/9\n").program
+    assert undoing(program, program.step) == ()
