@@ -18,6 +18,10 @@ from phigen.runtime.timed import EQUAL, reached, steps_until
 Finish = Callable[[Session], tuple[Session, float]]
 
 
+#: Steps within which a zero is that of the start: where a run was stopped, rounding has one beside it.
+START = 1e-9
+
+
 @dataclass(frozen=True)
 class End:
     """An end after so many whole ``steps``, and a ``part`` of one, which ``finish`` makes.
@@ -65,7 +69,7 @@ def where_zero(session: Session, h: float, most: int, g: Function, t0: float, *,
     try:
         for _ in finder.follow(session, most, lambda: session.advance(h, 1)):
             for at, there in finder.places:
-                if at > 0:
+                if at > START:
                     own = there.time()
                     span, steps = at * h if math.isnan(own) else own, int(np.floor(at))
                     return End(steps, _given((there, at)), span, at > steps, stopped=True)

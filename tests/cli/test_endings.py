@@ -133,6 +133,21 @@ def test_an_extension_holds_the_e_of_the_start(phigen, write):
     assert table("b.csv") == pytest.approx(table("a.csv"), abs=1e-13)
 
 
+@pytest.mark.parametrize("how", ["--extend", "--from"])
+@pytest.mark.parametrize("level", ["0.46", "0.1", "0.02", "0.5"])  # the first three with a rounding before the zero
+def test_a_run_that_goes_on_from_a_stop_ends_at_the_next_one(phigen, write, how, level):
+    spec = write("spec.yaml", SWING.replace("stop: q - 1/2, every: 0.3", f"stop: q - {level}"))
+    ran(phigen, spec, "--run", "stopped", "-o", "a.csv")
+    first = table("a.csv")[-1, 0]
+    assert first == pytest.approx(np.arccos(float(level)), abs=1e-11)
+    if how == "--from":
+        ran(phigen, spec, "--run", "stopped", "--from", "a.csv", "-o", "b.csv")
+        assert first + table("b.csv")[-1, 0] == pytest.approx(2 * np.pi - first, abs=1e-9)
+    else:
+        ran(phigen, spec, "--run", "stopped", "--extend", "-o", "a.csv")
+        assert table("a.csv")[-1, 0] == pytest.approx(2 * np.pi - first, abs=1e-9)
+
+
 def test_a_run_starts_where_another_ended(phigen, write):
     spec = write("spec.yaml", TURNING)
     ran(phigen, spec, "--until", 2, "-o", "a.npz")
