@@ -112,7 +112,9 @@ def prepared(
     """The run of that name, the first by default, with changes of the command line; not of a lattice."""
     expect_system(spec)
     run = run_of(spec, name)
-    run = with_steps(run, step, steps)
+    if until is not None:
+        run = replace(run, duration=None)
+    run = with_steps(spec, run, step, steps)
     if until is not None:
         if not math.isfinite(until) or (until - run.start) / run.step <= 0:
             raise click.BadParameter(
@@ -127,13 +129,20 @@ def prepared(
     return Experiment(run, tuple(initial.values()), parameters)
 
 
-def with_steps(run: Run, step: float | None, steps: int | None) -> Run:
+def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> Run:
     """The run with the step and the number of steps that the command line says."""
-    if step is not None:
-        if step == 0 or not math.isfinite(step):
-            raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
-        run = replace(run, step=Fraction(step))
-    return run if steps is None else replace(run, steps=steps, stride=min(run.stride, steps), until=None)
+    from phigen.spec.runs import with_step
+
+    if steps is not None:
+        run = replace(run, steps=steps, stride=min(run.stride, steps), duration=None, until=None)
+    if step is None:
+        return run
+    if step == 0 or not math.isfinite(step):
+        raise click.BadParameter("the step must be a finite number, and not 0", param_hint="--step")
+    try:
+        return with_step(run, Fraction(step), parts=spec.monitor is None and spec.lattice is None)
+    except ValueError as error:
+        raise click.BadParameter(f"{error}; --steps N makes so many", param_hint="--step") from None
 
 
 def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:

@@ -42,7 +42,7 @@ _TABLES = (".csv", ".npz")
 @target_option
 @order_option
 @scheme_option
-@click.option("--step", metavar="H", type=float, help="Step size, instead of the run's.")
+@click.option("--step", metavar="H", type=float, help="Step size, instead of the run's; a duration stays.")
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
 @sizes_option
 @click.option("--until", metavar="T", type=float, help="The time where the run ends, by a part of a step if need be.")
@@ -118,7 +118,7 @@ def command(
     if spec.lattice:
         expect_no(section=section, until=until, every=every, at=at, extend=extend)
         expect_no(**{"from": source})
-        chosen = with_seed(spec, with_steps(run_of(spec, name), step, steps), seed)
+        chosen = with_seed(spec, with_steps(spec, run_of(spec, name), step, steps), seed)
         given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
         run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json, lyapunov=lyapunov)
         return

@@ -199,6 +199,7 @@ class Run:
     compare: tuple[str, ...] = ()
     section: Expression | None = None
     direction: str = "rising"  # in which the section is crossed
+    duration: Fraction | None = None  # what says how many steps there are, if that is a time
     until: Fraction | None = None  # the physical time where it ends, by a part of a step
     every: Fraction | None = None  # of physical time between rows that are stored, in place of the stride
     stop: Expression | None = None  # it ends where this passes through 0

@@ -39,7 +39,8 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
     start = _start(name, raw.get("start"), declared)
     until = declared.number(raw.get("until"), numbers)
     steps = _steps_until(name, raw, until - start, step, declared) if until is not None else None
-    steps = steps if until is not None else _steps(name, raw, step, declared)
+    duration = declared.number(raw.get("duration"), numbers)
+    steps = steps if until is not None else _steps(name, raw, duration, step, declared)
     every = declared.number(raw.get("every"), numbers)
     if every is not None and (every <= 0 or "stride" in raw):
         _fail(name, "every", "every must be positive, and there is no stride beside it", declared)
@@ -65,6 +66,7 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
         section=declared.formula(section, declared.dated_scope()),
         direction=raw.get("direction") or "rising",
+        duration=duration,
         until=until,
         every=every,
         stop=declared.formula(raw.get("stop"), declared.dated_scope()),
@@ -83,10 +85,11 @@ def _start(name: str, given: Scalar | None, declared: Declarations) -> Fraction:
     return declared.number(given, declared.numbers()) or Fraction(0)
 
 
-def _steps(name: str, raw: Mapping[str, Any], step: Fraction | None, declared: Declarations) -> int | None:
+def _steps(
+    name: str, raw: Mapping[str, Any], duration: Fraction | None, step: Fraction | None, declared: Declarations
+) -> int | None:
     if "duration" not in raw:
         return raw.get("steps")
-    duration = declared.number(raw["duration"], declared.numbers())
     if duration is None or step is None:
         return None
     ratio, written = (
@@ -94,7 +97,7 @@ def _steps(name: str, raw: Mapping[str, Any], step: Fraction | None, declared: D
         f"{raw['duration'].text} is {float(duration / step):.9g} steps of {raw['step'].text}",
     )
     steps = round(ratio)
-    if abs(ratio - steps) > NEAR_INTEGER * abs(ratio):
+    if whole(ratio) is None:
         _fail(name, "duration", f"the duration {written}, not a whole number", declared, f"steps: {max(1, steps)}")
     elif steps < 1:
         hint = "a step backwards in time needs a negative duration" if step < 0 else "the duration must be positive"
@@ -122,8 +125,32 @@ def _steps_until(
         message = f"until: {float(ratio):.9g} steps, more than the limit of {limits.STEPS}"
         declared.reader.problems.add(message, location, limit=True)
     else:
-        return max(1, int(ratio))
+        return max(1, whole(ratio) or int(ratio))
     return None
+
+
+def whole(ratio: Fraction) -> int | None:
+    """How many steps a ratio of times is, but for the rounding of decimals; None if it is no whole number."""
+    steps = round(ratio)
+    return steps if abs(ratio - steps) <= NEAR_INTEGER * abs(ratio) else None
+
+
+def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
+    """The run with another step, as long as before where that is said as a time; it may go back instead.
+
+    A duration that it does not divide ends with a part of a step if there may be ``parts``; else `ValueError`.
+    """
+    if run.until is not None:
+        ratio = (run.until - run.start) / step
+        return replace(run, step=step, steps=max(1, whole(ratio) or int(ratio)))
+    if run.duration is None:
+        return replace(run, step=step)
+    span = abs(run.duration) * (1 if step > 0 else -1)
+    if (steps := whole(span / step)) is not None:
+        return replace(run, step=step, steps=steps, stride=min(run.stride, steps))
+    if not parts:
+        raise ValueError(f"the duration {float(span):.9g} is {float(span / step):.9g} steps of {float(step):.9g}")
+    return replace(run, step=step, steps=max(1, int(span / step)), until=run.start + span)
 
 
 def _initial(name: str, given: Any, declared: Declarations) -> tuple[Fraction, ...]:

@@ -11,7 +11,7 @@ from phigen.spec.declarations import Declarations
 from phigen.spec.model import Axis, Run, Sweep
 from phigen.spec.names import SWEEP_NAMES
 from phigen.spec.problems import did_you_mean, shown
-from phigen.spec.runs import without_repetition
+from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
 #: What ``over`` may hold besides ranges, each a word or a number.
@@ -58,7 +58,7 @@ def end_of_its_own(found: Sweep, run: Run, *, monitored: bool) -> str:
     if run.stop is not None:
         return f"{said} where its stop: is met"
     moved = {"step", "start"} & {axis.name for axis in found.over}
-    if run.until is not None and (monitored or moved or (run.until - run.start) % run.step):
+    if run.until is not None and (monitored or moved or whole((run.until - run.start) / run.step) is None):
         return f"{said} at the time {float(run.until):.9g}"
     return ""
 

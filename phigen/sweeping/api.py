@@ -19,6 +19,7 @@ from phigen.api import _spec_of
 from phigen.geometry.system import System
 from phigen.spec.model import Axis, Run, Spec, Sweep
 from phigen.spec.names import KEPT, SWEEP_NAMES
+from phigen.spec.runs import with_step
 from phigen.spec.sweeps import end_of_its_own
 
 if TYPE_CHECKING:
@@ -106,11 +107,11 @@ def _run_of(
         raise TypeError("the spec has no runs: initial, h and steps are needed")
     found = found or Run("run", (), Fraction(1), 1)
     given: dict[str, Any] = {} if initial is None else {"initial": tuple(Fraction(float(v)) for v in initial)}
-    given |= {} if h is None else {"step": Fraction(float(h))}
-    given |= {} if steps is None else {"steps": steps, "until": None}
+    given |= {} if steps is None else {"steps": steps, "duration": None, "until": None}
     if parameters:
         given["parameters"] = {**found.parameters, **{n: Fraction(float(v)) for n, v in parameters.items()}}
     found = replace(found, **given)
+    found = found if h is None else with_step(found, Fraction(float(h)))
     if len(found.initial) != len(spec.coordinates) and not spec.lattice:
         raise ValueError(f"initial has {len(found.initial)} values for {len(spec.coordinates)} coordinates")
     return found

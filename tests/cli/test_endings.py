@@ -270,6 +270,24 @@ def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, s
     assert Path("a.csv").read_bytes() == Path("b.csv").read_bytes()
 
 
+def test_a_duration_stays_with_another_step_and_steps_do_too(phigen, write):
+    """By a part of a step where it does not divide the duration; with a monitor that is in τ, and cannot be."""
+    spec = write("spec.yaml", SWING.replace("steps: 60}", "duration: 6, stride: 30}"))
+    given = ((0.05, 120, 6), (0.07, 85, 6), (-0.1, 60, -6), (3, 2, 6))
+    for step, steps, end in given:
+        told = json.loads(ran(phigen, spec, "--step", step, "--json").stdout)
+        assert (told["steps"], told["time"]) == (steps, pytest.approx(end, rel=1e-14))
+    told = json.loads(ran(phigen, spec, "--step", 0.07, "--steps", 9, "--json").stdout)
+    assert (told["steps"], told["time"]) == (9, pytest.approx(0.63))
+    plain = write("plain.yaml", SWING)
+    assert json.loads(ran(phigen, plain, "--step", 0.07, "--json").stdout)["steps"] == 60
+    body = write("body.yaml", BODY.replace("until: 5", "duration: 5"))
+    assert json.loads(ran(phigen, body, "--step", 0.1, "--json").stdout)["steps"] == 50
+    assert json.loads(ran(phigen, body, "--step", 0.07, "--until", 1, "--json").stdout)["time"] == pytest.approx(1)
+    refused = phigen("run", body, "--step", 0.07)
+    assert (refused.exit_code, "the duration 5 is 71.4285714 steps of 0.07" in refused.stderr) == (2, True)
+
+
 @pytest.mark.parametrize(("name", "steps"), [("until", 60), ("stopped", 10), ("back", 31), ("never", 20)])
 def test_verify_makes_the_whole_steps_of_the_run(phigen, swing, name, steps):
     (told,) = json.loads(phigen("verify", swing, "--run", name, "--quick", "--json", "-q").stdout)

@@ -16,8 +16,10 @@ import phigen
 from phigen import spec as specs
 from phigen.api import compilation_of
 from phigen.errors import FileError, SpecError
-from phigen.spec.model import Axis
+from phigen.spec.model import Axis, Sweep
+from phigen.spec.sweeps import end_of_its_own
 from phigen.study.lyapunov import spectrum
+from phigen.sweeping import api
 from phigen.sweeping.plan import Plan, chunk_of, values_of
 
 xarray = pytest.importorskip("xarray")
@@ -275,6 +277,19 @@ def test_a_scheduler_that_goes_away_is_told(spec, tmp_path, small_chunks, monkey
             phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler=own.scheduler_address, progress=leave)
     with pytest.raises(clusters.SweepError, match="no scheduler answers"):
         phigen.sweep(spec, over=OVER, output=tmp_path / "s.zarr", scheduler="tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize(("end", "steps"), [("duration: 6", 120), ("until: 6", 120), ("steps: 60", 60)])
+def test_another_step_leaves_a_run_as_long_as_it_is_in_time(end, steps):
+    run = api._run_of(specs.loads(BODY.replace("steps: 60", end)), None, None, None, 0.05, None, None)
+    assert run.steps == steps
+    assert end_of_its_own(Sweep("s", run.name), run, monitored=False) == ""
+
+
+def test_a_step_that_does_not_divide_a_duration_is_refused(spec):
+    spec = specs.loads(BODY.replace("steps: 60", "duration: 6"))
+    with pytest.raises(ValueError, match=r"the duration 6 is 85\.7142857 steps of 0\.07"):
+        phigen.sweep(spec, over={"I2": [1, 2]}, h=0.07)
 
 
 def test_a_system_without_a_time_has_no_start_to_vary(spec, tmp_path):
