@@ -118,80 +118,19 @@ def _declared(parameter: Parameter, member: str) -> tuple[str, str]:
 
 def model(program: Program, step: Sweeps) -> str:
     """Tables, and what is computed before the steps."""
-    member, layout, schedule, sites = members(program), layout_of(program, step), step.schedule, step.sites
-    flows, several = schedule.flows, len(sites.axes) > 1
-    joined = schedule.times[flows[0][1]] + schedule.times[flows[-1][1]]
-    multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
+    layout = layout_of(program, step)
     has = switches(program, step, layout)
-    constants = [
-        *[("HALO", layout.halo, "sites that are copied beside a row")] * has["HALO"],
-        *[("LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row")] * has["HALO"],
-        ("RESERVED", _reserved(program, layout, has), "arrays over the sites in the memory of a solver"),
-        *[("LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it")] * several,
-        ("ROW", max(1, step.row), "coefficients of one flow"),
-        ("ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"),
-    ]
-    constants += [("PREPARED", step.prepared, "of a row, before those that depend on the time")] * bool(step.refresh)
-    if program.noise:
-        drawn = program.dimension + len(sites.parameters)
-        constants += [
-            ("SOURCES", len(program.noise.sources), f"of noise at a site: {', '.join(program.noise.sources)}")
-        ]
-        constants += [("DRAWN", drawn, "the first of the arrays of increments")]
-        constants += [("PARTS", program.noise.parts, "increments of one source in a step, each of a part of it")]
-    if step.equation:
-        constants += [
-            ("SIDES", 2 if layout.slopes else 3, "y before and after a sweep" + ", and varied" * (not layout.slopes))
-        ]
-        constants += [("MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take")]
-        if has["BANDED"]:
-            constants += [("REACH", layout.reach, "sites that y at a site depends on, to each side")]
-            constants += [("BAND", layout.band, "diagonals beside that of the matrix of Newton's method")]
-    else:
-        constants += [("FLOWS", len(flows), "in a step")]
-    if has["WAVES"]:
-        far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
-        span = 1 if len(sites.axes) == 1 else max(1, *far)
-        constants += [("SPAN", span, "slices beside one that a flow reads: pieces of a row, or of the first axis")]
-    constants += [("WEIGHTS", len(layout.weights), "kinds of terms that open ends take away")] * (
-        bool(layout.weights) and several
-    )
-    if sites.colours > 1:
-        constants += [("COLOUR_COUNT", sites.colours, "colours of sites")]
-        constants += [("COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour")]
-    numbers = [p for p in program.parameters if p.at == "all"]
-    asked = [
-        f"isfinite(params->{member[p.name]})" + f" && params->{member[p.name]} > 0.0" * p.positive for p in numbers
-    ]
-    arrays = [(member[p.name], p.positive, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
     values = {
         "NAME": program.name,
         "defaults": ", ".join("NULL" if p.at != "all" else repr(float(p.value)) for p in program.parameters) or "0",
-        "constants": constants,
-        "least": ", ".join(map(str, sites.least)),
-        "periods": ", ".join(map(str, sites.periods)) if has["PERIODIC_COLOURS"] else "",
-        "several": several,
-        "ends": several or has["BANDED"],
-        "open": ", ".join(str(int(o)) for o in sites.open),
-        "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
-        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
-        "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and several else "",
-        "times": ", ".join(map(repr, schedule.times if step.equation else _by_flow(step, schedule.times, joined))),
-        "split": step.equation is None,
-        "multiples": ", ".join(map(repr, multiples)),
-        "moments": ", ".join(map(repr, _moments(step))) if step.refresh and not step.equation else "",
+        "constants": [*_constants(program, step, layout, has)],
+        **_tables_of_sites(program, step, layout, has),
+        **_tables_of_flows(step),
         "middles": ", ".join(map(repr, program.midpoints)),
         "fractions": len(program.fractions) > 1,
         "bound": repr(BOUND) if program.noise else "",
-        "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in _flows(step)),
         "joined": not program.noise,
-        "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
-        "part_count": len(step.by_colour),
-        "graph": layout.graph,
-        "allowed": [*_allowed(asked, arrays, graph=layout.graph)],
-        "stages": ", ".join(_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts)))
-        if has["BY_HAND"]
-        else "",
+        "allowed": [*_allowed(program, graph=layout.graph)],
     }
     timed = step.refresh or (program.time and step.equation)
     prepare = render("c", "middles.c", values) if timed else ""
@@ -202,13 +141,90 @@ def model(program: Program, step: Sweeps) -> str:
     )
 
 
+def _constants(
+    program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]
+) -> Iterator[tuple[str, int, str]]:
+    """Names, values, and what they are."""
+    sites, several = step.sites, len(step.sites.axes) > 1
+    if has["HALO"]:
+        yield "HALO", layout.halo, "sites that are copied beside a row"
+        yield "LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"
+    yield "RESERVED", _reserved(program, layout, has), "arrays over the sites in the memory of a solver"
+    if several:
+        yield "LINES", len(layout.lines), "rows that kernels read: the row itself and those beside it"
+    yield "ROW", max(1, step.row), "coefficients of one flow"
+    yield "ROWS_OF_FLOWS", rows_of(step), "rows of coefficients"
+    if step.refresh:
+        yield "PREPARED", step.prepared, "of a row, before those that depend on the time"
+    if program.noise:
+        sources = program.noise.sources
+        yield "SOURCES", len(sources), f"of noise at a site: {', '.join(sources)}"
+        yield "DRAWN", program.dimension + len(sites.parameters), "the first of the arrays of increments"
+        yield "PARTS", program.noise.parts, "increments of one source in a step, each of a part of it"
+    if step.equation:
+        yield "SIDES", 2 if layout.slopes else 3, "y before and after a sweep" + ", and varied" * (not layout.slopes)
+        yield "MOST_SWEEPS", step.equation.most_sweeps, "that a stage may take"
+        if has["BANDED"]:
+            yield "REACH", layout.reach, "sites that y at a site depends on, to each side"
+            yield "BAND", layout.band, "diagonals beside that of the matrix of Newton's method"
+    else:
+        yield "FLOWS", len(step.schedule.flows), "in a step"
+    if has["WAVES"]:
+        far = [max(step.stage(k, program.coordinates)[:2]) for k in range(len(step.parts))]
+        span = max(1, *far) if several else 1
+        yield "SPAN", span, "slices beside one that a flow reads: pieces of a row, or of the first axis"
+    if layout.weights and several:
+        yield "WEIGHTS", len(layout.weights), "kinds of terms that open ends take away"
+    if sites.colours > 1:
+        yield "COLOUR_COUNT", sites.colours, "colours of sites"
+        yield "COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour"
+
+
+def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
+    """What is the same in all steps: the shape of the lattice, what kernels read, and what its sweeps do."""
+    sites, several = step.sites, len(step.sites.axes) > 1
+    stages = [_braced(step.stage(k, program.coordinates)) for k in range(len(step.parts))] if has["BY_HAND"] else []
+    return {
+        "least": ", ".join(map(str, sites.least)),
+        "periods": ", ".join(map(str, sites.periods)) if has["PERIODIC_COLOURS"] else "",
+        "several": several,
+        "ends": several or has["BANDED"],
+        "open": ", ".join(str(int(o)) for o in sites.open),
+        "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
+        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
+        "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and several else "",
+        "graph": layout.graph,
+        "stages": ", ".join(stages),
+    }
+
+
+def _tables_of_flows(step: Sweeps) -> dict[str, object]:
+    """What differs from flow to flow."""
+    schedule = step.schedule
+    joined = schedule.times[schedule.flows[0][1]] + schedule.times[schedule.flows[-1][1]]
+    multiples = _by_flow(step, schedule.multiples, schedule.multiples[0]) if schedule.multiples else ()
+    return {
+        "times": ", ".join(map(repr, schedule.times if step.equation else _by_flow(step, schedule.times, joined))),
+        "split": step.equation is None,
+        "multiples": ", ".join(map(repr, multiples)),
+        "moments": ", ".join(map(repr, _moments(step))) if step.refresh and not step.equation else "",
+        "parts": ", ".join(str(part + (not step.by_colour)) for part, _ in _flows(step)),
+        "by_colour": ", ".join(str(int(c)) for c in step.by_colour),
+        "part_count": len(step.by_colour),
+    }
+
+
 def _moments(step: Sweeps) -> list[float]:
     """Where the time stands still, as a fraction of the step: for each row of coefficients."""
     return _by_flow(step, step.schedule.moments, 0.0)
 
 
-def _allowed(asked: Sequence[str], arrays: Sequence[tuple[str, bool, bool, str]], *, graph: bool) -> Iterator[str]:
+def _allowed(program: Program, *, graph: bool) -> Iterator[str]:
     """The statements that return whether parameters are allowed."""
+    named = members(program)
+    numbers = [(f"params->{named[p.name]}", p.positive) for p in program.parameters if p.at == "all"]
+    asked = [f"isfinite({number})" + f" && {number} > 0.0" * positive for number, positive in numbers]
+    arrays = [(named[p.name], p.positive, p.values is not None, p.at) for p in program.parameters if p.at != "all"]
     counts = ["sites", *["bonds"] * graph]
     unused = ["params"] * (not asked and not arrays) + [c for c in counts if all(at != c for *_, at in arrays)]
     if unused:
