@@ -17,7 +17,7 @@ from phigen.errors import StepError
 
 if TYPE_CHECKING:
     from phigen.lattice.states import Start
-    from phigen.runtime.lattice import LatticeSolver
+    from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.spec.model import Run, Spec
     from phigen.study.lyapunov import Spectrum
 
@@ -60,19 +60,7 @@ def run_lattice(
     start = start_of(spec, run)
     parameters = parameters_of(spec, start, settings)
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
-    kept = output.with_name(output.name + ".checkpoint") if output else None
-    if kept and not resume:
-        kept.unlink(missing_ok=True)
-    failure: StepError | None = None
-    with console.progress(f"{spec.name} {run.name}", run.steps) as progress:
-        try:
-            made = solver.integrate(
-                start.state, float(run.step), run.steps, run.stride,
-                t0=float(run.start) if spec.time else None, seed=run.seed if spec.noise else None,
-                output=output, checkpoints=kept, progress=progress, parameters=start.arguments | parameters,
-            )  # fmt: skip
-        except StepError as error:
-            failure, made = error, error.trajectory
+    made, failure = _integrated(console, spec, run, solver, start, start.arguments | parameters, output, resume=resume)
     if output and not failure:
         console.note(f"wrote {output}")
     spectrum = None
@@ -91,19 +79,53 @@ def run_lattice(
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
             out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")
-    if plot and plot.suffix.lower() in FILMS:
-        from phigen.drawing.films import film
-
-        film(made, f"{spec.name}, {run.name}", plot)
-        console.note(f"wrote {plot}")
-    elif plot:
-        from phigen.drawing.figures import save
-        from phigen.drawing.lattices import lattice_figure
-
-        save(lattice_figure(made, errors, f"{spec.name}, {run.name}", spectrum=spectrum), plot)
+    if plot:
+        _draw(spec, run, made, errors, spectrum, plot)
         console.note(f"wrote {plot}")
     if failure:
         raise failure
+
+
+def _integrated(
+    console: Console,
+    spec: Spec,
+    run: Run,
+    solver: LatticeSolver,
+    start: Start,
+    parameters: Mapping[str, Any],
+    output: Path | None,
+    *,
+    resume: bool,
+) -> tuple[LatticeTrajectory, StepError | None]:
+    """The frames of a run, and why it did not come to its end if it did not."""
+    kept = output.with_name(output.name + ".checkpoint") if output else None
+    if kept and not resume:
+        kept.unlink(missing_ok=True)
+    with console.progress(f"{spec.name} {run.name}", run.steps) as progress:
+        try:
+            return solver.integrate(
+                start.state, float(run.step), run.steps, run.stride,
+                t0=float(run.start) if spec.time else None, seed=run.seed if spec.noise else None,
+                output=output, checkpoints=kept, progress=progress, parameters=parameters,
+            ), None  # fmt: skip
+        except StepError as error:
+            return error.trajectory, error
+
+
+def _draw(
+    spec: Spec, run: Run, made: LatticeTrajectory, errors: Mapping[str, Any], spectrum: Spectrum | None, plot: Path
+) -> None:
+    """A film or a figure, by the suffix of the file."""
+    title = f"{spec.name}, {run.name}"
+    if plot.suffix.lower() in FILMS:
+        from phigen.drawing.films import film
+
+        film(made, title, plot)
+    else:
+        from phigen.drawing.figures import save
+        from phigen.drawing.lattices import lattice_figure
+
+        save(lattice_figure(made, errors, title, spectrum=spectrum), plot)
 
 
 def exponents_of(
