@@ -99,7 +99,8 @@ class Compilation:
         if self.sweeps is None or not self.sweeps.since:
             return method
         colours = self.sweeps.colouring.count
-        return f"{method}: {f'{colours} colours' if colours > 1 else 'the series'}, since {self.sweeps.since}"
+        seam = " and a seam" * bool(self.sweeps.colouring.seams)
+        return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     @property
     def exact(self) -> bool:

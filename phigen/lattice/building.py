@@ -111,6 +111,12 @@ def since_of(found: Sequence[Misfit], colours: int) -> str:
     return f"{' and '.join(distinct)}, {needed}" if found else ""
 
 
+def since_seam(found: Sequence[Misfit]) -> str:
+    """All of them in one line, where colours take them by a seam."""
+    distinct = {str(m): str(m.fitting) for m in found}
+    return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"
+
+
 def _local(spec: Spec) -> dict[tuple[str, str], Expression]:
     matrix = poisson_matrix(spec.poisson, spec.coordinates, algebra_of_form(spec.poisson, spec.coordinates))
     rows = zip(spec.coordinates, matrix, strict=True)

@@ -15,8 +15,8 @@ from phigen.lattice.graphs import site_sums, sums_by_field
 from phigen.lattice.parts import FORCE, BondSum, CellFlow, Colouring, SiteFields, SiteMotion, at_every_site, own_ring
 from phigen.scheme.choosing import Host
 from phigen.splitting.flow import solved
-from phigen.symbolic.expression import ZERO, Expression, substitute, symbol, symbols_of, total
-from phigen.symbolic.symbols import CHOSEN, Symbol
+from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, symbols_of, total
+from phigen.symbolic.symbols import BEGINS, CHOSEN, Symbol
 
 Covector = Mapping[str, Expression]
 
@@ -52,7 +52,12 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
     sums = _sums(cell)
     _flow(cell, still, [0], sums)  # what has no flow has none by any colours
     for colour in _colours(cell, colouring, still):
-        yield _flow(cell, still, [colour], sums)
+        flow = _flow(cell, still, [colour], sums)
+        if colouring.seams and colour is not None:
+            there = symbol(Symbol(BEGINS, colour, *(0 for _ in cell.axes)))
+            (beside,) = _flow(cell, still, [None], sums, there).motions
+            flow = replace(flow, beside=beside)
+        yield flow
     if any(not e.is_zero for e in rest.values()):
         single = [{f: e if g == f else ZERO for f in cell.fields} for g, e in rest.items() if not e.is_zero]
         colours: list[int | None] = [*range(colouring.count)]
@@ -97,12 +102,18 @@ def _colours(cell: Cell, colouring: Colouring, still: Covector) -> list[int | No
     return [*range(colouring.count)]
 
 
-def _flow(cell: Cell, covector: Covector, colours: list[int | None], sums: tuple[BondSum, ...] = ()) -> CellFlow:
-    """The flow of λππb for a covector b at sites of these colours."""
+def _flow(
+    cell: Cell,
+    covector: Covector,
+    colours: list[int | None],
+    sums: tuple[BondSum, ...] = (),
+    there: Expression = ONE,
+) -> CellFlow:
+    """The flow of λππb for a covector b at sites of these colours, or where ``there`` is 1."""
     at, n = SiteFields(cell), cell.fields
     own = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
     b = {f: e if own or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}
-    factor = at.damping() * (symbol(Symbol(CHOSEN)) if cell.relation == GRAPH and not own else 1)
+    factor = at.damping() * (symbol(Symbol(CHOSEN)) if cell.relation == GRAPH and not own else there)
     rates = {f: factor * at.tangent(f, lambda g, _: at.tangent(g, lambda h, _: b[h])) for f in n}
     ring = own_ring(n, rates.values())
     found = solved(ring, ring.tower.convert_all([rates[f] for f in n]))

@@ -31,7 +31,7 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
     if cell.forces:
         yield _forces(cell, flows, count, positive)
     for k, flow in enumerate(flows, 1):
-        residuals = [r for motion in flow.motions for r in _residuals(motion)]
+        residuals = [r for motion in flow.every_motion for r in _residuals(motion)]
         what, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
         name = f"the flow Φ of {what} at each site: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t"
         yield decide_zero(name, residuals, positive, flow.manner)

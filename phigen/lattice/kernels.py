@@ -8,7 +8,7 @@ from phigen.lattice.cell import Cell
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, symbols_of
-from phigen.symbolic.symbols import CHOSEN, GATHERED, INITIAL, PRESENT, VARIATION, kind_of
+from phigen.symbolic.symbols import BEGINS, CHOSEN, GATHERED, INITIAL, PRESENT, VARIATION, kind_of
 
 
 def site_kernel(
@@ -29,7 +29,8 @@ def site_kernel(
     plain = tuple(p.name for p in cell.parameters if p.at == "all")
     first = {"coef": coefficients.slots} if coefficients else {"params": plain}
     first |= {"t": cell.times} if cell.time in used else {}
-    inputs = {**first, "site": tuple(places), "present": of_kind(PRESENT, CHOSEN), "gathered": of_kind(GATHERED)}
+    weights = of_kind(PRESENT, CHOSEN, BEGINS)
+    inputs = {**first, "site": tuple(places), "present": weights, "gathered": of_kind(GATHERED)}
     bonds = tuple(p.name for p in cell.parameters if p.at == "bonds" and p.name in used)
     inputs |= {"bonds": bonds} if bonds else {}
     inputs |= {"varied": of_kind(VARIATION)} if of_kind(VARIATION) else {}

@@ -4,6 +4,10 @@ A part is a sum over sites of terms whose coordinates commute over all the latti
 flow, and each site moves by ẋ = Σ {x, a} ∂V/∂a with the values of its neighbours as constants, an equation of one site.
 Where π couples neighbours, or a term mixes what does not commute, sites get colours: the terms that begin at sites of
 one colour are then taken apart from the others. Terms of one site alone may be parts by their own flow too.
+
+Where colours do not fit a size, as two of them a ring of odd length, they are counted from site 0 on, and do not match
+where the last site meets it. The terms that begin at the last sites, the *seam*, are then parts of their own: so wide
+that all others see but one end of it. Beside it a site moves by what its neighbours are, which `BEGINS` tells.
 """
 
 from __future__ import annotations
@@ -15,6 +19,7 @@ from dataclasses import dataclass, field, replace
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.cell import GRID, PERIODIC, Cell
+from phigen.scheme.steps import Seam
 from phigen.splitting.conflicts import Conflicts, coloured
 from phigen.splitting.flow import Flow, NoFlowError, Solved, Term, flow_of, joint_flow, solved
 from phigen.splitting.ring import KICK, TIME, Ring
@@ -29,7 +34,7 @@ from phigen.symbolic.expression import (
     total,
 )
 from phigen.symbolic.neighbours import Offset, minus, plus, steps
-from phigen.symbolic.symbols import GATHERED, PRESENT, Symbol
+from phigen.symbolic.symbols import BEGINS, GATHERED, PRESENT, Symbol
 from phigen.symbolic.tower import Tower
 
 #: Most colours of sites.
@@ -55,10 +60,14 @@ class Summand:
 
 @dataclass(frozen=True)
 class Colouring:
-    """The colour of a site: Σ weights·position modulo ``count``."""
+    """The colour of a site: Σ weights·position modulo ``count``.
+
+    With ``seams``, one along each axis, it takes every size.
+    """
 
     count: int = 1
     weights: Steps = ()
+    seams: tuple[Seam, ...] = ()
 
     def at(self, colour: int, offset: Offset) -> int:
         """The colour of the site at an offset from one of a given colour."""
@@ -68,10 +77,31 @@ class Colouring:
 
     def periods(self, boundary: Sequence[str]) -> Steps:
         """What sizes must be multiples of, along each axis."""
+        if self.seams:
+            return (1,) * len(boundary)
         return tuple(
             self.count // math.gcd(self.count, w) if b == PERIODIC and w else 1
             for w, b in zip(self.weights or (0,) * len(boundary), boundary, strict=True)
         )
+
+    @property
+    def windows(self) -> tuple[int, ...]:
+        """The seams that a site may lie on, as bits of the axes: 0 is none of them."""
+        axes = sum(1 << a for a, seam in enumerate(self.seams) if seam.period > 1)
+        return tuple(w for w in range(axes + 1) if w & axes == w)
+
+    def on_seams(self) -> set[int]:
+        """The colours that sites on a seam may have: of a single narrow one not that at the end of a period."""
+        along = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
+        if len(along) > 1 or along[0][0].wide > 1:
+            return set(range(self.count))
+        ((seam, weight),) = along
+        return {weight * k % self.count for k in range(seam.period - 1)}
+
+    def with_seams(self, cell: Cell) -> Colouring:
+        """The colouring with seams so wide that terms at their two ends commute, and that what reads of what those at
+        one end move is not moved by those at the other."""
+        return replace(self, seams=tuple(_seam(cell, a, p) for a, p in enumerate(self.periods(cell.boundary))))
 
 
 @dataclass(frozen=True)
@@ -106,6 +136,26 @@ class SiteMotion:
     components: Mapping[str, Expression] = field(default_factory=dict)
 
 
+def _seam(cell: Cell, axis: int, period: int) -> Seam:
+    """The seam along an axis.
+
+    A term reads sites up to h apart, and moves those up to n from where it begins. What it moves reads at these two
+    alone, unless brackets depend on sites that they do not couple.
+    """
+    if period == 1:
+        return Seam()
+    h, p = cell.hamiltonian_reach[axis], cell.poisson_reach[axis]
+    n = h + p
+    between = all(
+        offset in (cell.origin, cell.place(other)[1])
+        for (_, other), entry in cell.bracket.items()
+        for _, offset in cell.places(entry).values()
+    )
+    wide = h if cell.is_local else h + n if between else 2 * n + p
+    damping = [] if cell.forces.damping is None else cell.places(cell.forces.damping).values()
+    return Seam(period, max([wide, *(h + abs(steps(offset)[axis]) for _, offset in damping)]), n)
+
+
 def at_every_site(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:
     """One motion for those of all colours where they are the same."""
     same = (
@@ -119,12 +169,20 @@ class CellFlow(Flow):
     """The flow of a part of H over the lattice: all ``motions`` may be made in any order, at all sites in any order.
 
     ``summands`` are the terms of the part with the colours of the sites where they begin. On graphs the part of one
-    colour stands for those of all, if it is ``by_colour``.
+    colour stands for those of all, if it is ``by_colour``. Where there are seams, ``beside`` is how sites near them
+    move, by the terms that begin on those of the ``window``; on the seams no others do.
     """
 
     motions: tuple[SiteMotion, ...] = ()
     summands: tuple[tuple[Summand, tuple[int, ...]], ...] = ()
     by_colour: bool = False
+    beside: SiteMotion | None = None
+    window: int = 0
+
+    @property
+    def every_motion(self) -> tuple[SiteMotion, ...]:
+        """The motions, with that beside seams."""
+        return (*self.motions, *([self.beside] if self.beside else []))
 
 
 @dataclass(frozen=True)
@@ -277,7 +335,15 @@ class PartSearch:
         increments = tuple(substitute([e for m in motions for e in m.increments.values()], added))
         hamiltonian = total(s.expression for s, _ in listed)
         manner = "; ".join(dict.fromkeys(m.manner for m in motions))
-        return CellFlow(hamiltonian, increments, manner, at_every_site(motions, self.colouring.count), listed)
+        settled = at_every_site(motions, self.colouring.count)
+        return CellFlow(hamiltonian, increments, manner, settled, listed, beside=self._beside(part, more))
+
+    def _beside(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]) -> SiteMotion | None:
+        """How sites near seams move; None where no terms are left out, so that there is nothing special about them."""
+        every = {(id(s.expression), c) for s, _ in (*part, *more) for c in range(self.colouring.count)}
+        if not self.colouring.seams or every == {(id(s.expression), c) for s, c in (*part, *more)}:
+            return None
+        return self._motion(part, more, None)
 
     def _motions(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]
@@ -286,14 +352,22 @@ class PartSearch:
             yield self._motion(part, more, colour)
 
     def force(
-        self, part: Iterable[tuple[Summand, int]], field: str, colour: int, shift: Offset = (), factor: Expression = ONE
+        self,
+        part: Iterable[tuple[Summand, int]],
+        field: str,
+        colour: int | None,
+        shift: Offset = (),
+        factor: Expression = ONE,
     ) -> Expression:
-        """∂V/∂field at the site ``shift`` away, which has some colour: from terms at sites, weighted at open ends."""
+        """∂V/∂field at the site ``shift`` away, which has some colour: from terms at sites, weighted at open ends.
+
+        Near a seam, without a colour, they are weighted by where they begin.
+        """
         found = []
         for summand, begins in part:
             places = {} if summand.bond else self.cell.places(summand.expression)
             for name, (base, offset) in places.items():
-                if base != field or self.colouring.at(colour, _back(offset)) != begins:
+                if base != field or (colour is not None and self.colouring.at(colour, _back(offset)) != begins):
                     continue
                 (slope,) = gradient(summand.expression, [name])
                 if slope.is_zero:
@@ -302,20 +376,24 @@ class PartSearch:
                     way = plus(shift or self.cell.origin, minus(offset))
                     weight = present(self.cell, summand.low, summand.high, [int(o) for o in way])
                     slope = weight * self.cell.shifted(slope, way)
+                    slope = slope if colour is not None else symbol(Symbol(BEGINS, begins, *way)) * slope
                 found.append(factor * slope)
         return total(found)
 
     def _motion(
-        self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int
+        self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
+        """How sites of a colour move; without one, those near seams."""
         cell = self.cell
-        moves = {c for s in (*part, *more) for c in self._support(s)}
+        moves: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
+        if colour is None:
+            moves = {(f, None) for f, _ in moves}
         rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
         forces: dict[str, Expression] = {}
         gathered: dict[str, Expression] = {}
         for (f, other), entry in cell.bracket.items():
             g, d = cell.place(other)
-            there = self.colouring.at(colour, d)
+            there = None if colour is None else self.colouring.at(colour, d)
             if (g, there) not in moves:
                 continue
             force = self.force(part, g, there, d) + self.force(more, g, there, d, symbol(KICK))
@@ -329,7 +407,8 @@ class PartSearch:
             forces[name] = force
             rates[f].append(entry * symbol(name))
         field = {f: total(r) for f, r in rates.items() if r}
-        self._expect_still(field, colour, part)
+        if colour is not None:  # what stands still beside a seam does so elsewhere, since no site sees both its ends
+            self._expect_still(field, colour, part)
         return self._moved(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
 
     def _moved(
@@ -337,7 +416,7 @@ class PartSearch:
         rates: Mapping[str, Expression],
         forces: Mapping[str, Expression],
         gathered: Sequence[BondSum],
-        colour: int,
+        colour: int | None,
         part: Sequence[tuple[Summand, int]],
     ) -> SiteMotion:
         """The motion with these ``rates``, in which symbols stand for the ``forces``."""

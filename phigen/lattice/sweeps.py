@@ -10,7 +10,7 @@ from typing import Any
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfits, since_of, told_at
+from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfits, since_of, since_seam, told_at
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.damping import TogetherError
 from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
@@ -21,6 +21,7 @@ from phigen.lattice.parts import (
     CellFlow,
     CellSplitting,
     Colouring,
+    NoPartError,
     PartSearch,
     SiteMotion,
     present,
@@ -41,8 +42,9 @@ from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.scheme.program import About, Noise, Observables, Program
 from phigen.scheme.staging import Coefficients
-from phigen.scheme.steps import Ends, Gather, Partners, Sites, Sweep, Sweeps
+from phigen.scheme.steps import Ends, Gather, Partners, Seam, Sites, Sweep, Sweeps
 from phigen.spec.model import NO_EXTRAS, Extras, Spec
+from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
@@ -145,7 +147,27 @@ def _plan_splitting(
         raise SpecError([Diagnostic(message, host.locations.get(("noise",)), "scheme: series takes it")])
     if cell.time:  # the flows of colours follow each other in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
-    return SplittingPlan(parts, choice, noise, since)
+    return SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
+
+
+def _with_seams(choice: Choice, colouring: Colouring) -> Choice:
+    """The choice with the flows of terms on seams, behind the flow of the others, and of the last flow before it."""
+    flows = choice.splitting.flows
+    last, found = len(flows) - 1, list[Flow]()
+    for k, flow in enumerate(flows):
+        seams = list(_on_seams(flow, colouring)) if isinstance(flow, CellFlow) and flow.beside else []
+        found += [*seams, flow] if k == last > 0 else [flow, *seams]
+    carrier = choice.carrier + len(found) - len(flows) if choice.carrier else choice.carrier
+    return replace(choice, splitting=replace(choice.splitting, flows=tuple(found)), carrier=carrier)
+
+
+def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
+    """The flows of the terms of a part that begin on seams, for each of these."""
+    colours = {colour for _, listed in flow.summands for colour in listed}
+    if colours and colours.isdisjoint(colouring.on_seams()):
+        return
+    for window in colouring.windows[1:]:
+        yield replace(flow, motions=(), summands=(), window=window)
 
 
 def _coloured(
@@ -167,6 +189,9 @@ def _coloured(
         wrong = misfits(spec, cell, parts.colouring.periods(cell.boundary)) if spec else []
         if not wrong:
             return *made, since_of(misfit, best[0].colouring.count) if best else ""
+        assert spec is not None
+        if seamed := _seamed(cell, parts.colouring, search, host, spec):
+            return *seamed, since_seam(wrong)
         best, misfit = best or made, misfit or wrong
     if best is None:
         assert refused is not None
@@ -175,6 +200,25 @@ def _coloured(
         assert spec is not None  # else nothing misfits
         raise MisfitError(told_at(spec, misfit), since_of(misfit, best[0].colouring.count))
     return *best, ""
+
+
+def _seamed(
+    cell: Cell, colouring: Colouring, search: type[PartSearch], host: Host, spec: Spec
+) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
+    """The parts of H and of the forces with seams, which take every size; None where some run is too small, where ends
+    are open, and where sites near seams have no elementary flow."""
+    seamed = colouring.with_seams(cell)
+    small = any(
+        size < seam.least
+        for run in spec.runs.values()
+        for size, seam in zip(run.lattice.sizes if run.lattice else (), seamed.seams, strict=False)
+    )
+    if small or any(b != PERIODIC for b in cell.boundary):
+        return None
+    try:
+        return search(cell, seamed).splitting(), force_flows(cell, seamed, host)
+    except (NoPartError, SpecError):
+        return None
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
@@ -201,7 +245,10 @@ def build_sweeps(
         solved = equation(cell, plan, coefficients, tangent=extras.tangent)
     else:
         swept = tuple(
-            tuple(_sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent) for motion in flow.motions)
+            tuple(
+                _sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent)
+                for motion in flow.every_motion
+            )
             for k, (flow, what) in enumerate(_named(cell, plan), 1)
         )
     if extras.adjoint and cell.noise:
@@ -240,7 +287,7 @@ def build_sweeps(
         adjoint=adjoint,
     )
     step = coefficients.settled(settled)
-    facts = [_lattice_fact(cell, plan.colouring.count), *_facts(plan), *_acting_facts(cell, plan), plan.order.note]
+    facts = [_lattice_fact(cell, plan.colouring), *_facts(plan), *_acting_facts(cell, plan), plan.order.note]
     return Program(
         name=cell.name,
         about=About(title, licence, spec_sha256, tuple(f for f in facts if f), _operations(step)),
@@ -304,14 +351,17 @@ def _sweep(
 ) -> Sweep:
     increments = staged(list(motion.increments.values()), coefficients)
     moved = tuple(cell.fields.index(f) for f in motion.increments)
-    suffix = f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
-    named = f"the flow of {what}: {motion.manner}".replace(KICK, KICK.kind)
+    beside = motion is flow.beside
+    suffix = "_beside" if beside else f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
+    where = f" on the seam {flow.window}" if flow.window else " near seams" if beside else ""
+    named = f"the flow of {what}{where}: {motion.manner}".replace(KICK, KICK.kind)
     kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
-    return Sweep(
-        kernel, moved, motion.colour, gather, _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
-    )
+    varied = _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
+    inside, window = flow.beside is not None and not beside, flow.window if beside else None
+    varied = replace(varied, inside=inside, window=window) if varied else None
+    return Sweep(kernel, moved, motion.colour, gather, varied, inside, window)
 
 
 def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients) -> Sweep:
@@ -378,6 +428,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
     axes, boundary = cell.axes or ("i",), cell.boundary or (PERIODIC,)
     reach = [max((abs(o[a]) for _, o in places.values()), default=0) for a in range(len(axes))]
     least = [max(a, b) for a, b in zip(reach, least_sizes(cell) or (1,), strict=True)]
+    least = [max(a, seam.least) for a, seam in zip(least, colouring.seams or [Seam()] * len(axes), strict=True)]
     return Sites(
         axes,
         tuple(b != PERIODIC for b in boundary),
@@ -388,6 +439,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
         tuple(colouring.periods(cell.boundary)) or (1,),
         tuple(least),
         increments=cell.increments,
+        seams=colouring.seams,
     )
 
 
@@ -397,11 +449,13 @@ def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
     return {name: (f, str(offset[0])) for name, (f, offset) in places}
 
 
-def _lattice_fact(cell: Cell, colours: int) -> str:
+def _lattice_fact(cell: Cell, colouring: Colouring) -> str:
     boundary = ", ".join(f"{a} {b}" for a, b in zip(cell.axes, cell.boundary, strict=True))
     related = {GRAPH: "sites with bonds between them, given at run time", PAIRS: "all pairs of sites"}
-    return f"lattice: {related.get(cell.relation, boundary)}; any size" + (
-        f", sites of {colours} colours" if colours > 1 else ""
+    return (
+        f"lattice: {related.get(cell.relation, boundary)}; any size"
+        + (f", sites of {colouring.count} colours" if colouring.count > 1 else "")
+        + " and a seam" * bool(colouring.seams)
     )
 
 
@@ -439,7 +493,7 @@ def _operations(step: Sweeps) -> dict[str, int]:
         times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
     counted: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):
-        for sweep in sweeps:
+        for sweep in (s for s in sweeps if s.window is None):
             for what, number in operation_counts(sweep.kernel.roots).items():
                 counted[what] += number * times[part]
     for kernel in (step.equation.relax, step.equation.advance) if step.equation else ():

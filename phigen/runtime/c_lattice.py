@@ -317,7 +317,7 @@ class CLattice:
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(
-                f"{self.interface.name} has no steps by hand: it is no grid that is split, or profile small"
+                f"{self.interface.name} has no steps by hand: it is no grid that is split, has a seam, or profile small"
             )
         found = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]
         for k, stage in enumerate(found):

@@ -513,7 +513,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
             if size % period:
                 message = f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
-                raise ValueError(f"{message}, and a solver compiled with scheme='series' takes every size")
+                hint = "a run of such a size in the spec, or scheme='series', makes a solver that takes it"
+                raise ValueError(f"{message}; {hint}")
         if not np.isfinite(found).all():
             place = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
             where = ", ".join(map(str, place[1:]))

@@ -254,6 +254,24 @@ class Splitting(_Scheduled):
 
 
 @dataclass(frozen=True)
+class Seam:
+    """Where the last site along an axis meets the first, of sizes that are no multiples of the ``period`` of colours.
+
+    It is as many of the last sites as are left over, and so many periods more that it is at least so ``wide``. Sites on
+    it and so ``near`` it are moved by its terms too. Others have colours that fit those around them.
+    """
+
+    period: int = 1
+    wide: int = 0
+    near: int = 0
+
+    @property
+    def least(self) -> int:
+        """The smallest size, whatever is left over: the seam and as many sites beside it."""
+        return 2 * self.wide + self.period - 1
+
+
+@dataclass(frozen=True)
 class Sites:
     """The sites of a lattice, whose number is an argument of the solver.
 
@@ -273,6 +291,7 @@ class Sites:
     ends: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # of bonds, pairs: what is read at a, or at b
     at_bonds: tuple[str, ...] = ()  # parameters at bonds
     increments: tuple[str, ...] = ()  # of the noise that each site has in a part of a step
+    seams: tuple[Seam, ...] = ()  # along each axis, where colours take every size
 
 
 @dataclass(frozen=True)
@@ -324,7 +343,8 @@ class Partners:
 class Sweep:
     """Changes of the ``moved`` fields (indices) at all sites of one ``colour``, read from what stands still.
 
-    Without a colour it is made at every site.
+    Without a colour it is made at every site. If it is ``inside``, it leaves out sites near seams. With a ``window`` it
+    is made at these alone, for terms that begin on these seams, as bits of their axes, or on none.
 
     The inputs of the ``kernel`` are ``coef``, ``site``, ``present``, symbols that are 1 where a term of H reaches
     beyond no open end, or where a site has the colour of the sweep, else 0, and ``gathered``, what ``gather`` adds up.
@@ -337,6 +357,8 @@ class Sweep:
     colour: int | None = 0
     gather: Gather | None = None
     tangent: Sweep | None = None
+    inside: bool = False
+    window: int | None = None
 
     @property
     def is_tangent(self) -> bool:
@@ -397,10 +419,11 @@ class Sweeps(_Scheduled):
     def is_by_hand(self) -> bool:
         """Whether the sweeps of a step can be driven one by one over planes: those of a grid that is split.
 
-        Noise is drawn with the sweep that reads it, so that must not be that of neighbours.
+        Noise is drawn with the sweep that reads it, so that must not be that of neighbours. Seams are where the lattice
+        has its ends, of which those who have but a piece of it know nothing.
         """
         beside = any(base in self.sites.increments and any(offset) for base, offset in self.sites.places.values())
-        return self.partners is None and self.equation is None and not beside
+        return self.partners is None and self.equation is None and not beside and not self.sites.seams
 
     def stage(self, part: int, fields: Sequence[str]) -> tuple[int, int, int, int]:
         """Of a part on a grid: how far behind and ahead it reads along the first axis, and as bits of a number the

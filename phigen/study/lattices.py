@@ -263,6 +263,7 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
         -(-max(least, 3 if len(about.axes) < 3 else 2) // p) * p
         for least, p in zip(about.least, about.periods, strict=True)
     ]
+    sizes = _with_seams(subject, sizes)
     whole, wanted = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
     x, parameters = _on_few(cell, subject.start, sizes, whole.bonds)
     few = _Few(whole, subject, parameters, x)
@@ -281,6 +282,16 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
     slip = min(max(few.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in tried)
     name, limit = f"tangent map against differences {where}", f"≤ {DIFFERENCES:.0e}"
     yield Check(name, slip, limit, slip <= DIFFERENCES, f"is no derivative of the step, {slip:.1e} off")
+
+
+def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
+    """Sizes from those on that have the seams of the run, and along one or two axes sites away from them."""
+    plan = subject.compilation.sweeps
+    seams = plan.colouring.seams if plan else ()
+    for axis, (seam, size) in enumerate(zip(seams, subject.start.sizes, strict=False)):
+        sizes[axis] += 2 * seam.near * (len(seams) < 3)
+        sizes[axis] += (size - sizes[axis]) % seam.period
+    return sizes
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Of lattices: what bonds or pairs add to a component of the gradient at a site; 1 where a term reaches beyond no open
-#: end, else 0; 1 at sites of the colour that a part of a graph belongs to, else 0.
-GATHERED, PRESENT, CHOSEN = "gathered", "present", "chosen"
+#: end, else 0; 1 at sites of the colour that a part of a graph belongs to, else 0; 1 where the site at an offset has a
+#: colour, and lies on the side of a seam that a sweep is for, else 0.
+GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
 
 
 class Symbol(str):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweeps
-from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
+from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol, kind_of
 
 
 def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], str]) -> dict[str, object]:
@@ -22,6 +22,8 @@ def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], 
         "parted": sites.colours > 1,
         "colours": sites.colours,
         "colour_weights": listed(sites.weights),
+        "seamed": bool(sites.seams),
+        "seams": listed([[seam.period, seam.wide, seam.near] for seam in sites.seams]),
         "row": step.row,
         "renewed": step.refresh is not None,
         "prepared": step.prepared,
@@ -43,10 +45,17 @@ def switches(step: Sweeps) -> dict[str, bool]:
     """The switches that all runtimes of lattices know."""
     return {
         "COLOURS": step.sites.colours > 1,
+        "SEAMS": bool(step.sites.seams),
         "GATHER": step.partners is not None,
         "GRAPH": step.others.graph,
         "BY_COLOUR": bool(step.by_colour),
     }
+
+
+def begins(step: Sweeps) -> tuple[Symbol, ...]:
+    """What is 1 where a site at an offset has a colour, and is on the seams of a sweep, in the order of kernels."""
+    read = (s for sweep in step.sweeps for s in sweep.kernel.inputs["present"])
+    return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == BEGINS))
 
 
 def weights(program: Program, step: Sweeps) -> tuple[Symbol, ...]:

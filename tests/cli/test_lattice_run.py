@@ -66,9 +66,13 @@ def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
     assert {"scheme": "splitting", "colours": 3, "since": None}.items() <= split.items()
 
 
-def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours(phigen, tmp_path):
+def test_what_names_a_splitting_says_which_sizes_would_take_fewer_colours_or_no_seam(phigen, tmp_path):
     spec = tmp_path / "ring.yaml"
     spec.write_text(ring([1], 9), encoding="utf-8")
+    said = "Splitting: 2 colours and a seam, since 9 along i is no multiple of 2; 8 would do without\n"
+    assert said in phigen("check", spec).stdout
+    periodic = ring([1], 9).replace("axes: [i]", "axes: [i, j], boundary: [periodic, open]").replace("[9]", "[9, 2]")
+    spec.write_text(periodic, encoding="utf-8")
     said = (
         "Splitting: 3 colours, since 9 along i is no multiple of 2, as a splitting with 2 colours needs; 8 would do\n"
     )

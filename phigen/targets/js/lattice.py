@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import VARIED, Ends, Gather, Sweep, Sweeps
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol
+from phigen.symbolic.symbols import BEGINS, CHOSEN, COEFFICIENT, GATHERED, INITIAL, PRESENT, VARIATION, Symbol
 from phigen.targets import lattice
 from phigen.targets.code import lower
 from phigen.targets.features import switches
@@ -72,6 +72,7 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         **lattice.tables(program, step, json.dumps),
         "near": json.dumps(_near(step)),
         "bounds": json.dumps([lattice.bounds(w) for w in lattice.weights(program, step)]),
+        "wanted": json.dumps([[s.key[0], list(s.key[1:])] for s in lattice.begins(step)]),
         "sums": step.sums,
         "unit": "stages" if step.equation else "flows",
         "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows)}]",
@@ -134,7 +135,7 @@ class _Printed:
         """A sweep: it changes x in place, since it reads elsewhere only what stands still; its derivative changes v."""
         varied = sweep.kernel.name.startswith("tangent")
         more = ["v"] * varied
-        body = _Body(self, sweep.kernel, sweep.gather.names if sweep.gather else ())
+        body = _Body(self, sweep.kernel, sweep.gather.names if sweep.gather else (), window=sweep.window or 0)
         changed = "v" if varied else "x"
         stores = [(self._entry(changed, sweep.moved[s.index]), body.show(s.value)) for s in body.code.stores]
         if len(stores) > 1:
@@ -146,12 +147,22 @@ class _Printed:
         before = [f"{camel(e.kernel.name)}({given});" for e in _ends(sweep.gather)]
         clear = ["sites.sums.fill(0);"] if before else []
         loop = "for (let i = 0; i < count; i++) {"
-        if self.step.sites.colours > 1 and sweep.colour is not None:
+        chosen = self._chosen(sweep)
+        if chosen:
             body.lines.insert(0, "const i = chosen[k];")
-            body.first.insert(0, f"const chosen = sites.coloured[{sweep.colour}];")
+            body.first.insert(0, f"const chosen = {chosen};")
             loop = "for (let k = 0; k < chosen.length; k++) {"
         arguments = ["coef", "x", *more, "sites", *by_colour]
         return self._function(sweep.kernel, arguments, [*clear, *before], body, [loop])
+
+    def _chosen(self, sweep: Sweep) -> str:
+        """The list of the sites where a sweep is made; nothing where that is at all."""
+        if sweep.window is not None:
+            return "sites.beside"
+        if self.step.sites.colours == 1 or (sweep.colour is None and not sweep.inside):
+            return ""
+        colour = "all" if sweep.colour is None else sweep.colour
+        return f"sites.{'inside' if sweep.inside else 'coloured'}[{json.dumps(colour)}]"
 
     def of_equation(self, kernel: Kernel) -> str:
         """A kernel of the equation of a stage, at the y that is its x."""
@@ -236,8 +247,10 @@ def at_field(site: str, field: int) -> str:
 class _Body:
     """The statements of a kernel at a site i, and at another, j: those before the loop are ``first``."""
 
-    def __init__(self, printed: _Printed, kernel: Kernel, sums: Sequence[str] = (), params: str = "") -> None:
-        self.printed, self.code = printed, lower(kernel)
+    def __init__(
+        self, printed: _Printed, kernel: Kernel, sums: Sequence[str] = (), params: str = "", window: int = 0
+    ) -> None:
+        self.printed, self.code, self.window = printed, lower(kernel), window
         self.params = params or ("params" if "params" in kernel.inputs else "sites.params")
         own = _OWN | printed.names | set(LANGUAGE.functions.values()) | {f"change{k}" for k in range(9)}
         self.scope = Scope(LANGUAGE.reserved | own)
@@ -264,6 +277,9 @@ class _Body:
             self.scope.bind(s, f"sites.sums[{at_field('i', sums.index(s))}]")
         elif s.kind == CHOSEN:
             self.scope.bind(s, "(sites.colours[i] === colour ? 1 : 0)")
+        elif s.kind == BEGINS:
+            number = lattice.begins(self.printed.step).index(s)
+            self.scope.bind(s, f"{self._array(f'sites.begins({number}, {self.window})', Symbol(BEGINS, number))}[i]")
         elif s.kind == INITIAL:
             self.scope.bind(s, f"start[{at_field('i', fields.index(str(s.key[0])))}]")
         elif s.kind == VARIATION:

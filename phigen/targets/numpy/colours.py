@@ -1,4 +1,4 @@
-"""Sweeps in NumPy that differ in the colour of their sites only: one function, which others call with their colour."""
+"""Sweeps in NumPy that differ in the colour of their sites only, or in their seams: one function, which others call."""
 
 from __future__ import annotations
 
@@ -9,7 +9,16 @@ from phigen.scheme.steps import Sweep, Sweeps
 
 def chosen(step: Sweeps, sweep: Sweep, new: str, old: str) -> str:
     """The new values where a sweep is made, the old ones elsewhere."""
+    if sweep.window is not None:
+        return f"np.where(sites.beside, {new}, {old})"
+    if sweep.inside:
+        return f"sites.inside({'colour' if _argument(step, sweep) else 'None'}, {new}, {old})"
     return f"sites.coloured(colour, {new}, {old})" if _argument(step, sweep) else new
+
+
+def early(sweep: Sweep, unchanged: str) -> list[str]:
+    """The statements that leave out sweeps near seams where colours fit the sizes."""
+    return ["    if not sites.beside.any():", f"        return {unchanged}"] if sweep.window is not None else []
 
 
 def functions(step: Sweeps, sweeps: Iterable[tuple[Sweep, str, str, Sequence[str]]]) -> Iterator[str]:
@@ -24,5 +33,7 @@ def functions(step: Sweeps, sweeps: Iterable[tuple[Sweep, str, str, Sequence[str
 
 
 def _argument(step: Sweeps, sweep: Sweep) -> str:
-    """The argument that says at sites of which colour a sweep is made, where it is not made at all."""
+    """The argument that says at sites of which colour a sweep is made, where it is not made at all, or its seams."""
+    if sweep.window is not None:
+        return f", window={sweep.window}"
     return "" if sweep.colour is None or step.sites.colours == 1 else f", colour={sweep.colour}"

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import VARIED, Gather, Sweep, Sweeps
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
+from phigen.symbolic.symbols import BEGINS, CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets import lattice
 from phigen.targets.code import Code, lower
 from phigen.targets.header import facts
@@ -78,9 +78,10 @@ def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]]) -> str:
 def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> tuple[Sweep, str, str, list[str]]:
     """One sweep as a function from a state to the next, or from a variation of the state to the next: its parts."""
     kernel, code = sweep.kernel, lower(sweep.kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"v", "moved", "gathered", "colour"})
+    scope = Scope(PYTHON_RESERVED | _OWN | {"v", "moved", "gathered", "colour", "window"})
     own, given = ("v", "x, v") if sweep.is_tangent else ("x", "x")
-    lines = [f"    gathered = _{_sums_of(sweep)}(coef, {given}, sites)"] if sweep.gather else []
+    lines = colours.early(sweep, own)
+    lines += [f"    gathered = _{_sums_of(sweep)}(coef, {given}, sites)"] if sweep.gather else []
     names = sweep.gather.names if sweep.gather else ()
     lines += [*_body(program, step, kernel, code, scope, names), f"    moved = {own}.copy()"]
     show = LANGUAGE.printer(scope)
@@ -179,6 +180,8 @@ def _body(
                 scope.bind(s, f"gathered[{list(gathered).index(s)}]")
             elif isinstance(s, Symbol) and s.kind == CHOSEN:
                 scope.bind(s, "sites.chosen()")
+            elif isinstance(s, Symbol) and s.kind == BEGINS:
+                scope.bind(s, f"sites.begins(window, {', '.join(map(str, s.key))})")
             elif isinstance(s, Symbol) and s.kind == INITIAL:
                 scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
             elif isinstance(s, Symbol) and s.kind == VARIATION:

@@ -43,10 +43,10 @@ def _sweep(
     program: Program, step: Sweeps, sweep: Sweep, kernel: Kernel, body: Body
 ) -> tuple[Sweep, str, str, list[str]]:
     """The cotangent before a sweep from that after it, x being the state before: the parts of a function."""
-    code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"change_bar", "colour"})
+    code, scope = lower(kernel), Scope(PYTHON_RESERVED | _OWN | {"change_bar", "colour", "window"})
     names = sweep.gather.names if sweep.gather else ()
     seeds = ", ".join(colours.chosen(step, sweep, f"bar[{f}]", "0.0") for f in sweep.moved)
-    lines = [f"    change_bar = [{seeds}]"]
+    lines = [*colours.early(sweep, "bar"), f"    change_bar = [{seeds}]"]
     gather = _name(sweep.gather) if sweep.gather else ""
     lines += [f"    gathered = _{gather}(coef, x, sites)"] if gather else []
     lines += [*body(program, step, kernel, code, scope, names), "    bar = bar.copy()"]

@@ -330,6 +330,16 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
     s->to = s->length;
 #endif
     s->width = width;
+#if PHI_SEAMS
+    for (int a = 0; a < PHI_AXES; ++a) {
+        const ptrdiff_t size = (ptrdiff_t)sizes[a], period = phi_seams[a][0], left = size % period;
+        s->seams[a] = size - left;
+        while (left > 0 && size - s->seams[a] < phi_seams[a][1]) s->seams[a] -= period;
+        const ptrdiff_t near = left > 0 ? phi_seams[a][2] : 0;
+        s->inside[0] = near;
+        s->inside[1] = s->seams[a] - near;
+    }
+#endif
 #if PHI_TIMED
     s->t = s->now = t0;
 #endif

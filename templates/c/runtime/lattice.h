@@ -28,6 +28,10 @@ typedef struct {
     size_t sizes[PHI_AXES];
     size_t sites, rows;
     ptrdiff_t length, width;  /* sites of a row; doubles between the beginnings of two rows */
+#if PHI_SEAMS
+    ptrdiff_t seams[PHI_AXES]; /* along each axis the first site of the seam; that behind the last where there is none */
+    ptrdiff_t inside[2];      /* of a row the first site away from the seam, and that behind the last */
+#endif
     double *x[PHI_ARRAYS];    /* in rows, each field, then each parameter at sites: the first site of the first row */
 #if !PHI_ONE_ROW
     ptrdiff_t *lines;         /* of each row, where it is and where those beside it are */

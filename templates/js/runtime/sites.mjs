@@ -4,6 +4,9 @@ import { OPEN, PERIODS, POSITIVE } from "./model.mjs";
 // #if COLOURS
 import { COLOURS, COLOUR_WEIGHTS } from "./model.mjs";
 // #endif
+// #if SEAMS
+import { SEAMS, WANTED } from "./model.mjs";
+// #endif
 // #if GATHER
 import { GATHERED } from "./model.mjs";
 // #endif
@@ -49,6 +52,23 @@ export class Sites {
     this.coloured = Array.from({ length: COLOURS }, (_, colour) => {
       return Int32Array.from(colours.flatMap((own, i) => (own === colour ? [i] : [])));
     });
+    // #if SEAMS
+    this.#colours = colours;
+    /** Along each axis the first site of the seam; that behind the last where there is none. */
+    this.seams = SEAMS.map(([period, wide], axis) => {
+      const left = sizes[axis] % period;
+      return sizes[axis] - (left && left + Math.max(0, Math.ceil((wide - left) / period)) * period);
+    });
+    const beside = every(Array, (i) => this.#place(i).some((at, axis) => {
+      const near = this.seams[axis] < sizes[axis] ? SEAMS[axis][2] : 0;
+      return at < near || at >= this.seams[axis] - near;
+    }));
+    const listed = (wanted) => Int32Array.from(beside.flatMap((own, i) => (wanted(own, i) ? [i] : [])));
+    /** The sites on seams and near them; all others, and those of each colour. */
+    this.beside = listed((own) => own);
+    this.inside = this.coloured.map((_, colour) => listed((own, i) => !own && colours[i] === colour));
+    this.inside.all = listed((own) => !own);
+    // #endif
     // #endif
     // #if GATHER
     /** What bonds or pairs add up at each site. */
@@ -120,6 +140,24 @@ export class Sites {
     }, 0);
   }
 
+  // #if SEAMS
+  #colours;
+  #begins = new Map();
+
+  /** 1 where the site at an offset has a colour, both of that number, and lies on just the seams of a window, else 0. */
+  begins(number, window) {
+    const key = `${number} ${window}`;
+    const [colour, offset] = WANTED[number];
+    const there = (_, i) => {
+      const site = this.#beside(i, offset);
+      const seams = this.#place(site).reduce((sum, at, axis) => sum + (at >= this.seams[axis] ? 2 ** axis : 0), 0);
+      return this.#colours[site] === colour && seams === window ? 1 : 0;
+    };
+    if (!this.#begins.has(key)) this.#begins.set(key, Float64Array.from({ length: this.count }, there));
+    return this.#begins.get(key);
+  }
+
+  // #endif
   /** 1 where all from low to high is on the lattice, along each axis that is open, else 0. */
   #holds(site, bounds) {
     const place = this.#place(site);

@@ -29,7 +29,7 @@ from phigen.targets.c.lattice.layout import Layout, givers, handed_apart, layout
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
-from phigen.targets.c.lattice.parts import Case, at, call_forms, calls_over_sites, either, over_rows
+from phigen.targets.c.lattice.parts import Case, at, beside_seams, call_forms, calls_over_sites, either, over_rows
 from phigen.targets.rendering import render
 
 
@@ -50,7 +50,7 @@ class _Pulled:
     """A transposed kernel, where its cotangents are, what is gathered for it, and the transposes of the kernels of
     that, with the parameters that are opposite seen from b; what is called before it, for pieces of rows; the fields
     that it undoes, or another kernel, from sums that bonds or pairs add up in their transposes; what the flow after it
-    has handed, where it takes that."""
+    has handed, where it takes that; its ``sites`` of a piece, if it is made near seams, or away from them."""
 
     kernel: Kernel
     seeds: Seeds
@@ -60,6 +60,7 @@ class _Pulled:
     undone: tuple[int, ...] = ()
     undo: Kernel | None = None
     taken: tuple[Handed, ...] = ()
+    sites: tuple[str, ...] = ()
 
 
 def printed(program: Program, step: Sweeps, adjoint: Adjoint, rows: Rows) -> str:
@@ -132,9 +133,10 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
             alike = len(ends) == 1 and ends[0][0].of_all
             own, undo = (alike and apart(kernel)) or (kernel, None)
             before = tuple(_gathered(program, layout, sweep)) if _reads_sums(own) else ()
+            before += (f"row.window = {sweep.window};",) if sweep.window is not None else ()
             if taken:
                 own = replace(own, name=f"{own.name}_after{after + 1}")
-            pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo, taken))
+            pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo, taken, beside_seams(sweep)))
         told = f"the sweeps of H_{k + 1} have changed"
         both = _back(program, layout, rows, f"hand{k + 1}", told, pulled, apart=handed_apart(program, layout.step)[k])
         along = [pair for kernel in back[k] for pair in kernel.along("site")]
@@ -188,7 +190,8 @@ def _back(
                 first_loop(program, layout, k, form + far, one.seeds, sums, listed, given, calls, moved, one.taken)
                 for k, form in forms_of(program, kernel)
             ]
-            lines[far] = [called(call.loop, call.sites) for call in calls_over_sites(own)]
+            whole = [(call.loop, call.sites) for call in calls_over_sites(own)]
+            lines[far] = [called(*call) for call in [(own[0], sites) for sites in one.sites] or whole]
             loops.extend(own)
         return either(lines)
 
@@ -196,20 +199,29 @@ def _back(
         listed = handed_by(layout, one.kernel, given)
         given = max([given, *(h.array + 1 for h in listed)])
         fields = [program.coordinates[f] for f in one.undone]
-        first += [*one.before, *over_sites(one, one.kernel, listed, () if one.undo else fields)]
+        first += [*one.before, *(_cleared(layout, listed) if one.sites else ())]
+        first += over_sites(one, one.kernel, listed, () if one.undo else fields)
         bonds = [loop for e in one.ends for loop in gathering_back(program, layout, *e, given, summed=bool(one.undo))]
         loops += bonds
         second += map(called, bonds)
         second += over_sites(one, one.undo, (), fields) if one.undo else []
         given += len(one.gather.names) if one.gather else 0
         beside += listed
-    first += copied_ends(program, layout, beside)
+    swept = layout.swept("begin, stop" if _has_ends(first) else "row.from, row.to")
+    first += copied_ends(program, layout, beside, swept)
     if beside and apart:
         loop = handing(program, layout, name, whom, beside)
         second.append(f"{program.name}_{loop.name}(&row);")
         loops.append(loop)
     undone = sorted({f for one in pulled for f in one.undone})
     return Back(tuple(loops), tuple(first), tuple(second), given, tuple(undone))
+
+
+def _cleared(layout: Layout, handed: Sequence[Handed]) -> Iterator[str]:
+    """What sites hand to others is nothing where loops leave them out."""
+    for array in sorted({h.array for h in handed}):
+        place = f"row.handed[{array}]{layout.at(0, 'row.')} + begin"
+        yield f"memset({place}, 0, (size_t)(stop - begin) * sizeof **row.handed);"
 
 
 def _ends_back(gather: Gather | None, kernels: Mapping[str, Kernel]) -> Iterator[tuple[Ends, Set[str], Kernel]]:

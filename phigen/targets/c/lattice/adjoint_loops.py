@@ -189,12 +189,12 @@ def _unused(code: Code) -> list[str]:
     return [] if any(isinstance(s, Symbol) and s.kind == COEFFICIENT for s in code.used) else ["    (void)coef;"]
 
 
-def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed]) -> Iterator[str]:
-    """What copies the ends of rows of what is handed along them; beyond open ends there is nothing."""
+def copied_ends(program: Program, layout: Layout, handed: Sequence[Handed], swept: str) -> Iterator[str]:
+    """What copies the ends of rows of what is handed along them, if ``swept``; beyond open ends there is nothing."""
     if layout.step.sites.open[-1]:
         return
     for array in sorted({h.array for h in handed if h.offset[-1]}):
-        yield f"{program.name}_ends(row.handed[{array}]{layout.at(0, 'row.')}, s->length, {layout.swept()});"
+        yield f"{program.name}_ends(row.handed[{array}]{layout.at(0, 'row.')}, s->length, {swept});"
 
 
 def handing(program: Program, layout: Layout, name: str, whom: str, handed: Sequence[Handed]) -> Loop:

@@ -128,7 +128,8 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "SPREAD": program.profile == "fast",
         "BESIDE": bool(layout.weights) and program.profile == "fast",
         "BETWEEN": (bool(layout.weights) and program.profile == "fast")
-        or any(wide(layout, sweep) for part in step.parts for sweep in part),
+        or any(wide(layout, sweep) for part in step.parts for sweep in part)
+        or bool(step.sites.seams),
         "OPEN_ROWS": step.sites.open[-1],
         "HALO": layout.halo > 0,
         "PERIODIC_COLOURS": max(step.sites.periods, default=1) > 1,
@@ -178,7 +179,7 @@ def site_blocks(program: Program, step: Sweeps, layout: Layout) -> bool:
 
 def waves(program: Program, step: Sweeps) -> bool:
     """Whether several flows are made at once: of grids, where what a flow reads lies beside."""
-    split = step.equation is None and step.partners is None
+    split = step.equation is None and step.partners is None and not step.sites.seams
     return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 

@@ -9,11 +9,11 @@ from phigen.lattice.collecting import AROUND
 from phigen.lattice.pairing import HERE, THERE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.symbolic.symbols import CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
+from phigen.symbolic.symbols import BEGINS, CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
 from phigen.targets.c.kernels import members, printer
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.code import Code
-from phigen.targets.lattice import bounds
+from phigen.targets.lattice import begins, bounds
 from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 
@@ -92,6 +92,10 @@ class SiteNames:
                 self._bind_seed(s, seeds[s.kind][int(s.key[0])], {HERE: "a", THERE: "b"}.get(s.kind))
             elif isinstance(s, Symbol) and s.kind == INCREMENT:
                 self._bind_site(s)
+            elif isinstance(s, Symbol) and s.kind == BEGINS:
+                k = begins(layout.step).index(s)
+                self.scope.bind(s, f"w{k}")
+                self._weights.append(f"const double w{k} = {program.name}_begins(row, {k}, i);")
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
             elif s == program.time:

@@ -196,7 +196,8 @@ def _case(
     all_called = [call for called in forms.values() for call in called]
     orders = [*_reordered(layout, [call.order for call in all_called])]
     orders += _other_bonds(layout, [call.bonds for call in all_called])
-    beside, where = has_ends(program, [sweep.kernel for sweep in part]), "v" if varied else "s->x"
+    beside = has_ends(program, [sweep.kernel for sweep in part]) or any(map(beside_seams, part))
+    where = "v" if varied else "s->x"
     return Case(either(lines), setup, beside, orders, moved, where)
 
 
@@ -221,7 +222,7 @@ class Case:
 class _Call:
     """A loop for some sites of a piece: their bounds, if not all of them; the ``colour`` that it is told, if any; the
     fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
-    likewise; what it is ``told`` of bonds besides; ``others`` would do the same."""
+    likewise; what it is ``told`` of bonds besides; the ``window`` of seams, if any; ``others`` would do the same."""
 
     loop: Loop
     sites: str = ""
@@ -230,14 +231,19 @@ class _Call:
     bonds: tuple[str, ...] = ()
     told: tuple[str, ...] = ()
     others: tuple[_Call, ...] = ()
+    window: int | None = None
 
 
 def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str]) -> Iterator[str]:
     """The statements that call loops, which have ``names`` by their code, each with the fields in its order."""
     order: tuple[str, ...] = ()
     colour: int | None = 0
+    window: int | None = 0
     for call in called:
         told = list[str]()
+        if call.window not in (window, None):
+            window = call.window
+            told.append(f"row.window = {window}")
         if call.colour not in (colour, None):
             colour = call.colour
             told.append(f"row.swept = {colour}")
@@ -271,7 +277,7 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
     """The loops of a sweep, in the order in which they are called for a piece of a row."""
     meant = over_ends(sweep.gather) if sweep.gather else []
 
-    def told(k: int, bonds: tuple[str, ...], sign: float) -> tuple[str, ...]:
+    def said(k: int, bonds: tuple[str, ...], sign: float) -> tuple[str, ...]:
         ends, opposite = meant[k]
         values = {"at_bonds": "_".join(bonds) or "s->at_bonds", "sign": f"{sign!r}"}
         values["across"] = str(int(ends.chosen == "there"))
@@ -282,8 +288,8 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
         alone = program.profile == "fast" or layout.step.adjoint
         for gather, bonds, sign in () if alone or not sweep.gather else other_ways(layout.step.sites, sweep.gather):
             again = [*gathering(program, layout, gather, "coef")]
-            others.append(_Call(again[k], bonds=bonds, told=told(k, bonds, sign)))
-        yield _Call(loop, told=told(k, (), 1.0), others=tuple(others))
+            others.append(_Call(again[k], bonds=bonds, told=said(k, bonds, sign)))
+        yield _Call(loop, told=said(k, (), 1.0), others=tuple(others))
     loops = [
         sweep_loop(program, layout, replace(sweep, kernel=kernel), form + more, calls)
         for kernel, more in forms_of(program, sweep.kernel)
@@ -292,7 +298,15 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
         yield _Call(loops[0], "0, (s->length + 7) & ~(ptrdiff_t)7")
     else:
         swept = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
-        yield from (replace(call, colour=sweep.colour if swept else None) for call in calls_over_sites(loops))
+        colour = sweep.colour if swept else None
+        called = [_Call(loops[0], sites) for sites in beside_seams(sweep)] or calls_over_sites(loops)
+        yield from (replace(call, colour=colour, window=sweep.window) for call in called)
+
+
+def beside_seams(sweep: Sweep) -> tuple[str, ...]:
+    """The sites of a piece of a row away from seams, or near them, if a sweep is made there only."""
+    near = ("begin, second", "third, stop") if sweep.window is not None else ()
+    return ("second, third",) if sweep.inside else near
 
 
 def calls_over_sites(loops: Sequence[Loop]) -> Iterator[_Call]:
@@ -400,11 +414,13 @@ def over_rows(
     last = [bounds(w)[-1] for w in layout.weights]
     low, one_row = max([0, *(-low for low, _ in last)]), len(layout.step.sites.axes) == 1
     low = (low + 7) // 8 * 8 if back else low
+    seamed = bool(layout.step.sites.seams)
+    away, end = "s->inside[0]" if seamed else low, f"s->length - {max([0, *(high for _, high in last)])}"
     values = {
         "NAME": program.name,
-        "low": low if one_row else f"row.whole ? {low} : s->length",
-        "high": max([0, *(high for _, high in last)]),
-        "back": back,
+        "low": away if one_row else f"row.whole ? {away} : s->length",
+        "high": "s->inside[1]" if seamed else f"({end}) & ~(ptrdiff_t)7" if back else end,
+        "ends": "seams" if seamed else "open ends",
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
         "alone": alone,
         "threads": threads,
@@ -435,7 +451,7 @@ def _over_pieces(
     if len(own) > 1 and program.profile == "small":
         calls = ["switch (part) {", *_cases(own, labels), "}", *last]
         setup = [*dict.fromkeys(line for case in pieces for line in case.setup)]
-        return _piece(values, Case(calls, setup, beside=False))
+        return _piece(values, Case(calls, setup, any(case.beside for case in pieces)))
     whole = iter([replace(case, calls=[*case.calls, *copied]) for case, copied in zip(pieces, ends, strict=True)])
     loops = [[case] if isinstance(case, str) else _piece(values, next(whole)) for case in cases]
     return loops[0] if len(loops) == 1 else ["switch (part) {", *_cases(loops, labels), "}"]
