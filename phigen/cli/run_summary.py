@@ -34,6 +34,8 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
     if summaries[0].is_balance:
         power = "∂H/∂t" if not compilation.system.forces else "(∂H/∂t + the power of the forces)"
         out(f"  The energy balance is H − ∫ {power} dt, integrated along the stored states by a rule of order 8.")
+        if any(s.off > 0.01 for s in summaries):
+            out("  They are too far apart for it to say much: a shorter --every, or stride, brings them closer.")
     if recorder.experiment.run.members > 1:
         _print_means(recorder)
     if recorder.finder:

@@ -246,7 +246,7 @@ RUN = Record(
         Field("parameters", MapOf(NAME, VALUES), "values that differ from the defaults"),
         Field("exact", FORMULAS, "closed form by coordinate, in t and x0_NAME for initial values"),
         Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to run beside it"),
-        Field("section", FORMULA, "Poincaré section: where this expression passes through 0"),
+        Field("section", FORMULA, "Poincaré section: where this expression passes through 0, as direction says"),
         Field("direction", Choice(DIRECTIONS), "how the section is crossed: rising, falling or both", default="rising"),
         Field("description", PROSE, "what the run shows"),
     ),
@@ -294,7 +294,7 @@ _IN_RUNS["tolerance"] = "solver: {tolerance: …}; steps have one size, and thei
 SPEC = Record(
     "a spec",
     (
-        Field("phigen", Integer(FORMAT_VERSION, FORMAT_VERSION), "version of the format", required=True),
+        Field("phigen", Integer(FORMAT_VERSION, FORMAT_VERSION), "1, the version of the format", required=True),
         Field(
             "name",
             Name(SPEC_NAME, "a spec name", "lower-case letters, digits and _, starting with a letter, at most 31", 31),

@@ -35,10 +35,11 @@ Schema = dict[str, Any]
 
 @dataclass
 class Reader:
-    """What reading produces beside the values: the errors, and the place of every part."""
+    """What reading produces beside the values: the errors, the place of every part, and what its key is for."""
 
     problems: Problems
     locations: dict[Path, Location] = field(default_factory=dict)
+    purposes: dict[Path, str] = field(default_factory=dict)
 
     def error(self, node: Node, message: str, hint: str = "", *, limit: bool = False) -> None:
         """Report an error at a node."""
@@ -65,8 +66,9 @@ class Kind:
         raise NotImplementedError
 
     def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
-        """Report a node of the wrong kind."""
-        reader.error(node, f"{label(path)}expected {self.expected}, found {kind_of(node)}", hint)
+        """Report a node of the wrong kind; without a better hint, with what its key is for."""
+        found = f"{label(path)}expected {self.expected}, found {kind_of(node)}"
+        reader.error(node, found, hint or reader.purposes.get(path, ""))
 
 
 @dataclass(frozen=True)
@@ -334,6 +336,7 @@ class Record(Kind):
             else:
                 inner = (*path, name)
                 reader.locations[inner] = place(key, item)
+                reader.purposes[inner] = known[name].description
                 value = known[name].kind.read(item, inner, reader)
                 if value is not None:
                     values[name] = value

@@ -270,3 +270,10 @@ def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
     part, _ = made("c.csv", "--at", "0.12")
     assert part.exit_code == 2
     assert "0.12 is not at the end of one" in part.stderr
+
+
+@pytest.mark.slow
+def test_states_too_far_apart_for_the_balance_of_energy_are_told(phigen, in_tmp):
+    duffing = ("run", str(resources.bundled()["duffing"]), "--target", "numpy")
+    assert "too far apart" not in phigen(*duffing).stdout
+    assert "They are too far apart" in phigen(*duffing, "--every", 2).stdout
