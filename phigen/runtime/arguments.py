@@ -48,7 +48,7 @@ class Beginning:
 
 def step_size(h: float) -> float:
     """A step size: finite, and not 0."""
-    size = _number(h, "the step size h")
+    size = number(h, "the step size h")
     if size == 0:
         raise ValueError("the step size h must not be 0")
     return size
@@ -56,7 +56,7 @@ def step_size(h: float) -> float:
 
 def end(until: float, begin: float, h: float) -> float:
     """The span of time until an end, of the sign of the step."""
-    span = _number(until, "the time until") - begin
+    span = number(until, "the time until") - begin
     if span * h <= 0:
         raise ValueError(f"until = {until!r} is never reached from {begin!r} by steps of {h!r}")
     return span
@@ -78,7 +78,7 @@ def count(value: int, what: str, minimum: int, most: int = _MOST) -> int:
 def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -> float:
     """The time of a start, 0 by default. Without a time, t0 may be a parameter, which joins ``more``."""
     if t0 is None or interface.time:
-        return 0.0 if t0 is None else _number(t0, "the time t0")
+        return 0.0 if t0 is None else number(t0, "the time t0")
     if "t0" not in interface.parameters:
         raise TypeError(f"t0 was given, but the Hamiltonian of {interface.name} does not depend on the time")
     more["t0"] = t0
@@ -105,7 +105,7 @@ def increments(given: ArrayLike, interface: Interface) -> Floats:
     """The increments of the noise in some steps (steps, draws)."""
     if not interface.noise:
         raise TypeError(f"increments were given, but {interface.name} has no noise")
-    found = np.array(given, dtype=np.float64)
+    found = real(given, "increments")
     if found.ndim != 2 or found.shape[1] != interface.draws:
         raise ValueError(f"increments must have shape (steps, {interface.draws}), not {found.shape}")
     if not np.isfinite(found).all():
@@ -160,7 +160,7 @@ def parameters(interface: Interface, given: Mapping[str, float] | None, more: Ma
     asked = together(given, more)
     expect_known(asked, interface.parameters)
     for name, value in asked.items():
-        values[name] = _number(value, f"parameter {name!r}")
+        values[name] = number(value, f"parameter {name!r}")
         if name in interface.positive and values[name] <= 0:
             raise ValueError(f"parameter {name!r} must be positive, not {_shown(value)}")
     return values
@@ -212,13 +212,13 @@ def ensemble(
     begin: Floats = np.asarray(start_time(alone, interface, plain[1]))
     values = {name: np.asarray(value) for name, value in parameters(interface, *plain).items()}
     for name in own.keys() & values.keys():
-        values[name] = _array(own[name], f"parameter {name!r}", shape)
+        values[name] = array(own[name], f"parameter {name!r}", shape)
         if name in interface.positive and not (values[name] > 0).all():
             m = int(np.argmin(values[name] > 0))
             raise ValueError(f"parameter {name!r} must be positive, not {float(values[name][m])}, as of member {m}")
     if alone is not t0 and interface.time:
-        begin = _array(t0, "the times t0", shape)  # type: ignore[arg-type]
-    size = _array(h, "the step size h", shape) if np.ndim(h) > 0 else np.asarray(step_size(h))  # type: ignore[arg-type]
+        begin = array(t0, "the times t0", shape)  # type: ignore[arg-type]
+    size = array(h, "the step size h", shape) if np.ndim(h) > 0 else np.asarray(step_size(h))  # type: ignore[arg-type]
     if not size.all():
         raise ValueError("the step size h must not be 0")
     stride = 0 if stride is None else count(stride, "stride", 1)
@@ -230,16 +230,7 @@ def ensemble(
 
 def states(x: ArrayLike, what: str, interface: Interface) -> Floats:
     """States (…, DIM), a copy: what the caller does to his array later is his affair."""
-    if np.iscomplexobj(x):
-        raise TypeError(f"{what} must be real")
-    try:
-        if np.asarray(x).dtype.kind in "SU":
-            raise TypeError("texts are none")
-        found = np.array(x, dtype=np.float64)
-    except OverflowError:
-        raise ValueError(f"{what} must be finite, but a number in it is too large") from None
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"{what} must be an array of numbers: {error}") from None
+    found = real(x, what)
     names = interface.coordinates
     if found.ndim == 0 or found.shape[-1] != len(names):
         last = f"{len(names)} ({', '.join(names)})"
@@ -257,8 +248,8 @@ def firsts(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: 
         first(np.eye(1), None, interface)  # which says why there is none
     several = np.ndim(attitude0) > len(interface.attitude) if attitude0 is not None else False
     placed = position0 is not None and np.ndim(position0) > 1
-    turns = _array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
-    places = _array(position0, "position0", (members, 3)) if placed and interface.position else None  # type: ignore[arg-type]
+    turns = array(attitude0, "attitude0", (members, *interface.attitude)) if several else None  # type: ignore[arg-type]
+    places = array(position0, "position0", (members, 3)) if placed and interface.position else None  # type: ignore[arg-type]
     begin = np.empty((members, interface.element))
     identity = np.eye(interface.attitude[0])[0] if len(interface.attitude) == 1 else np.eye(interface.attitude[0])
     for m in range(members):
@@ -280,22 +271,19 @@ def first(attitude0: ArrayLike | None, position0: ArrayLike | None, interface: I
             raise TypeError(f"{interface.name} has no {what[:-1]}: {where}")
     shape = interface.attitude
     start = np.eye(shape[0]) if len(shape) == 2 else np.eye(4)[0]
-    attitude = start if attitude0 is None else _array(attitude0, "attitude0", shape)
+    attitude = start if attitude0 is None else array(attitude0, "attitude0", shape)
     if len(shape) == 1:
         if not attitude.any():
             raise ValueError("attitude0 must not be 0")
         attitude = attitude / np.abs(attitude).max()
         attitude /= np.sqrt(attitude @ attitude)
-    place = np.zeros(3) if position0 is None else _array(position0, "position0", (3,))
+    place = np.zeros(3) if position0 is None else array(position0, "position0", (3,))
     return np.concatenate([attitude.ravel(), place]) if interface.position else attitude.ravel()
 
 
-def _array(given: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
+def array(given: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
     """A copy of an array of finite numbers of that shape."""
-    try:
-        found = np.array(given, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise TypeError(f"{what} must be an array of numbers: {error}") from None
+    found = real(given, what)
     if found.shape != shape:
         raise ValueError(f"{what} must have shape {shape}, not {found.shape}")
     if not np.isfinite(found).all():
@@ -303,7 +291,23 @@ def _array(given: ArrayLike, what: str, shape: tuple[int, ...]) -> Floats:
     return found
 
 
-def _number(value: float, what: str) -> float:
+def real(given: ArrayLike, what: str) -> Floats:
+    """A copy of an array of numbers: not of complex ones, whose imaginary parts would be lost, nor of texts."""
+    try:
+        kind = np.asarray(given).dtype.kind
+        if kind in "SU":
+            raise TypeError("texts are none")
+        if kind != "c":
+            return np.array(given, dtype=np.float64)
+    except OverflowError:
+        raise ValueError(f"{what} must be finite, but a number in it is too large") from None
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"{what} must be an array of numbers: {error}") from None
+    raise TypeError(f"{what} must be real")
+
+
+def number(value: float, what: str) -> float:
+    """A finite number."""
     if isinstance(value, str | bytes | bytearray):  # which float would read
         raise TypeError(f"{what} must be a number, not {_shown(value)}")
     try:

@@ -87,10 +87,14 @@ def pullback(
         raise ValueError(f"x0 must have shape {shapes}, not {start.shape}")
     steps, rest = arguments.count(steps, "steps", 0), dict(given)
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
+    own = [v for v in (h, t0, *rest.values()) if np.ndim(v) > 0] if start.ndim == 1 else []
+    if own:
+        start = np.tile(start, (len(own[0]), 1))
     several = start.reshape(-1, interface.dimension)
     members = arguments.ensemble(several, h, steps, width, t0, {}, rest, interface)
     rows = len(row_steps(steps, width))
-    bars = cotangents(cotangent, start.shape if stride is None else (rows, *start.shape)).reshape(-1, *several.shape)
+    bars = cotangents(cotangent, start.shape if stride is None else (rows, *start.shape))
+    bars = bars.reshape(1 if stride is None else rows, *several.shape)
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *several.shape)), bars])
     try:
@@ -103,7 +107,7 @@ def pullback(
         if start.ndim == 1:
             error.members = ()
         raise solver.failure(error, size, None, values) from error
-    states = states.reshape(-1, *start.shape)
+    states = states.reshape(rows, *start.shape)
     each = zip(members.parameters.items(), found, strict=True)
     bars_of = {name: bar if np.ndim(value) else bar.sum() for (name, value), bar in each}
     return Pullback(states[-1] if stride is None else states, x0_bar.reshape(start.shape), bars_of)
@@ -111,7 +115,7 @@ def pullback(
 
 def cotangents(cotangent: ArrayLike, shape: tuple[int, ...]) -> Floats:
     """Cotangents as an array of a shape. Raises `ValueError` for other shapes, and what is not finite."""
-    bars = np.array(cotangent, dtype=np.float64)
+    bars = arguments.real(cotangent, "cotangent")
     if bars.shape != shape:
         raise ValueError(f"cotangent must have shape {shape}, that of the states, not {bars.shape}")
     if not np.isfinite(bars).all():

@@ -323,6 +323,8 @@ class NumpySolver:
             raise MissingExtraError("pullback")
         x0, own = members.x0, members.parameters
         self._expect_admissible(x0, own)
+        if not len(members):
+            return np.empty_like(bars), np.empty_like(x0), np.empty((len(self.interface.parameters), 0))
         options: dict[str, Any] = {"t0": members.t0} if self.interface.time else {}
         options |= {"gauge": self._gauge} if self._gauge is not None else {}
         try:

@@ -376,7 +376,8 @@ class Solver(Named[Backend, Interface]):
         """The state after ``steps`` steps, and the derivatives of its product with a ``cotangent``: (x1, x0_bar,
         parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters.
 
-        ``x0`` is (DIM,) or (members, DIM), x1 and the cotangent have its shape. With a ``stride``, x1 are all rows of
+        ``x0`` is (DIM,) or (members, DIM), x1 and the cotangent have its shape; a state (DIM,) is that of all members
+        where there are several parameters, and is derived along by each. With a ``stride``, x1 are all rows of
         `integrate`, (rows, …), and so is the cotangent. Parameters, h and t0 are numbers, or (members,); of a number
         that all members share, the derivative is the sum over members. ``threads`` are as for `ensemble`. All is exact
         to round-off for the steps as they are made: the choice of a gauge is held fixed, that of e = −H(x0) with a
@@ -402,7 +403,9 @@ class Solver(Named[Backend, Interface]):
         These are (DIM, DIM), row i of x_i, and (DIM,) for each parameter, by name. One `pullback` for each coordinate,
         with what is said there. Raises the same.
         """
-        start = arguments.state(x0, "x0", self.interface)
+        start, h = arguments.state(x0, "x0", self.interface), arguments.step_size(h)
+        for name, value in arguments.together(parameters, more).items():
+            arguments.number(value, f"parameter {name!r}")
         given: dict[str, Any] = {"t0": t0, "parameters": parameters, **more}
         rows = [self.pullback(start, h, steps, side, **given) for side in np.eye(len(start))]
         names = rows[0].parameters_bar

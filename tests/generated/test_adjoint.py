@@ -257,6 +257,20 @@ def test_members_and_their_parameters_have_cotangents(target):
     assert together.parameters_bar["I2"] == pytest.approx(sum(e.parameters_bar["I2"] for e in apart), abs=1e-14)
 
 
+@pytest.mark.parametrize("target", TARGETS)
+def test_one_start_is_that_of_all_members_and_there_may_be_none(target):
+    made, x = solver(compilation("newton"), target), start("newton")
+    bar, masses = weights((3, 3)), np.array([1.5, 2.0, 2.5])
+    one, each = (made.pullback(begin, H, STEPS, bar, I2=masses) for begin in (x, np.tile(x, (3, 1))))
+    assert all(np.array_equal(a, b) for a, b in zip(one[:2], each[:2], strict=True))
+    assert np.array_equal(one.parameters_bar["I2"], each.parameters_bar["I2"])
+    none = np.empty((0, 3))
+    x1, x0_bar, found = made.pullback(none, H, STEPS, none, I2=np.empty(0))
+    assert (x1.shape, x0_bar.shape, found["I2"].shape, found["I3"]) == ((0, 3), (0, 3), (0,), 0)
+    rows = made.pullback(none, H, 4, np.empty((3, 0, 3)), stride=2).x1
+    assert rows.shape == (3, 0, 3)
+
+
 @pytest.mark.parametrize("kind", ["newton, time", "splitting, monitor", "path, time, composed", "kicks, time"])
 def test_members_are_what_each_is_alone_in_any_number_of_threads(kind, monkeypatch):
     """Those that are not in lanes. Steps, parameters and times of their own; long runs are those of segments."""
@@ -381,6 +395,11 @@ def test_what_cannot_be_pulled_back_is_told(target):
             made.pullback(x, H, 2, np.ones(shape))
     with pytest.raises(ValueError, match="finite"):
         made.pullback(x, H, 2, [1, np.nan, 1])
+    for bar, why in ((x + 1j, "real"), (["1", "2", "3"], "array of numbers"), ([[1, 2], 3, 4], "array of numbers")):
+        with pytest.raises(TypeError, match=f"cotangent must be.*{why}"):
+            made.pullback(x, H, 2, bar)
+    with pytest.raises(TypeError, match="'I2' must be a number"):
+        made.jacobian(x, H, 2, I2=[1.0])
     with pytest.raises(ValueError, match=r"'I2' must have shape \(1,\)"):
         made.pullback([x], H, 2, [x], I2=[1, 2])
     with pytest.raises(TypeError, match="unknown parameter"):
