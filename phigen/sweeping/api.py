@@ -17,6 +17,8 @@ from phigen import resources
 from phigen import spec as specs
 from phigen.api import _spec_of
 from phigen.geometry.system import System
+from phigen.runtime import arguments
+from phigen.spec import limits
 from phigen.spec.model import Axis, Run, Spec, Sweep
 from phigen.spec.names import KEPT, SWEEP_NAMES
 from phigen.spec.runs import with_step
@@ -106,15 +108,31 @@ def _run_of(
     if found is None and (initial is None or h is None or steps is None):
         raise TypeError("the spec has no runs: initial, h and steps are needed")
     found = found or Run("run", (), Fraction(1), 1)
-    given: dict[str, Any] = {} if initial is None else {"initial": tuple(Fraction(float(v)) for v in initial)}
-    given |= {} if steps is None else {"steps": steps, "duration": None, "until": None}
+    given: dict[str, Any] = {} if initial is None else {"initial": tuple(map(Fraction, _numbers(initial, "initial")))}
+    if steps is not None:
+        given |= {"steps": arguments.count(steps, "steps", 1, limits.STEPS), "duration": None, "until": None}
     if parameters:
-        given["parameters"] = {**found.parameters, **{n: Fraction(float(v)) for n, v in parameters.items()}}
+        given["parameters"] = {**found.parameters, **_parameters(spec, parameters)}
     found = replace(found, **given)
-    found = found if h is None else with_step(found, Fraction(float(h)))
+    found = found if h is None else with_step(found, Fraction(arguments.step_size(h)))
     if len(found.initial) != len(spec.coordinates) and not spec.lattice:
         raise ValueError(f"initial has {len(found.initial)} values for {len(spec.coordinates)} coordinates")
     return found
+
+
+def _parameters(spec: Spec, given: Mapping[str, float]) -> dict[str, Fraction]:
+    """Values of parameters that are the same for all members."""
+    arguments.expect_known(given, {p.name: 0.0 for p in spec.parameters})
+    values = {name: arguments.number(value, f"parameter {name!r}") for name, value in given.items()}
+    for p in spec.parameters:
+        if p.positive and values.get(p.name, 1.0) <= 0:
+            raise ValueError(f"parameter {p.name!r} must be positive, not {values[p.name]}")
+    return {name: Fraction(value) for name, value in values.items()}
+
+
+def _numbers(given: Any, what: str) -> list[float]:
+    """A list of finite numbers."""
+    return arguments.array(given, what, (len(given),) if np.ndim(given) else (1,)).tolist()  # type: ignore[no-any-return]
 
 
 def _sweep_of(
@@ -133,11 +151,13 @@ def _sweep_of(
     found = found or Sweep("sweep", run.name)
     given: dict[str, Any] = {"run": run.name}
     if over is not None:
-        words = {key: over[key] for key in ("random", "seed", "file") if isinstance(over.get(key), int | str)}
+        words = _words(over, spec)
         axes = tuple(_axis(key, value, spec) for key, value in over.items() if key not in words)
         given |= {"over": axes, "random": 0, "seed": 0, "file": "", **words}
-    given |= {} if keep is None else {"keep": tuple(keep)}
-    given |= {} if frames is None else {"frames": frames}
+    if isinstance(keep, str):
+        raise TypeError(f"keep must be a list of names, [{keep!r}], not {keep!r}")
+    given |= {} if keep is None else {"keep": tuple(dict.fromkeys(keep))}
+    given |= {} if frames is None else {"frames": arguments.count(frames, "frames", 0)}
     found = replace(found, **given)
     if end := end_of_its_own(found, run, monitored=spec.monitor is not None):
         raise ValueError(f"{end}; give it steps in place of that")
@@ -153,8 +173,27 @@ def _sweep_of(
         raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")
     if found.random and len(drawn) < len(found.over):
         raise ValueError("over: random members are drawn, so there are no counts and no lists")
-    if not (found.random or found.file or prod(axis.size or 1 for axis in found.over)):
+    if found.file and (found.over or found.random):
+        raise ValueError("over: a file has all values; it stands alone")
+    if not (found.over or found.file):
         raise ValueError("over: there is nothing to vary")
+    members = found.random or prod(axis.size for axis in found.over if axis.size)
+    if members > limits.SWEPT:
+        raise ValueError(f"over: {members} members, the limit is {limits.SWEPT}")
+    return found
+
+
+def _words(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
+    """What ``over`` says besides ranges; these names may be those of parameters too, of which there are ranges."""
+    if not isinstance(over, Mapping):
+        raise TypeError(f"over must map names to ranges or lists, not {over!r}")
+    parameters = {p.name for p in spec.parameters}
+    found: dict[str, Any] = {}
+    for key, least, most in (("random", 1, limits.SWEPT), ("seed", 0, 2**63 - 1)):
+        if key in over and key not in parameters and not (key == "seed" and isinstance(over[key], Mapping)):
+            found[key] = arguments.count(over[key], f"over: {key}", least, most)
+    if "file" in over and "file" not in parameters:
+        found["file"] = fspath(over["file"])
     return found
 
 
@@ -165,9 +204,24 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
     if name == "start" and name not in known[: -len(SWEEP_NAMES)] and not spec.time:
         raise ValueError("over: start: this system has no time")
     if isinstance(value, Mapping):
-        ends = (float(value.get("from", 0)), float(value.get("to", 0)))
-        return Axis(name, (), ends, int(value.get("count", 0)), str(value.get("scale", "linear")))
-    values = np.asarray(value, dtype=np.float64)
-    if values.ndim != 1 or not values.size or not np.isfinite(values).all():
+        return _range(name, value)
+    values = _numbers(value, f"over: {name}") if np.ndim(value) else []
+    if not values:
         raise ValueError(f"over: {name} must be a range, or a list of finite numbers")
-    return Axis(name, tuple(values.tolist()))
+    return Axis(name, tuple(values))
+
+
+def _range(name: str, value: Mapping[str, Any]) -> Axis:
+    """The axis of a range in words."""
+    needed = () if name == "seed" else ("from", "to")
+    for word in (*value, *needed):
+        if word not in ("from", "to", "count", "scale") or word not in value:
+            raise ValueError(f"over: {name} needs from and to, and may have count and scale, not {dict(value)!r}")
+    first, last = (arguments.number(value.get(end, 0), f"over: {name}: {end}") for end in ("from", "to"))
+    count = arguments.count(value["count"], f"over: {name}: count", 1, limits.SWEPT) if "count" in value else 0
+    scale = value.get("scale", "linear")
+    if scale not in ("linear", "log"):
+        raise ValueError(f"over: {name}: scale must be linear or log, not {scale!r}")
+    if scale == "log" and min(first, last) <= 0:
+        raise ValueError(f"over: {name} on a logarithmic scale reaches {min(first, last):g}")
+    return Axis(name, (), (first, last), count, scale)

@@ -190,6 +190,36 @@ def test_runs_that_do_not_end_with_the_same_whole_step_are_refused(spec, end, ov
         phigen.sweep(run, over={"step": [0.1, 0.2]})
 
 
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"parameters": {"I9": 1}}, "unknown parameter 'I9'"),
+        ({"parameters": {"I2": np.nan}}, "'I2' must be finite"),
+        ({"initial": [0, np.nan, 0]}, "initial must be finite"),
+        ({"initial": "abc"}, "initial must be an array of numbers"),
+        ({"h": 0}, "must not be 0"),
+        ({"steps": -1}, "steps must be at least 1"),
+        ({"frames": -1}, "frames must be at least 0"),
+        ({"keep": "final"}, "keep must be a list"),
+        ({"over": ["I2"]}, "over must map names"),
+        ({"over": {}}, "nothing to vary"),
+        ({"over": {"I2": {"form": 1, "to": 2, "count": 3}}}, "I2 needs from and to"),
+        ({"over": {"I2": {"from": 1, "to": np.inf, "count": 3}}}, "I2: to must be finite"),
+        ({"over": {"I2": {"from": 1, "to": 2, "count": -3}}}, "I2: count must be at least 1"),
+        ({"over": {"I2": {"from": 1, "to": 2, "count": 3, "scale": "lgo"}}}, "linear or log"),
+        ({"over": {"I2": {"from": 0, "to": 2, "count": 3, "scale": "log"}}}, "logarithmic scale reaches 0"),
+        ({"over": {"I2": [1, 2j]}}, "I2 must be real"),
+        ({"over": {"random": 5.0, "I2": {"from": 1, "to": 2}}}, "random must be an integer"),
+        ({"over": {"random": 5, "seed": -1, "I2": {"from": 1, "to": 2}}}, "seed must be at least 0"),
+        ({"over": {"file": "members.csv", "I2": [1]}}, "stands alone"),
+        ({"over": {n: {"from": 1, "to": 2, "count": 10**6} for n in ("I2", "I3")}}, "members, the limit is"),
+    ],
+)
+def test_what_cannot_be_swept_is_told_before_anything_is_started(given, said):
+    with pytest.raises((TypeError, ValueError), match=said):
+        phigen.sweep("rigid_body", **{"over": {"I2": [1, 2]}, **given})
+
+
 @pytest.mark.slow
 def test_killed_workers_cost_no_member(spec, cluster, tmp_path, small_chunks):
     """Workers are killed at random while they are at work; the result is that of one ensemble."""
