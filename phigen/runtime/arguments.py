@@ -119,6 +119,16 @@ def expect_no_noise(what: str, interface: Interface) -> None:
         raise TypeError(f"{what} is not offered with noise: parts of a step are not on the same path")
 
 
+def times_within(times: ArrayLike, t: Floats) -> Floats:
+    """The times (times,) that were asked for, of a trajectory with rows at ``t``; `ValueError` for others."""
+    wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
+    low, high = sorted((float(t[0]), float(t[-1])))
+    slack = 1e-9 * (high - low)
+    if wanted.ndim != 1 or not ((wanted >= low - slack) & (wanted <= high + slack)).all():
+        raise ValueError(f"times must be numbers between {low!r} and {high!r}")
+    return wanted
+
+
 def rows_at(t: Floats, x: Floats, wanted: Floats) -> Floats:
     """The rows of ``x`` (rows, DIM) at some of the times ``t``, where others are not on the path: `ValueError`."""
     nearest = np.argmin(np.abs(t[:, np.newaxis] - wanted), axis=0)

@@ -30,6 +30,7 @@ from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream
 from phigen.runtime.live import LiveLattice
 from phigen.runtime.memory import expect_room
 from phigen.runtime.named import Named
+from phigen.runtime.timed import advance_by
 from phigen.writing import replacing
 
 if TYPE_CHECKING:
@@ -215,6 +216,13 @@ class LatticeTrajectory:
         if coordinate not in self.coordinates:
             raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
         return self.x[:, self.coordinates.index(coordinate)]
+
+    def at(self, times: ArrayLike) -> Floats:
+        """The states (times, coordinates, *sizes) at given times, by steps of the same method from the nearest frame.
+
+        As `phigen.Trajectory.at`; raises the same.
+        """
+        return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
         """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h and parameter_NAME) or the frames as ``.npy``."""
@@ -457,6 +465,23 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         return LiveLattice(self, self.started(at), at)
 
     # --- what is seen
+
+    def states_at(self, trajectory: LatticeTrajectory, times: Floats) -> Floats:
+        """The states of a trajectory of this solver at given times; see `LatticeTrajectory.at`."""
+        t, x = trajectory.t, trajectory.x
+        if self.interface.noise:
+            return arguments.rows_at(t, x, times)
+        found = np.empty((len(times), *x.shape[1:]))
+        for k, time in enumerate(times.tolist()):
+            row = int(np.argmin(np.abs(t - time)))
+            begin = float(t[row]) if self.interface.time else 0.0
+            session = self.started(Beginning(np.array(x[row]), trajectory.h, trajectory.parameters, begin))
+            try:
+                advance_by(time - float(t[row]), trajectory.h, session.advance)
+            except BackendError as error:
+                raise self.failure(error, trajectory.h, None, trajectory.parameters) from error
+            found[k] = session.state()
+        return found
 
     def hamiltonian(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any

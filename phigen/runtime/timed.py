@@ -154,14 +154,22 @@ def states_at(place: Callable[[int], Session], t: Floats, x: Floats, h: float, t
     return states
 
 
+def advance_by(span: float, h: float, advance: Callable[[float, int], object]) -> None:
+    """Steps for the time ``span``, whole ones of h as far as they go, where steps are equal in time."""
+    step = float(np.copysign(h, span))
+    whole = _whole_steps(step, span)
+    advance(step, whole)
+    left = span - whole * step
+    if abs(left) > EQUAL * abs(span):
+        advance(left, 1)
+
+
 def _from(session: Session, h: float, span: float) -> Session:
     """The session after the time ``span``, in whole steps as far as they go."""
     step = np.copysign(h, span)
     if not np.isfinite(session.time()):
-        whole = _whole_steps(step, span)
-        session.advance(step, whole)
-        left = span - whole * step
-        return reached(session, step, left)[0] if abs(left) > EQUAL * abs(span) else session
+        advance_by(span, h, session.advance)
+        return session
     while True:
         copy = session.branch()
         try:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from phigen.runtime import arguments
 from phigen.runtime.interface import Floats, Interface
 from phigen.runtime.tables import Column, write
 from phigen.targets.names import identifiers
@@ -108,12 +109,7 @@ class Trajectory:
         """
         if self.solver is None:
             raise TypeError("this trajectory was not made by a solver of phigen")
-        wanted = np.atleast_1d(np.asarray(times, dtype=np.float64))
-        low, high = sorted((float(self.t[0]), float(self.t[-1])))
-        slack = 1e-9 * (high - low)
-        if wanted.ndim != 1 or not ((wanted >= low - slack) & (wanted <= high + slack)).all():
-            raise ValueError(f"times must be numbers between {low!r} and {high!r}")
-        return self.solver.states_at(self, wanted)
+        return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
         """Write a file by the suffix of the path; raises `ValueError` for any other.

@@ -135,6 +135,37 @@ def test_c_makes_the_steps_of_numpy_and_goes_on_with_the_same_bits(name: str, tm
     assert again.x.tobytes() == run.x.tobytes()
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+def test_states_at_times_are_steps_from_the_nearest_frame_at_its_time(target: str) -> None:
+    x, values = given("driven")
+    found, h, asked = solver("driven", 4, target), 0.1, {"parameters": values}
+    run, every = (found.integrate(x, h, 10, stride, t0=T0, **asked) for stride in (4, 1))
+    times = T0 + np.array([0.0, 0.3, 0.83, 1.0, 0.57])
+    states = run.at(times)
+    assert states.shape == (5, *x.shape)
+    np.testing.assert_allclose(states[[0, 3]], run.x[[0, -1]], rtol=0, atol=0)
+    np.testing.assert_allclose(states[1], every.x[3], rtol=0, atol=1e-13)  # a step back from the frame at 0.4
+    np.testing.assert_allclose(states[2], found.step(run.x[2], 0.03, t0=T0 + 0.8, **asked), rtol=0, atol=1e-14)
+    after = found.step(found.step(run.x[1], h, t0=T0 + 0.4, **asked), 0.07, t0=T0 + 0.5, **asked)
+    np.testing.assert_allclose(states[4], after, rtol=0, atol=1e-14)
+    with pytest.raises(ValueError, match=r"between 0\.7 and 1\.7"):
+        run.at(2.0)
+
+
+def test_states_at_times_go_back_too_and_with_noise_are_frames() -> None:
+    x, values = given("driven")
+    back = solver("driven", 4).integrate(x, -0.1, 5, 5, t0=T0, parameters=values)
+    np.testing.assert_allclose(
+        back.at(T0 - 0.02)[0], solver("driven", 4).step(x, -0.02, t0=T0, parameters=values), rtol=0, atol=1e-14
+    )
+    noise = "noise: {n: {hamiltonian: z}}"
+    text = f'phigen: 1\nname: bath\nlattice: {{axes: [i]}}\n{SPINS}hamiltonian: "x*x[i+1]"\n{noise}\n'
+    noisy = lattice_solver_of(compile_spec(specs.loads(text)), "numpy").integrate(x, 0.1, 4, 2, seed=1)
+    np.testing.assert_array_equal(noisy.at([0.2, 0.0]), noisy.x[[1, 0]])
+    with pytest.raises(ValueError, match="with noise only states that are stored"):
+        noisy.at(0.1)
+
+
 def test_sweeps_by_hand_know_the_time() -> None:
     x, values = given("driven")
     found = solver("driven", 4, "c")
