@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.lowering import expand_powers, with_numbers_shared
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
 from phigen.scheme.steps import Splitting
@@ -31,8 +32,7 @@ def _undoing(flow: Kernel, back: Kernel, parities: Mapping[str, int]) -> Kernel:
     state, changes = flow.inputs["state"], flow.outputs[0].values
     turned = dict(zip(state, turned_back(changes, parities), strict=True))
     moved = {s: change for s, change in turned.items() if not change.is_zero}
-    values = iter(before(back.roots, moved))
-    outputs = [replace(o, values=tuple(next(values) for _ in o.values)) for o in back.outputs]
-    return replace(
-        back, outputs=(*outputs, Output(UNDONE, tuple(symbol(s) + moved[s] if s in moved else ZERO for s in state)))
-    )
+    found = before(back.roots, moved) + [symbol(s) + moved[s] if s in moved else ZERO for s in state]
+    values = iter(with_numbers_shared(expand_powers(found)))
+    outputs = (*back.outputs, Output(UNDONE, tuple(ZERO for _ in state)))
+    return replace(back, outputs=tuple(replace(o, values=tuple(next(values) for _ in o.values)) for o in outputs))

@@ -6,6 +6,7 @@ long sub-expressions become temporaries). The result is a list of trees over sym
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -91,6 +92,31 @@ def _cost(e: Expression) -> int:
     return FUNCTIONS[e.op].cost if e.op in FUNCTIONS else COST[e.op]
 
 
+def with_numbers_shared(roots: Sequence[Expression]) -> list[Expression]:
+    """The roots with ½(ab) and ½(ac) as (½a)b and (½a)c, where that takes fewer operations."""
+    roots = list(roots)
+    while True:
+        found = _numbers_moved(roots)
+        if cost(found) >= cost(roots):
+            return roots
+        roots = found
+
+
+def _numbers_moved(roots: Sequence[Expression]) -> list[Expression]:
+    """Every product of a number and a product with the number at that factor which most such products have."""
+    scaled = [e for e in topological(roots) if e.op == "mul" and e.args[0].is_number and e.args[1].op == "mul"]
+    counts = Counter((e.args[0], factor) for e in scaled for factor in e.args[1].args)
+    chosen = {e: int(counts[e.args[0], e.args[1].args[1]] > counts[e.args[0], e.args[1].args[0]]) for e in scaled}
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e not in chosen or counts[e.args[0], e.args[1].args[chosen[e]]] == 1:
+            return raw(e.op, tuple(args), e.value) if e.args else e
+        factor, other = args[1].args if chosen[e] == 0 else args[1].args[::-1]
+        return raw("mul", (raw("mul", (args[0], factor)), other))
+
+    return fold(roots, visit)
+
+
 def operation_counts(roots: Sequence[Expression]) -> dict[str, int]:
     """Additions, multiplications, divisions and function calls of the roots together."""
     counts = {"additions": 0, "multiplications": 0, "divisions": 0, "functions": 0}
@@ -147,4 +173,4 @@ def assign(
     return assignments, [trees[id(r)] for r in roots]
 
 
-__all__ = ["Assignment", "assign", "cost", "expand_powers", "operation_counts"]
+__all__ = ["Assignment", "assign", "cost", "expand_powers", "operation_counts", "with_numbers_shared"]

@@ -32,7 +32,7 @@ def printed(program: Program, step: Splitting) -> str:
         kernel, values = _flow(program, flow, k)
         text = function(program, kernel, functions=_functions(program))
         # With an element compilers would find it too long to be put into its only callers.
-        found.append(text.replace("\nstatic void", "\nstatic inline void") if more else text)
+        found.append(_linked(text, "static inline") if more else text)
         found.append(render("c", "flow.c", {**values, "more": more}))
     along = _along(program)
     arguments = f"const double *coef, double x[{along}], double moved[{along}], const double start[{along}]"
@@ -91,13 +91,20 @@ def adjoint_in_lanes(
     kernels, own = _transposed(program, step, back)
     found = []
     for kernel in kernels:
-        found.append(function(program, kernel, lanes=True, functions=near))
+        text = function(program, kernel, lanes=True, functions=near)
+        found.append(_linked(text, f"{program.name}_IN_PLACE static inline"))
         if reaches_far(kernel):
-            found.append(function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far))
+            text = function(program, replace(kernel, name=f"{kernel.name}_far"), lanes=True, functions=far)
+            found.append(_linked(text, f"{program.name}_APART static"))
     own["more"] = ", before" * any(len(kernel.outputs) > 2 for kernel in kernels)
     own["undone"] = any(len(kernel.outputs) > 2 for kernel in kernels)
     own["linear"] = not any(_read(kernel) for kernel in kernels)
     return [*found, render("c", "adjoint_flows_lanes.c", own)]
+
+
+def _linked(text: str, linkage: str) -> str:
+    """A function where compilers are told whether to put it into its only caller."""
+    return text.replace("\nstatic void", f"\n{linkage} void")
 
 
 def reaches_far(kernel: Kernel) -> bool:
