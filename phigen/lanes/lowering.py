@@ -153,9 +153,9 @@ def _of_steps(program: Program) -> Blocks | Packs | None:
             used = operations(step.flows)
             packs = _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
             kept = 2 * _DOUBLE * LANES**2 * program.dimension  # bytes of a segment of one pack
-            undone = undoing(program, step)
-            if undone:
-                return _with_back(packs and replace(packs, undone=True), undone, 0)
+            undone = undoing(program, step) if packs else ()
+            if packs and undone:
+                return _with_back(replace(packs, undone=True), undone, 0)
             return _with_back(packs, step.adjoint.steps if step.adjoint else (), kept)
     return None
 

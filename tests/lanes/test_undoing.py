@@ -68,6 +68,11 @@ def test_flows_are_undone_with_the_functions_that_their_transposes_call(name):
         assert Counter(e.op for e in calls(undone)) <= Counter(e.op for e in calls(flow) | calls(back))
 
 
+def test_monitored_flows_move_more_than_the_state_and_are_in_no_packs():
+    assert made("kepler_eccentric").monitor
+    assert in_lanes(made("kepler_eccentric")) is None
+
+
 def test_products_with_one_number_share_it():
     a, b, c = map(symbol, "abc")
     half = number(Fraction(1, 2))
