@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from itertools import product
 from math import prod
+from typing import Any
 
 from phigen.errors import SpecError
 from phigen.geometry.forms import algebra_of_form, poisson_matrix
@@ -374,4 +375,5 @@ def _run(spec: Spec, run: Run, names: _Names) -> Run:
     listed = {stem: Values(listed=tuple(v[s] for s in sorted(v))) for stem, v in arrays.items()}
     numbers = {n: v for n, v in run.parameters.items() if n not in names.sites}
     lattice = LatticeRun(names.sizes, state, (), listed)
-    return replace(run, initial=(), parameters=numbers, exact={}, section=None, lattice=lattice)
+    none: dict[str, Any] = {"exact": {}, "section": None, "until": None, "every": None, "stop": None}  # of lattices
+    return replace(run, initial=(), parameters=numbers, lattice=lattice, **none)

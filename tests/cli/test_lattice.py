@@ -97,6 +97,20 @@ def test_sizes_that_do_not_fit_say_so(phigen, lattice, sizes, code, message):
     assert (done.exit_code, message in " ".join(done.stderr.split())) == (code, True)
 
 
+def test_the_lattice_of_a_system_written_out_has_what_runs_of_lattices_have(phigen, tmp_path):
+    """Which end with whole steps, and store states after these."""
+    text = """phigen: 1
+name: ring
+coordinates: [q0, q1, q2, q3, p0, p1, p2, p3]
+poisson: {canonical: {q: [q0, q1, q2, q3], p: [p0, p1, p2, p3]}}
+hamiltonian: (p0**2 + p1**2 + p2**2 + p3**2)/2 + ((q1 - q0)**2 + (q2 - q1)**2 + (q3 - q2)**2 + (q0 - q3)**2)/2
+runs: {r: {initial: [1, 0, 0, 0, 0, 0, 0, 0], step: 0.1, until: 3.05, every: 0.5, stop: q0 + 9}}
+"""
+    (tmp_path / "ring.yaml").write_text(text, encoding="utf-8")
+    shown = loads(phigen("show", tmp_path / "ring.yaml", "--lattice").stdout)
+    assert shown.runs["r"].steps == 30
+
+
 def test_show_prints_the_lattice_of_a_system_written_out(phigen):
     shown = loads(phigen("show", "spin_chain5", "--lattice").stdout)
     assert shown.lattice.axes == ("i",)
