@@ -58,6 +58,8 @@ def end_of_its_own(found: Sweep, run: Run, *, monitored: bool) -> str:
     if run.stop is not None:
         return f"{said} where its stop: is met"
     moved = {"step", "start"} & {axis.name for axis in found.over}
+    if run.duration is not None and "step" in moved:
+        return f"{said} after the duration {float(run.duration):.9g}"
     if run.until is not None and (monitored or moved or whole((run.until - run.start) / run.step) is None):
         return f"{said} at the time {float(run.until):.9g}"
     return ""

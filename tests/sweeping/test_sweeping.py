@@ -175,6 +175,7 @@ def test_members_with_noise_take_the_seed_of_the_run_and_paths_of_their_own(clus
         ("steps: 60, stop: x2", "I2: [1, 2]", True),
         ("until: 6.05", "I2: [1, 2]", True),
         ("until: 6", "step: [0.1, 0.2]", True),
+        ("duration: 6", "step: [0.1, 0.2]", True),
         ("until: 6", "I2: [1, 2]", False),
     ],
 )
