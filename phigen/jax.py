@@ -40,9 +40,10 @@ def propagator(
     broadcast to (…); what is not given has its default. Results have the precision of x0, which is single unless
     ``jax_enable_x64`` is set. Under `vmap` members are those of one ensemble. A step that fails raises where the result
     is asked for. Derivatives are exact to round-off, and ask for a solver compiled with ``adjoint=True``: those of
-    `jax.grad` and `jax.vjp` take one run back. With ``forward`` they are of the tangent map, for `jax.jvp` and
-    `jax.jacfwd` too, one run back for each number of a result. Of a lattice DIM is (coordinates, *sizes), parameters at
-    sites have axes of theirs, and further arguments, such as ``bonds=``, are those of all its runs.
+    `jax.grad` and `jax.vjp` take one run back; those of `jax.jvp` and `jax.jacfwd` are by the tangent map, one run back
+    for each number of a result, as all are with ``forward``. Of a lattice, which has no tangent map here, DIM is
+    (coordinates, *sizes), parameters at sites have axes of theirs, and further arguments, such as ``bonds=``, are those
+    of all its runs.
     """
     made = Propagation(solver, h, steps, stride, t0, shared)
     shaped = partial(jax.pure_callback, vmap_method="broadcast_all")
@@ -64,6 +65,10 @@ def propagator(
 
     def moved(at: Any, directions: Any) -> Any:
         own, (x0, parameters), (along, changes) = _Own(made, *at), at, directions
+        if made.axes > 1:
+            return shaped(
+                made.jacobian, jax.ShapeDtypeStruct(made.shape(x0.shape), x0.dtype), *at
+            )  # which refuses them
         states = made.shape(x0.shape)
 
         def jacobian(x: Any, p: Any) -> Any:
@@ -79,19 +84,60 @@ def propagator(
             result = result + slopes * change.reshape(change.shape + (1,) * rows)
         return result
 
-    if forward:
-        run = jax.custom_jvp(called)
-        run.defjvp(lambda at, directions: (run(*at), moved(at, directions)))
-    else:
-        run = jax.custom_vjp(called)
-        run.defvjp(lambda *at: (called(*at), at), pulled)
+    def derived(at: Any, directions: Any) -> Any:
+        at = _derived_once(at)
+        if forward:
+            return moved(at, directions)
+        return _linear(lambda v: moved(at, v), lambda bar: pulled(at, bar), directions, made.shape(at[0].shape))
+
+    run = jax.custom_jvp(called)
+    run.defjvp(lambda at, directions: (run(*at), derived(at, directions)))
 
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
-        x = jnp.asarray(x0, dtype=jnp.result_type(float, x0))
-        made.expect(x.shape, parameters or {})
-        return run(x, {name: jnp.asarray(v, dtype=x.dtype) for name, v in (parameters or {}).items()})
+        x = _real(x0, "x0")
+        given = {
+            name: _real(value, f"parameter {name!r}").astype(x.dtype) for name, value in (parameters or {}).items()
+        }
+        made.expect(x.shape, {name: value.shape for name, value in given.items()})
+        return run(x, given)
 
     return propagate
+
+
+def _real(given: Any, what: str) -> Any:
+    """An array of real numbers of a precision of its own, of that of JAX if it has none."""
+    array = jnp.asarray(given)
+    if jnp.iscomplexobj(array):
+        raise TypeError(f"{what} must be real")
+    return array.astype(jnp.result_type(float, array))
+
+
+def _linear(apply: Callable[[Any], Any], transpose: Callable[[Any], Any], at: Any, shape: tuple[int, ...]) -> Any:
+    """A linear map at a place, of results of that shape, whose transpose is known.
+
+    JAX lets the transpose of a solution be given: here that of (u, y) = (v, A v), with nothing to solve.
+    """
+    zero = sum(0 * jnp.sum(leaf) for leaf in jax.tree.leaves(at))  # linear in v, as all that is solved for has to be
+    at, nothing = jax.tree.map(lambda leaf: leaf + zero, at), jnp.broadcast_to(zero, shape)
+
+    def solve(_: Any, right: Any) -> Any:
+        return right[0], apply(right[0])
+
+    def back(_: Any, bars: Any) -> Any:
+        return transpose(bars[1]), jnp.zeros_like(bars[1])
+
+    return jax.lax.custom_linear_solve(lambda v: v, (at, nothing), solve, back)[1]
+
+
+@jax.custom_jvp  # type: ignore[untyped-decorator]
+def _derived_once(at: Any) -> Any:
+    """The same; where it is differentiated, a derivative is."""
+    return at
+
+
+@_derived_once.defjvp  # type: ignore[untyped-decorator]
+def _derived_twice(*_: Any) -> Any:
+    raise TypeError("second derivatives of runs are not offered: a derivative of phigen.jax is differentiated")
 
 
 class _Own:

@@ -39,8 +39,8 @@ def propagator(
     made = Propagation(solver, h, steps, stride, t0, shared)
 
     def propagate(x0: Any, parameters: Mapping[str, Any] | None = None) -> Any:
-        made.expect(tuple(x0.shape), parameters or {})
         given = {name: torch.as_tensor(v, dtype=x0.dtype, device=x0.device) for name, v in (parameters or {}).items()}
+        made.expect(tuple(x0.shape), {name: tuple(value.shape) for name, value in given.items()})
         return _Run.apply(made, tuple(given), x0, *given.values())
 
     return propagate

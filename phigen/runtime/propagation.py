@@ -6,7 +6,7 @@ the leading axes.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,6 +38,11 @@ class Propagation:
     shared: Mapping[str, ArrayLike] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.solver, Solver | LatticeSolver):
+            raise TypeError(f"a propagator is that of a compiled solver, not of {self.solver!r}")
+        if isinstance(self.solver, Solver):
+            arguments.start_time(self.t0, self.solver.interface, {})
+            self.solver.values(self.shared, {})  # type: ignore[arg-type]
         arguments.step_size(self.h)
         arguments.count(self.steps, "steps", 0)
         if self.stride is not None:
@@ -64,11 +69,18 @@ class Propagation:
         """The shape of the result, by that of the start."""
         return start if self.stride is None else (*start[: -self.axes], self.rows, *start[-self.axes :])
 
-    def expect(self, start: tuple[int, ...], names: Iterable[str]) -> None:
-        """Raises `TypeError` and `ValueError` for arguments that no run can have."""
-        arguments.expect_known(names, self.solver.interface.parameters)
-        if not isinstance(self.solver, LatticeSolver) and start[-1:] != (self.solver.interface.dimension,):
+    def expect(self, start: tuple[int, ...], parameters: Mapping[str, tuple[int, ...]]) -> None:
+        """Raises `TypeError` and `ValueError` for shapes of arguments that no run can have, and for unknown names."""
+        arguments.expect_known(parameters, self.solver.interface.parameters)
+        if isinstance(self.solver, LatticeSolver):
+            return
+        if start[-1:] != (self.solver.interface.dimension,):
             raise ValueError(f"x0 must have shape (…, {self.solver.interface.dimension}), not {start}")
+        for name, shape in parameters.items():
+            lengths = zip(reversed(shape), reversed(start[:-1]), strict=False)
+            if len(shape) >= len(start) or any(own not in (1, length) for own, length in lengths):
+                members = f"{start[:-1]}, that of the members" if start[1:] else "()"
+                raise ValueError(f"parameter {name!r} must have a shape that broadcasts to {members}, not {shape}")
 
     def run(self, x0: ArrayLike, parameters: Values) -> Floats:
         """The states."""

@@ -92,13 +92,35 @@ def test_members_share_a_parameter_in_any_way(solver):
 
 
 @pytest.mark.slow
-def test_derivatives_both_ways_agree(solver):
-    back, forth = (propagator(solver, stride=3, forward=forward) for forward in (False, True))
+@pytest.mark.parametrize("forward", [False, True])
+def test_derivatives_both_ways_agree(solver, forward):
+    back, forth = (propagator(solver, stride=3, forward=towards) for towards in (False, forward))
     at, along = (X, 2.2), (jnp.array(0.1 * X[::-1]), 0.7)
     by_x, by_i2 = jax.grad(cubes(back), argnums=(0, 1))(*at)
     _, slope = jax.jvp(cubes(forth), at, along)
     assert close(slope, np.sum(by_x * along[0]) + by_i2 * along[1])
     assert close(jax.jit(jax.grad(cubes(forth)))(*at), by_x)
+
+
+def test_a_gradient_takes_one_run_back_and_a_jvp_the_tangent_map(solver, monkeypatch):
+    from phigen.runtime.propagation import Propagation
+
+    made, along = propagator(solver), jnp.array([0.3, -0.2, 0.5])
+    _, slope = jax.jvp(lambda x: made(x, {"I2": 2.2}), (X[0],), (along,))
+    assert close(slope, solver.jacobian(X[0], H, STEPS, I2=2.2).by_x0 @ along)
+    monkeypatch.delattr(Propagation, "jacobian")
+    x1 = solver.integrate(X[0], H, STEPS, I2=2.2).x[-1]
+    found = solver.pullback(X[0], H, STEPS, 3 * x1**2, I2=2.2)
+    by = jax.grad(lambda p: jnp.sum(made(X[0], p) ** 3))({"I2": 2.2, "I3": 3.0})
+    assert all(close(by[name], found.parameters_bar[name]) for name in by)
+    rows = jax.vmap(jax.vmap(jax.grad(cubes(made)), (None, 0)), (0, None))(X, jnp.array([1.8, 2.2]))
+    assert close(rows[0, 1], found.x0_bar)
+
+
+@pytest.mark.parametrize("forward", [False, True])
+def test_second_derivatives_are_refused(solver, forward):
+    with pytest.raises(TypeError, match="second derivatives of runs are not offered"):
+        jax.hessian(cubes(propagator(solver, forward=forward)))(X[0], 2.2)
 
 
 def test_failing_steps_raise(solver):
@@ -114,6 +136,26 @@ def test_arguments_of_no_run_are_told_by_the_call_itself(solver):
         run(X[0], {"I7": 2.0})
     with pytest.raises(ValueError, match=r"x0 must have shape \(…, 3\)"):
         run(X[0][:2])
+    for x, own in ((X, 3), (X[0], 1)):
+        with pytest.raises(ValueError, match="'I2' must have a shape that broadcasts"):
+            run(x, {"I2": np.ones(own)})
+    with pytest.raises(TypeError, match="x0 must be real"):
+        run(1j * X[0])
+    with pytest.raises(TypeError, match="'I2' must be real"):
+        run(X[0], {"I2": 1j})
+    with pytest.raises(TypeError, match="unknown parameter 'I7'"):
+        propagator(solver, I7=2.0)
+    with pytest.raises(TypeError, match="does not depend on the time"):
+        propagator(solver, t0=1.0)
+    with pytest.raises(TypeError, match="compiled solver"):
+        propagator("rigid_body")
+
+
+def test_members_may_be_none_and_states_lists(solver):
+    made = propagator(solver)
+    assert np.array_equal(made([1, 0.5, 0.3]), made(X[0] * 0 + np.array([1, 0.5, 0.3])))
+    by_x, by_i2 = jax.grad(cubes(made), argnums=(0, 1))(np.empty((0, 3)), 2.2)
+    assert (by_x.shape, float(by_i2)) == ((0, 3), 0)
 
 
 @pytest.mark.parametrize("stride", [None, 3])
