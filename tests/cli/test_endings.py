@@ -259,8 +259,11 @@ def test_noise_after_a_part_of_a_step_is_new(phigen, write):
     assert abs(drawn[-1] - drawn[-2]) > 1e-6
 
 
-def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, swing):
-    run = ("run", swing, "--run", "steps", "-t", "numpy", "--every", 0.07, "--until", 5.03, "-q")
+@pytest.mark.parametrize(
+    ("text", "end"), [(SWING, ("--until", 5.03)), pytest.param(BODY, ("--steps", 80), marks=pytest.mark.slow)]
+)
+def test_an_interrupted_run_with_given_times_goes_on_to_the_same_bytes(phigen, write, text, end):
+    run = ("run", write("spec.yaml", text), "-t", "numpy", "--every", 0.07, *end, "-q")
     assert phigen(*run, "-o", "a.csv").exit_code == 0
     with interrupted(2), pytest.MonkeyPatch.context() as patch:
         patch.setattr("phigen.runtime.march._MOST_ROWS", 9)
