@@ -176,6 +176,32 @@ static void phi_put(const phi_solver *s, double *rows, const double *values)
     }
 }
 
+#if PHI_SEAMS
+/* The kind of each site: its colour, and as many more for each seam that it is on. */
+static void phi_put_kinds(const phi_solver *s)
+{
+    PHI_EACH_ROW {
+        double *row = PHI_ROW_AT(s->kinds);
+        ptrdiff_t place[PHI_AXES];
+#if !PHI_ONE_ROW
+        phi_place(s, r, place);
+#endif
+        for (ptrdiff_t i = 0; i < s->length; ++i) {
+            int colour = 0, window = 0;
+            place[PHI_LAST_AXIS] = i;
+            for (int a = 0; a < PHI_AXES; ++a) {
+                colour += (int)(place[a] % PHI_COLOUR_COUNT) * phi_colours[a];
+                window |= (place[a] >= s->seams[a]) << a;
+            }
+            row[i] = window * PHI_COLOUR_COUNT + colour % PHI_COLOUR_COUNT;
+        }
+#if PHI_HALO
+        phi_ends(row, s->length, 0, s->length);
+#endif
+    }
+}
+
+#endif
 #if PHI_SITE_PARAMETERS
 /* The values of a parameter at sites, or one value for all. */
 static void phi_put_parameter(const phi_solver *s, double *rows, const double *values, double value)
@@ -368,6 +394,10 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
 #if PHI_COMPENSATED
     for (size_t k = 0; k < 2 * PHI_DIM; ++k, memory += block) s->carry[k] = memory;
     phi_forget(s);
+#endif
+#if PHI_SEAMS
+    s->kinds = memory;
+    phi_put_kinds(s);
 #endif
 #if PHI_SITE_PARAMETERS
     phi_put_parameters(s, &own);

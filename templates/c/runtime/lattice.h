@@ -31,6 +31,7 @@ typedef struct {
 #if PHI_SEAMS
     ptrdiff_t seams[PHI_AXES]; /* along each axis the first site of the seam; that behind the last where there is none */
     ptrdiff_t inside[2];      /* of a row the first site away from the seam, and that behind the last */
+    double *kinds;            /* of each site, in rows: its colour, and the seams that it is on */
 #endif
     double *x[PHI_ARRAYS];    /* in rows, each field, then each parameter at sites: the first site of the first row */
 #if !PHI_ONE_ROW

@@ -39,10 +39,9 @@ typedef struct {
 #endif
 #endif
 #if PHI_SEAMS
-    int window;                   /* the seams, as bits of their axes, that terms begin on which move sites near them */
+    double window;                /* the first kind, see phi_solver, of those that terms begin on which move sites near seams */
 #if !PHI_ONE_ROW
-    int whole;                    /* whether it is away from those along all other axes */
-    ptrdiff_t place[PHI_AXES];    /* of its first site */
+    int near;                     /* the other axes along which it is near a seam, as bits */
 #endif
 #endif
 #if PHI_COLOURS
@@ -76,27 +75,6 @@ static ptrdiff_t phi_first(const phi_row *row, int colour, ptrdiff_t from)
         if ((row->colour + (int)(i % PHI_COLOUR_COUNT) * PHI_COLOUR_STRIDE) % PHI_COLOUR_COUNT == colour) return i;
 #endif
     return row->to;
-}
-
-#endif
-#if PHI_SEAMS
-/* 1 if the site at an offset from that at i, see phi_wanted, has a colour and is on just those seams, else 0. */
-static inline double phi_begins(const phi_row *row, int wanted, ptrdiff_t i)
-{
-    int window = 0, colour = 0;
-    for (int a = 0; a < PHI_AXES; ++a) {
-        const ptrdiff_t size = (ptrdiff_t)row->s->sizes[a];
-#if PHI_ONE_ROW
-        ptrdiff_t at = i + phi_wanted[wanted][a];
-#else
-        ptrdiff_t at = (a == PHI_AXES - 1 ? i : row->place[a]) + phi_wanted[wanted][a];
-#endif
-        if (at < 0) at += size;
-        if (at >= size) at -= size;
-        if (at >= row->s->seams[a]) window |= 1 << a;
-        colour += (int)(at % PHI_COLOUR_COUNT) * phi_colours[a];
-    }
-    return window == row->window && colour % PHI_COLOUR_COUNT == phi_wanted[wanted][PHI_AXES] ? 1.0 : 0.0;
 }
 
 #endif
@@ -161,7 +139,7 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
     row.chosen = 0;
 #endif
 #if PHI_SEAMS
-    row.window = 0;
+    row.window = 0.0;
 #endif
 #if PHI_COLOURS
 #if !PHI_ONE_ROW
@@ -194,11 +172,10 @@ static inline phi_row phi_piece_of(const phi_solver *s, size_t index)
     for (int a = 0; a < PHI_AXES - 1; ++a) row.colour = (int)((row.colour + place[a] * phi_colours[a]) % PHI_COLOUR_COUNT);
 #endif
 #if !PHI_ONE_ROW && PHI_SEAMS
-    row.whole = 1;
-    memcpy(row.place, place, sizeof place);
+    row.near = 0;
     for (int a = 0; a < PHI_AXES - 1; ++a) {
         const ptrdiff_t near = s->seams[a] < (ptrdiff_t)s->sizes[a] ? phi_seams[a][2] : 0;
-        row.whole = row.whole && place[a] >= near && place[a] < s->seams[a] - near;
+        if (place[a] < near || place[a] >= s->seams[a] - near) row.near |= 1 << a;
     }
 #endif
     return row;

@@ -29,7 +29,16 @@ from phigen.targets.c.lattice.layout import Layout, givers, handed_apart, layout
 from phigen.targets.c.lattice.loops import Loop, forms_of
 from phigen.targets.c.lattice.partners import gathering
 from phigen.targets.c.lattice.partners_back import gathering_back
-from phigen.targets.c.lattice.parts import Case, at, beside_seams, call_forms, calls_over_sites, either, over_rows
+from phigen.targets.c.lattice.parts import (
+    Case,
+    at,
+    beside_seams,
+    call_forms,
+    calls_over_sites,
+    either,
+    first_kind,
+    over_rows,
+)
 from phigen.targets.rendering import render
 
 
@@ -133,7 +142,7 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
             alike = len(ends) == 1 and ends[0][0].of_all
             own, undo = (alike and apart(kernel)) or (kernel, None)
             before = tuple(_gathered(program, layout, sweep)) if _reads_sums(own) else ()
-            before += (f"row.window = {sweep.window};",) if sweep.window is not None else ()
+            before += (f"row.window = {first_kind(layout, sweep)}.0;",) if sweep.window is not None else ()
             if taken:
                 own = replace(own, name=f"{own.name}_after{after + 1}")
             pulled.append(_Pulled(own, seeds, sweep.gather, ends, before, moved, undo, taken, beside_seams(sweep)))

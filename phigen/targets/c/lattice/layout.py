@@ -109,6 +109,7 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     """The layout of a lattice."""
     sites = step.sites
     offsets = [offset for _, offset in sites.places.values()]
+    offsets += [tuple(map(int, s.key[1:])) for s in lattice.begins(step)]
     offsets += [tuple(-o for o in offset) for offset in offsets] if step.adjoint else []
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
     halo = max((abs(o[-1]) for o in offsets), default=0)

@@ -17,7 +17,7 @@ from phigen.targets.c.lattice.layout import (
     switches,
 )
 from phigen.targets.header import plain
-from phigen.targets.lattice import begins, bounds
+from phigen.targets.lattice import bounds
 from phigen.targets.rendering import render
 
 
@@ -80,6 +80,7 @@ def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
         stage += has["BANDED"] + (DIRECTIONS + 1 + (own + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
         stage = stage * own + has["KRYLOV"]  # one for sums over pieces
     fields = own + 2 * own * has["COMPENSATED"]  # before a step, and what rounding leaves out
+    fields += bool(layout.step.sites.seams)  # and the kinds of sites
     return len(layout.arrays) + fields + (_gathered(layout) if has["GATHER"] else 0) + stage
 
 
@@ -178,8 +179,6 @@ def _constants(
     if sites.colours > 1:
         yield "COLOUR_COUNT", sites.colours, "colours of sites"
         yield "COLOUR_STRIDE", sites.weights[-1], "what a step along a row adds to the colour"
-    if sites.seams:
-        yield "BEGINS", len(begins(step)), "what sweeps near seams ask of the sites around"
 
 
 def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mapping[str, bool]) -> dict[str, object]:
@@ -196,7 +195,6 @@ def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mappin
         "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and (several or sites.seams) else "",
         "seams": ", ".join(_braced([s.period, s.wide, s.near]) for s in sites.seams),
-        "begins": ", ".join(_braced([*s.key[1:], s.key[0]]) for s in begins(step)),
         "graph": layout.graph,
         "stages": ", ".join(stages),
     }

@@ -93,9 +93,7 @@ class SiteNames:
             elif isinstance(s, Symbol) and s.kind == INCREMENT:
                 self._bind_site(s)
             elif isinstance(s, Symbol) and s.kind == BEGINS:
-                k = begins(layout.step).index(s)
-                self.scope.bind(s, f"w{k}")
-                self._weights.append(f"const double w{k} = {program.name}_begins(row, {k}, i);")
+                self._bind_kind(s)
             elif isinstance(s, Symbol):
                 self._bind_weight(s)
             elif s == program.time:
@@ -158,6 +156,19 @@ class SiteNames:
     def of_pair(self, code: Code) -> tuple[list[str], list[str]]:
         """What some code reads at the other site, and at the site that a loop is over."""
         return together([text for s, text in self._other.items() if s in code.used]), together(self._own)
+
+    def _bind_kind(self, s: Symbol) -> None:
+        """Whether a site has a colour, and is on the seams that a row tells of: these have kinds from one on."""
+        colour, *offset = map(int, s.key)
+        line, named = self.layout.line(offset), f"w{begins(self.layout.step).index(s)}"
+        kinds, window = self.scope[Symbol("kinds", line)], self.scope[Symbol("window")]
+        self._starts.append(("const double *restrict ", f"{kinds} = row->s->kinds{self.layout.at(line)}"))
+        if f"{window} = row->window" not in self._first:
+            self._first.append(f"{window} = row->window")
+        self.scope.bind(s, named)
+        self._weights.append(
+            f"const double {named} = {beside(kinds, offset[-1])} == {window} + {colour}.0 ? 1.0 : 0.0;"
+        )
 
     def _bind_weight(self, s: Symbol) -> None:
         k = self.layout.weights.index(s)

@@ -193,12 +193,23 @@ def _case(
     lines = {form: [*_called(program, called, names)] for form, called in forms.items()}
     moved = sorted({f for sweep in part for f in sweep.moved})
     setup = ["row.varied = v;"] * varied + (["row.chosen = colour;"] if coloured and coloured[k] else [])
+    setup += _near_seams(layout, part) if _has_rows_of_its_own(program, layout) else []
     all_called = [call for called in forms.values() for call in called]
     orders = [*_reordered(layout, [call.order for call in all_called])]
     orders += _other_bonds(layout, [call.bonds for call in all_called])
     beside = has_ends(program, [sweep.kernel for sweep in part]) or any(map(beside_seams, part))
     where = "v" if varied else "s->x"
     return Case(either(lines), setup, beside, orders, moved, where)
+
+
+def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[str]:
+    """What leaves out rows, and sites of them, that are not near all seams that the terms of a part begin on."""
+    window, last = max((sweep.window or 0) for sweep in part), len(layout.step.sites.axes) - 1
+    rows = window & ~(1 << last)
+    if rows:
+        yield f"if ((row.near & {rows}) != {rows}) continue;"
+    if window >> last:
+        yield "row.near = 0;"
 
 
 #: The most statements of a case of a switch that are on its line.
@@ -222,7 +233,7 @@ class Case:
 class _Call:
     """A loop for some sites of a piece: their bounds, if not all of them; the ``colour`` that it is told, if any; the
     fields in the ``order`` that it takes for its own, if another one, and where it gathers the parameters at ``bonds``
-    likewise; what it is ``told`` of bonds besides; the ``window`` of seams, if any; ``others`` would do the same."""
+    likewise; what it is ``told`` of bonds besides; the first kind of its ``window``, if any; ``others`` do the same."""
 
     loop: Loop
     sites: str = ""
@@ -243,7 +254,7 @@ def _called(program: Program, called: Sequence[_Call], names: Mapping[str, str])
         told = list[str]()
         if call.window not in (window, None):
             window = call.window
-            told.append(f"row.window = {window}")
+            told.append(f"row.window = {window}.0")
         if call.colour not in (colour, None):
             colour = call.colour
             told.append(f"row.swept = {colour}")
@@ -300,7 +311,13 @@ def _calls(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Map
         swept = program.profile == "small" and layout.leaves_out(sweep.colour) and not sweep.is_tangent
         colour = sweep.colour if swept else None
         called = [_Call(loops[0], sites) for sites in beside_seams(sweep)] or calls_over_sites(loops)
-        yield from (replace(call, colour=colour, window=sweep.window) for call in called)
+        window = first_kind(layout, sweep)
+        yield from (replace(call, colour=colour, window=window) for call in called)
+
+
+def first_kind(layout: Layout, sweep: Sweep) -> int | None:
+    """The first of the kinds of sites on the seams that a sweep is for."""
+    return None if sweep.window is None else sweep.window * layout.step.sites.colours
 
 
 def beside_seams(sweep: Sweep) -> tuple[str, ...]:
@@ -418,7 +435,7 @@ def over_rows(
     away, end = "s->inside[0]" if seamed else low, f"s->length - {max([0, *(high for _, high in last)])}"
     values = {
         "NAME": program.name,
-        "low": away if one_row else f"row.whole ? {away} : s->length",
+        "low": away if one_row else f"{'row.near == 0' if seamed else 'row.whole'} ? {away} : s->length",
         "high": "s->inside[1]" if seamed else f"({end}) & ~(ptrdiff_t)7" if back else end,
         "ends": "seams" if seamed else "open ends",
         "skipping": switches(program, layout.step, layout)["BY_HAND"] and one_row,
