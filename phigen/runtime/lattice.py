@@ -424,7 +424,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def pullback(
         self,
         x0: ArrayLike,
-        h: float,
+        h: ArrayLike,
         steps: int,
         cotangent: ArrayLike,
         stride: int | None = None,
@@ -437,9 +437,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         parameters_bar), x0_bar along ``x0``, parameters_bar by name along the parameters, of the shapes of these.
 
         ``x0`` is (coordinates, *sizes), or has a first axis of members, as parameters may; x1 and the cotangent have
-        its shape, and ``t0`` may be that of each. Of what members share the derivative is the sum over them. With a
-        ``stride``, x1 are all frames of `integrate`, with a first axis of rows, and so is the cotangent. All is exact
-        to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
+        its shape, and ``h`` and ``t0`` may be those of each. Of what members share the derivative is the sum over them.
+        With a ``stride``, x1 are all frames of `integrate`, with a first axis of rows, and so is the cotangent. All is
+        exact to round-off. Raises `StepError`, and `TypeError` if the solver was compiled without ``adjoint=True``.
         """
         times = self._times(t0, more)
         given = arguments.together(parameters, more)
@@ -525,12 +525,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     def state(self, x: ArrayLike, what: str) -> Floats:
         """A state, a copy, checked with its sizes."""
         about = self.interface
-        if np.iscomplexobj(x):
-            raise TypeError(f"{what} must be real")
-        try:
-            found = np.array(x, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError) as error:
-            raise TypeError(f"{what} must be an array of numbers: {error}") from None
+        found = arguments.real(x, what)
         if found.ndim != 1 + len(about.axes) or found.shape[0] != len(about.coordinates):
             raise ValueError(f"{what} must have shape ({self.shape_text()}), not {found.shape}")
         for axis, size, least, period in zip(about.axes, found.shape[1:], about.least, about.periods, strict=True):
@@ -560,7 +555,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         if missing:
             raise TypeError(f"parameter {missing[0]!r} has no default for all sizes; give an array, or one number")
         for name, value in arrays.items():
-            array = np.asarray(value, dtype=np.float64)
+            array = arguments.real(value, f"parameter {name!r}")
             if array.shape not in ((), shapes[name]):
                 raise ValueError(f"parameter {name!r} must be a number or have shape {shapes[name]}, not {array.shape}")
             where = "sites" if name in about.at_sites else "bonds"

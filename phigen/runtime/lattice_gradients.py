@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def pullback(
     solver: LatticeSolver,
     x0: ArrayLike,
-    h: float,
+    h: ArrayLike,
     steps: int,
     cotangent: ArrayLike,
     stride: int | None,
@@ -29,29 +29,34 @@ def pullback(
     given: Mapping[str, Any],
 ) -> Pullback:
     """See `LatticeSolver.pullback`."""
-    h, steps = arguments.step_size(h), arguments.count(steps, "steps", 0)
+    steps = arguments.count(steps, "steps", 0)
     own = {name: np.asarray(value) for name, value in given.items() if has_members(solver.interface, name, value)}
+    own |= {what: np.asarray(v) for what, v in (("the step size h", h), ("the times t0", t0)) if np.ndim(v)}
     single = np.ndim(x0) == 1 + len(solver.interface.axes) and not own
     start = solver.state(x0, "x0")[np.newaxis] if single else states(solver, x0, own, "x0")
     width = max(1, steps) if stride is None else arguments.count(stride, "stride", 1)
     shape = start.shape[1:] if single else start.shape
     rows = len(row_steps(steps, width))
-    bars = cotangents(cotangent, shape if stride is None else (rows, *shape)).reshape(-1, *start.shape)
+    bars = cotangents(cotangent, shape if stride is None else (rows, *shape))
+    bars = bars.reshape(1 if stride is None else rows, *start.shape)
     if stride is None:
         bars = np.concatenate([np.zeros((rows - 1, *start.shape)), bars])
     times = np.broadcast_to(t0, len(start))
+    each = [arguments.step_size(size) for size in np.broadcast_to(h, len(start))]
     made = filled(f"{rows} frames", (rows, *start.shape))
     x0_bar, found = np.empty_like(start), list[dict[str, Floats]]()
     for m, x in enumerate(start):
         values = solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
         try:
-            made[:, m], x0_bar[m], by = solver.backend.pullback(x, h, steps, width, bars[:, m], values, float(times[m]))
+            made[:, m], x0_bar[m], by = solver.backend.pullback(
+                x, each[m], steps, width, bars[:, m], values, float(times[m])
+            )
         except MissingExtraError:
             hint = "compile it with adjoint=True, or say adjoint: true in the spec"
             raise TypeError(f"{solver.interface.name} was compiled without pullback; {hint}") from None
         except BackendError as error:
             told = BackendError(error.status, error.step, error.states, () if single else (m,))
-            raise solver.failure(told, h, None, values) from error
+            raise solver.failure(told, each[m], None, values) from error
         found.append(by)
     bar = x0_bar.reshape(shape)
     result = made.reshape(rows, *shape)
@@ -59,4 +64,6 @@ def pullback(
         name: np.array([by[name] for by in found]) if name in own else np.sum([by[name] for by in found], axis=0)
         for name in solver.interface.parameters
     }
+    if not found:
+        every = {name: np.zeros(np.shape(given.get(name, 0.0))) for name in every}
     return Pullback(result[-1] if stride is None else result, bar, every)

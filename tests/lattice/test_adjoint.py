@@ -298,6 +298,20 @@ def test_members_and_their_disorder_have_cotangents():
     assert np.array_equal(found["J"], [e.parameters_bar["J"] for e in each])
     assert found["delta"] == pytest.approx(sum(e.parameters_bar["delta"] for e in each), rel=1e-14)
     assert solver.pullback(x, H, 0, bar[0], B=0.5).parameters_bar["B"] == 0.0
+    steps = np.array([0.5, 1.0, -1.5]) * H
+    one = solver.pullback(x, steps, STEPS, bar, B=0.5)
+    alone = [solver.pullback(x, steps[m], STEPS, bar[m], B=0.5) for m in range(3)]
+    assert np.array_equal(one.x1, [e.x1 for e in alone])
+    assert np.array_equal(one.x0_bar, [e.x0_bar for e in alone])
+    with pytest.raises(TypeError, match="'B' must be real"):
+        solver.pullback(x, H, 1, bar[0], B=1j * disorder[0])
+
+
+def test_lattices_may_have_no_members_to_pull_back():
+    solver, none = made("xxz_disorder"), np.empty((0, 3, SITES))
+    x1, x0_bar, found = solver.pullback(none, H, STEPS, none, B=np.ones(SITES), J=np.empty(0))
+    assert (x1.shape, x0_bar.shape) == (none.shape, none.shape)
+    assert [found[name].shape for name in ("B", "J", "delta")] == [(SITES,), (0,), ()]
 
 
 def weighed_tangents(solver, x, bar, stride, parameters):
