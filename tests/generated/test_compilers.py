@@ -95,6 +95,14 @@ def test_all_c_is_cpp_as_well(compiler, standard, tmp_path):
 BACK = [("g++", name) for name in ("klein_gordon", "lotka_volterra", "pendulum_euler")]
 
 
+def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
+    made = compile_spec(spec_of("rigid_body"), scheme="splitting", extras=Extras(tangent=True, adjoint=True))
+    files = emit(made.program, "c", "phigen")
+    assert "rigid_body_pull_group(" in files["rigid_body.c"]
+    write(tmp_path, files)
+    run([tool("g++"), "-x", "c++", "-std=c++20", *WARNINGS, "-fsyntax-only", "rigid_body.c"], tmp_path)
+
+
 @pytest.mark.parametrize(("compiler", "name"), slow_but(BACK, product(["g++", "clang++"], sorted(resources.bundled()))))
 def test_code_with_derivatives_is_cpp_as_well(compiler, name, tmp_path):
     found = spec_of(name)

@@ -15,7 +15,7 @@
 /* Members of an ensemble are gone back through together, one in each lane, as they are integrated. */
 #if PHI_SPLITTING
 enum {
-    PHI_BACK_GROUP = PHI_BACK_PACKS * PHI_LANES,
+    PHI_BACK_GROUP = (int)PHI_BACK_PACKS * PHI_LANES,
 #if PHI_UNDONE
     PHI_SEGMENT = 16 + (2 * PHI_BACK_GROUP + PHI_FLOWS - 1) / PHI_FLOWS /* steps; so the trail of one member suffices for all */
 #else
