@@ -91,8 +91,8 @@ def test_all_c_is_cpp_as_well(compiler, standard, tmp_path):
     run([tool(compiler), f"-std={standard}", *WARNINGS, "-Wvla", "-fsyntax-only", "all.cpp"], tmp_path)
 
 
-#: A lattice, equations that are solved in lanes, and an explicit step.
-BACK = [("g++", name) for name in ("klein_gordon", "lotka_volterra", "pendulum_euler")]
+#: A lattice, equations that are solved in lanes, an explicit step, and flows.
+BACK = [("g++", name) for name in ("klein_gordon", "lotka_volterra", "pendulum_euler", "kepler")]
 
 
 def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
@@ -104,10 +104,10 @@ def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
 
 
 @pytest.mark.parametrize(("compiler", "name"), slow_but(BACK, product(["g++", "clang++"], sorted(resources.bundled()))))
-def test_code_with_derivatives_is_cpp_as_well(compiler, name, tmp_path):
+def test_fast_code_with_derivatives_is_cpp_as_well(compiler, name, tmp_path):
     found = spec_of(name)
     extras = Extras(tangent=not found.lattice, adjoint=not found.noise)
-    write(tmp_path, emit(compile_spec(found, extras=extras).program, "c", "phigen"))
+    write(tmp_path, emit(compile_spec(found, extras=extras, profile="fast").program, "c", "phigen"))
     for standard in ("c++17", "c++20"):
         run([tool(compiler), "-x", "c++", f"-std={standard}", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)
 

@@ -245,7 +245,7 @@ static void phi_set_aside(phi_solver *s)
 {
     phi_uniform(s->rate, s->h, s->aside);
 #if PHI_BLOCKS
-    phi_uniform(s->rate, PHI_AHEAD * s->h, s->aside_of_block);
+    phi_uniform(s->rate, (double)PHI_AHEAD * s->h, s->aside_of_block);
 #endif
 }
 

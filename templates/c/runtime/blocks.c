@@ -60,7 +60,7 @@ static void phi_refresh(const phi_solver *s PHI_AND_INT_STAGE, phi_table *table)
 static void phi_renew_lanes(const phi_solver *s, phi_table *table)
 {
     const double done = (double)(s->steps - s->steps_before_h);
-    double now[PHI_COEFFICIENTS - PHI_PREPARED];
+    double now[(int)PHI_COEFFICIENTS - PHI_PREPARED];
     PHI_EACH_STAGE {
         for (int lane = 0; lane < PHI_LANES; ++lane) {
             const double t = s->t_before_h + (done + lane) * s->h;
@@ -164,10 +164,10 @@ static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM
     double mean[PHI_DIM];
 #if PHI_TIMED
     for (int part = 0; part < PHI_STRIDES; ++part)
-        phi_runge_kutta(s, t + part * h / PHI_STRIDES, h / PHI_STRIDES, x, mean);
+        phi_runge_kutta(s, t + part * h / (double)PHI_STRIDES, h / (double)PHI_STRIDES, x, mean);
 #else
     (void)t;
-    for (int part = 0; part < PHI_STRIDES; ++part) phi_runge_kutta(s, h / PHI_STRIDES, x, mean);
+    for (int part = 0; part < PHI_STRIDES; ++part) phi_runge_kutta(s, h / (double)PHI_STRIDES, x, mean);
 #endif
 }
 
@@ -240,7 +240,7 @@ static void phi_march(const phi_solver *s, phi_table *table, phi_lanes begin[PHI
         by_adams = by_adams && phi_adams(s, table->slope, PHI_PAST + lane, x);
         if (!by_adams) phi_stride(s, s->t + lane * s->h, s->h, x);
     }
-    phi_note_slope(s, table->slope, PHI_PAST + PHI_LANES, x);
+    phi_note_slope(s, table->slope, (int)PHI_PAST + PHI_LANES, x);
     table->marching = 1;
 }
 
@@ -332,7 +332,7 @@ static void phi_guess_by_march(const phi_solver *s, phi_table *table, phi_model 
 #endif
     memcpy(x, s->x, sizeof x);
 #if PHI_COMPOSED
-    for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
+    for (int k = 0; k < (int)PHI_STAGES * PHI_LANES; ++k) {
         const int lane = k / PHI_STAGES;
         const int stage = k % PHI_STAGES;
         const double h = phi_fractions[stage] * s->h;

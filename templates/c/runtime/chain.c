@@ -151,7 +151,7 @@ static void phi_chain(phi_model *model, phi_lanes unit[restrict PHI_DIM], double
         small[i] = carry[i];
     }
 #if PHI_COMPOSED
-    for (int k = 0; k < PHI_STAGES * PHI_LANES; ++k) {
+    for (int k = 0; k < (int)PHI_STAGES * PHI_LANES; ++k) {
         const int lane = k / PHI_STAGES, after = (k + 1) / PHI_STAGES % PHI_LANES;
         const int stage = k % PHI_STAGES, next = (k + 1) % PHI_STAGES;
 #else

@@ -49,7 +49,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 #endif
     s->open = 0;
 #if PHI_NOISE
-    const int drawing = number == 0 || number == PHI_FLOWS - PHI_SOURCES;
+    const int drawing = number == 0 || number == PHI_FLOWS - (int)PHI_SOURCES;
 #endif
 #if PHI_ONE_ROW
     s->from = (ptrdiff_t)from;

@@ -13,7 +13,7 @@
 #define PHI_IN(pointer, stage, member) pointer[stage].member
 #define PHI_TO(pointer, stage) pointer + stage
 #define PHI_ROW_OF(pointer, stage) pointer + stage * PHI_ROW
-#define PHI_ALL_STAGES(number) PHI_STAGES * number
+#define PHI_ALL_STAGES(number) (int)PHI_STAGES * number
 #define PHI_FRACTION(h) phi_fractions[stage] * h
 #define PHI_AT_FIRST(pointer) stage == 0 ? pointer : NULL
 #else
