@@ -1,12 +1,12 @@
 """Sweeps that are undone: the fields before a flow, found from those after it by the flow over the time −h.
 
-Of what bonds or pairs add up nothing is computed twice either: it reads nothing that the sweep moves. Flows with forces
-are left out: what these damp cannot be found again.
+Of what bonds or pairs add up nothing is computed twice either: it reads nothing that the sweep moves. Where forces
+damp, a multiple of a field that is added to it is divided away; other damping is left out.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from phigen.lattice.adjoint import BACK
@@ -15,18 +15,18 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
 from phigen.scheme.steps import Sites, Sweep, Sweeps
-from phigen.symbolic.expression import ONE, Expression, rebuild, symbol, symbols_of
+from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import PRESENT, Symbol
 
 
 def can_be_undone(program: Program, step: Sweeps) -> bool:
     """Whether the transpose of a step finds the fields before its sweeps from those after them."""
-    if not step.adjoint or step.equation or program.forced:
+    if not step.adjoint or step.equation:
         return False
     parities, sweeps = of_coefficients(step), [sweep for part in step.parts for sweep in part]
-    used = {s for sweep in sweeps for s in symbols_of(*sweep.kernel.roots)}
     summed = {s for sweep in sweeps if sweep.gather for k in sweep.gather.kernels for s in symbols_of(*k.roots)}
-    return all(parities.get(s, EVEN) for s in used) and all(parities.get(s, EVEN) == EVEN for s in summed)
+    found = all(_changes(program, sweep, parities) for sweep in sweeps)
+    return found and all(parities.get(s, EVEN) == EVEN for s in summed)
 
 
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
@@ -69,7 +69,7 @@ def _without_factors(value: Expression, offset: Sequence[int]) -> Expression:
 def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kernel:
     """The transpose of a sweep that reads the moved fields as they are after it, and finds what they were, `UNDONE`."""
     moved = [program.coordinates[f] for f in sweep.moved]
-    changes = dict(zip(moved, turned_back(sweep.kernel.roots, of_coefficients(step)), strict=True))
+    changes = _changes(program, sweep, of_coefficients(step))
     values = iter(before(back.roots, changes))
     outputs = [replace(o, values=tuple(next(values) for _ in o.values)) for o in back.outputs]
     unread = tuple(f for f in moved if f not in back.inputs["site"])
@@ -78,6 +78,23 @@ def undoing(program: Program, step: Sweeps, sweep: Sweep, back: Kernel) -> Kerne
         inputs={**back.inputs, UNDONE: unread},
         outputs=(*outputs, Output(UNDONE, tuple(symbol(f) + change for f, change in changes.items()))),
     )
+
+
+def _changes(program: Program, sweep: Sweep, parities: Mapping[str, int]) -> dict[str, Expression]:
+    """What undoes a sweep, added to the fields after it that it has moved; nothing where that is not found."""
+    moved, changes = [program.coordinates[f] for f in sweep.moved], sweep.kernel.roots
+    if all(parities.get(s, EVEN) for s in symbols_of(*changes)):
+        return dict(zip(moved, turned_back(changes, parities), strict=True))
+    found = {f: _divided(f, moved, change) for f, change in zip(moved, changes, strict=True)}
+    return {f: e for f, e in found.items() if e is not None} if None not in found.values() else {}
+
+
+def _divided(field: str, moved: Sequence[str], change: Expression) -> Expression | None:
+    """What undoes the change of a field by a multiple of itself, and more without moved fields; None for others."""
+    (factor,), (more,) = gradient(change, [field]), substitute([change], {field: ZERO})
+    if not {*moved}.isdisjoint(symbols_of(factor, more)):
+        return None
+    return -(factor * symbol(field) + more) * (ONE / (ONE + factor))
 
 
 def apart(back: Kernel) -> tuple[Kernel, Kernel] | None:

@@ -60,15 +60,20 @@ def before(values: Sequence[Expression], changes: Mapping[str, Expression]) -> l
         return moved.get(node.value, node) if node.op == "symbol" else rebuild(node, [e for e, _ in args]), form
 
     called = dict.fromkeys(e.args[0] for e in topological(values) if e.op in FUNCTIONS and len(e.args) == 1)
-    read = [e for e in called if not moved.keys().isdisjoint(symbols_of(e))]
+    read = [e for e in called if not moved.keys().isdisjoint(symbols_of(e)) and not _called_in(e)]
     kept = {
         e: symbol(Symbol("kept", k))
         for k, (e, (other, _)) in enumerate(zip(read, fold(read, visit), strict=True))
-        if decide_zero("", [("", other - e)]).verdict == PROVED
+        if len(_called_in(other)) < 2 and decide_zero("", [("", other - e)]).verdict == PROVED  # of more it takes long
     }
     held = {value.value: e for e, value in kept.items()}
     without = fold(values, lambda e, args: kept.get(e) or rebuild(e, args))
     return substitute([found for found, _ in fold(without, visit)], held)
+
+
+def _called_in(value: Expression) -> set[Expression]:
+    """The arguments of all functions in a value."""
+    return {e.args[0] for e in topological([value]) if e.op in FUNCTIONS}
 
 
 def _form(node: Expression, args: Sequence[Form | None]) -> Form | None:

@@ -114,8 +114,12 @@ static phi_status phi_segment_back(phi_solver *s, phi_transpose *g, size_t done,
         next = row * stride > done + leg * g->leg ? row * stride : done + leg * g->leg; /* one row, or leg, at once */
         next = k - next > most ? k - most : next;
 #endif
-        PHI_PARALLEL
-        phi_steps_back(s, g, g->first_step + next, k - next);
+        if (g->anew) {
+            phi_step_back_anew(s, g, g->first_step + next, leg);
+        } else {
+            PHI_PARALLEL
+            phi_steps_back(s, g, g->first_step + next, k - next);
+        }
         if (next == done + leg * g->leg) status = phi_leave_leg(s, g, leg);
 #if PHI_RENEWED
         phi_add_up_step(s, g, g->first_step + next, coef_bar);
@@ -219,8 +223,9 @@ static int phi_begins_again(phi_solver *s, phi_transpose *g)
 {
 #if PHI_UNDONE
     if (!g->failed && !g->lost) return 0;
-    if (g->lost) g->leg = 1;
-    else g->far = 1;
+    if (!g->lost) g->far = 1;
+    else if (g->leg > 1) g->leg = 1;
+    else g->anew = 1;
     g->lost = 0;
 #else
     if (!g->failed) return 0;

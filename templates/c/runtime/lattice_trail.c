@@ -27,7 +27,8 @@ typedef struct phi_transpose {
 #elif PHI_UNDONE
     double *kept;                /* in a segment the states that its legs begin with */
     size_t leg;                  /* the steps of a leg */
-    int lost;                    /* whether sweeps of a leg were undone to another state than that */
+    int lost;                    /* whether sweeps of a leg were undone to another state than that, */
+    int anew;                    /* and whether all flows of a step are made anew for each that is gone back through */
     double *end[PHI_DIM];        /* what steps after the last go on from, */
     size_t last_far;             /* and how many of these by functions for large arguments */
 #else
@@ -94,7 +95,8 @@ static size_t phi_state_size(const phi_solver *s)
 
 #if PHI_UNDONE
 /* Sweeps are undone on the way back, leg by leg: the state that a leg begins with is kept, so what rounding adds is left behind there.
-   Where it has added much, as where fields grow fast, all is done once more with legs of one step. They are counted from
+   Where it has added much, as where fields grow fast, all is done once more with legs of one step, and where that does not do, as
+   where they are damped away, from the beginning of a step for each of its flows. Legs are counted from
    where the run began: segments change no bit. */
 #define PHI_UNLIKE (450.0 * DBL_EPSILON) /* of the largest value of all fields, 1e-13 in double precision */
 

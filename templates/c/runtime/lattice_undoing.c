@@ -154,6 +154,32 @@ static void phi_fields_of_leg(const phi_transpose *g, size_t leg, double *fields
     for (size_t f = 0; f < PHI_DIM; ++f) fields[f] = PHI_FIRST_SITE(g->kept + (leg * PHI_DIM + f) * g->block);
 }
 
+/* The same as phi_steps_back for one step, from which a leg begins: the state before each of its flows is not what was undone. */
+static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t before, size_t leg)
+{
+    double *began[PHI_DIM];
+    phi_fields_of_leg(g, leg, began);
+    for (int last = PHI_OWN_FLOWS; last-- > 0;) {
+        phi_copy(s->x, began, s);
+        PHI_PARALLEL
+        {
+            phi_flow flow;
+            size_t count = 0;
+            for (int number = 0; number <= last; ++number) {
+                phi_find_flow(s, before, number == 0 && before > g->first_step ? PHI_FLOWS : number, &flow);
+                phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(g->far));
+            }
+#if PHI_TAKES
+            if (last == PHI_OWN_FLOWS - 1) phi_hand_nothing(s, g, phi_number_of(before + 1, 0));
+#endif
+            phi_flow_back(s, g, before, last == 0 && before > g->first_step ? PHI_FLOWS : last, g->bar, &flow, &count, 1);
+#if PHI_TAKES
+            if (last == 0) phi_hand_last(s, g, phi_number_of(before, 0), g->bar);
+#endif
+        }
+    }
+}
+
 /* The largest value of a field, in an order that lets loops vectorise. */
 static double phi_largest_of(const phi_solver *s, const double *field)
 {
@@ -189,9 +215,12 @@ static phi_status phi_leave_leg(const phi_solver *s, phi_transpose *g, size_t le
         const double size = phi_largest_of(s, began[f]);
         largest = size > largest ? size : largest;
     }
-    if (!phi_all_hold(s, s->x)) return PHI_NOT_FINITE;
+    if (!phi_all_hold(s, s->x)) {
+        g->lost = g->far && !g->anew;
+        return PHI_NOT_FINITE;
+    }
     for (size_t f = 0; f < PHI_DIM; ++f)
-        if (g->leg > 1 && !phi_differ_by(s, s->x[f], began[f], PHI_UNLIKE * largest)) g->lost = 1;
+        if (!g->anew && !phi_differ_by(s, s->x[f], began[f], PHI_UNLIKE * largest)) g->lost = 1;
     phi_copy(s->x, began, s);
     return g->lost ? PHI_NOT_FINITE : PHI_OK;
 }
