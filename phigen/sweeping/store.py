@@ -27,6 +27,9 @@ WAITING = 255
 
 _BESIDE = "made_by"
 
+#: What a store has by these names, beside what is kept and what is varied.
+OWN = ("status", "coordinate", "frame", "frames", _BESIDE)
+
 
 def imported(name: str) -> Any:
     """A package that sweeps need. Raises `MissingPackageError`."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import prod
 from pathlib import Path
@@ -16,11 +16,12 @@ from phigen import __version__
 from phigen.api import chosen_target, compilation_of, interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
-from phigen.errors import FileError
+from phigen.errors import Diagnostic, FileError, SpecError
 from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.memory import expect_room
 from phigen.spec.model import Extras, Run, Spec, Sweep
+from phigen.spec.names import KEPT
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
 
@@ -68,6 +69,7 @@ def made(
     extras = replace(spec.extras, tangent=True) if "lyapunov" in sweep.keep else spec.extras
     compilation = compilation_of(spec, setting.order, _wanted(extras), setting.scheme)
     listed = _listed(sweep, spec) if sweep.file else {}
+    _expect_names([*(axis.name for axis in sweep.over), *listed], spec)
     target = chosen_target(setting.target)
     plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
     beside = _beside(compilation, target, spec)
@@ -90,6 +92,14 @@ def made(
             cluster.make_all(client, slots, *place, chunks, count)
         store.imported("zarr").consolidate_metadata(str(setting.output))
     return Outcome(int(counts[0]), int(counts[1]), plan.size, dict(zip(plan.dims, plan.shape, strict=True)))
+
+
+def _expect_names(varied: Iterable[str], spec: Spec) -> None:
+    """`SpecError` for a name under which the store has something else."""
+    for name in varied:
+        if name in (*store.OWN, *KEPT):
+            message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
+            raise SpecError([Diagnostic(message, hint="another name for it in the spec")])
 
 
 def _wanted(extras: Extras) -> Extras:

@@ -221,6 +221,14 @@ def test_what_cannot_be_swept_is_told_before_anything_is_started(given, said):
         phigen.sweep("rigid_body", **{"over": {"I2": [1, 2]}, **given})
 
 
+@pytest.mark.parametrize("name", ["status", "final", "coordinate", "frame"])
+def test_names_that_the_store_needs_are_not_varied(tmp_path, name):
+    spec = specs.loads(BODY.replace("I2", name))
+    with pytest.raises(SpecError, match=f"a sweep over '{name}'"):
+        phigen.sweep(spec, over={name: [1, 2]}, output=tmp_path / "map.zarr")
+    assert not (tmp_path / "map.zarr").exists()
+
+
 @pytest.mark.slow
 def test_killed_workers_cost_no_member(spec, cluster, tmp_path, small_chunks):
     """Workers are killed at random while they are at work; the result is that of one ensemble."""
