@@ -96,7 +96,7 @@ class CrossingFinder(Generic[C]):
             self.first = session.steps
             self.values = [self._value(session, 0, 0.0)]
         while steps > 0:
-            states, failure, known = [], None, len(self.values) - 1
+            states, clocks, failure, known = [], list[float](), None, len(self.values) - 1
             for _ in range(min(steps, BLOCK)):
                 before = session.branch()
                 try:
@@ -106,11 +106,14 @@ class CrossingFinder(Generic[C]):
                     break
                 self.past.append(before)
                 states.append(session.state())
+                clocks.append(self._clock(session, math.nan))
             steps -= len(states)
             if states:
                 rows = np.array(states)
                 self.first = session.steps - len(rows) - known
-                self.values += self._values(rows, self._time(known + 1 + np.arange(len(rows)))).tolist()
+                counted = self._time(known + 1 + np.arange(len(rows)))
+                times = counted if math.isnan(clocks[0]) else np.array(clocks)
+                self.values += self._values(rows, times).tolist()
                 yield rows, list(self._crossings(known))
                 self.past, self.values = self.past[-1:], self.values[-2:]
             if failure:
@@ -139,7 +142,9 @@ class CrossingFinder(Generic[C]):
         return math.copysign(1.0, self.h) * np.asarray(found, dtype=np.float64)
 
     def _value(self, session: C, j: int, fraction: float) -> float:
-        return float(self._values(session.state()[np.newaxis], np.array([self._time(j, fraction)]))[0])
+        return float(
+            self._values(session.state()[np.newaxis], np.array([self._clock(session, self._time(j, fraction))]))[0]
+        )
 
     def _crossings(self, known: int) -> Iterator[tuple[float, Floats]]:
         """The crossings of this block, whose first ``known`` intervals are those of an earlier one."""

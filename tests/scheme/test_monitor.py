@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from support import javascript, slow_but
 
 from phigen import SpecError, StepError, spec
+from phigen import solve_ivp as solve
 from phigen.api import solver_of
 from phigen.compiler import compile_proved, compile_spec, emit, examine
 from phigen.errors import CheckError
@@ -295,3 +296,17 @@ def test_sympy_derives_the_same_with_a_monitor(forces):
     found = list(compare(compile_spec(spec.loads(BODY + forces), order=2)))
     assert all(c.statement.holds for c in found if c.term is None)
     assert any(c.statement.name == GRADIENT for c in found)
+
+
+def test_events_are_told_the_physical_time():
+    solver = solver_of(compiled_text(BODY, 6), "c")
+
+    def event(t, x):
+        return x[0] - 0.1 * t + 0.05
+
+    found = solve(solver, (0.0, 9.0), BODY_START, h=0.05, events=event)
+    exact = solve_ivp(
+        lambda t, x: solver.vector_field(x), (0, 9), BODY_START, events=event, rtol=1e-12, atol=1e-12, method="DOP853"
+    )
+    assert len(found.t_events[0]) > 0
+    np.testing.assert_allclose(found.t_events[0], exact.t_events[0], rtol=0, atol=1e-7)
