@@ -144,13 +144,14 @@ export class Sites {
   #colours;
   #begins = new Map();
 
-  /** 1 where the site at an offset has a colour, both of that number, and lies on just the seams of a window, else 0. */
+  /** 1 where the site at an offset has that colour, by number, and lies on just a window of seams, else 0. */
   begins(number, window) {
     const key = `${number} ${window}`;
     const [colour, offset] = WANTED[number];
     const there = (_, i) => {
       const site = this.#beside(i, offset);
-      const seams = this.#place(site).reduce((sum, at, axis) => sum + (at >= this.seams[axis] ? 2 ** axis : 0), 0);
+      const within = (sum, at, axis) => sum + (at >= this.seams[axis] ? 2 ** axis : 0);
+      const seams = this.#place(site).reduce(within, 0);
       return this.#colours[site] === colour && seams === window ? 1 : 0;
     };
     if (!this.#begins.has(key)) this.#begins.set(key, Float64Array.from({ length: this.count }, there));
