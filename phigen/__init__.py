@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from phigen.geometry.system import System
+    from phigen.lattice.system import LatticeSystem
     from phigen.runtime.habits import solve_ivp
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.solver import Solver
@@ -38,6 +39,7 @@ _HOMES = {
     "sweep": "phigen.sweeping.api",
     "System": "phigen.geometry.system",
     "LatticeSolver": "phigen.runtime.lattice",
+    "LatticeSystem": "phigen.lattice.system",
     "LatticeTrajectory": "phigen.runtime.lattice",
     "Solver": "phigen.runtime.solver",
     "solve_ivp": "phigen.runtime.habits",
@@ -56,6 +58,7 @@ _HOMES = {
 __all__ = [
     "CheckError",
     "LatticeSolver",
+    "LatticeSystem",
     "LatticeTrajectory",
     "LimitError",
     "MissingPackageError",

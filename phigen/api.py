@@ -13,7 +13,7 @@ import re
 import warnings
 from collections.abc import Callable, Mapping
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, overload
 
 from phigen import registry, resources
 from phigen import spec as specs
@@ -29,6 +29,7 @@ from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SC
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
+    from phigen.lattice.system import LatticeSystem
     from phigen.notation.sympy_formulas import SympyFormulas
     from phigen.runtime.backend import Backend
     from phigen.runtime.interface import Interface
@@ -37,16 +38,20 @@ if TYPE_CHECKING:
     from phigen.scheme.program import Program
 
 #: What `compile` takes.
-Source = str | PathLike[str] | Spec | System | Compilation
+Source: TypeAlias = "str | PathLike[str] | Spec | System | LatticeSystem | Compilation"
 
 
-def load(path: str | PathLike[str]) -> System:
-    """The system in a spec file, or in the bundled one of that name; its ``spec`` holds the rest of the file.
+def load(path: str | PathLike[str]) -> System | LatticeSystem:
+    """Return the system in a spec file, or in the bundled one of that name; its ``spec`` holds the rest of the file.
 
-    Raises `SpecError` with all errors of the file.
+    A lattice is a `LatticeSystem`. Raises `SpecError` with all errors of the file.
     """
     spec = specs.load(resources.file_of(fspath(path)))
     try:
+        if spec.lattice:
+            from phigen.lattice.system import lattice_from_spec
+
+            return lattice_from_spec(spec)
         return system_from_spec(spec)
     except SpecError as error:
         raise located(error, spec) from None
@@ -143,11 +148,13 @@ def compilation_of(
     wanted: dict[str, Any] = {"order": order, "scheme": scheme, "extras": extras, "profile": profile}
     if isinstance(source, System):
         return compile_proved(source.spec or _spec_of(source), system=source, **wanted)
+    if not isinstance(source, Spec | str | PathLike) and isinstance(getattr(source, "spec", None), Spec):
+        source = source.spec  # a LatticeSystem, whose room is loaded for lattices alone
     if isinstance(source, Spec):
         return compile_proved(source, **wanted)
     if isinstance(source, str | PathLike):
         return compile_proved(specs.load(resources.file_of(fspath(source))), **wanted)
-    raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System or a Spec")
+    raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System, a LatticeSystem or a Spec")
 
 
 def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
@@ -156,14 +163,14 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
 
     if compilation.cell:
         raise system_of_lattice(compilation.spec)
-    return Solver(*_loaded(compilation.program, target))
+    return Solver(*_loaded(compilation.program, target), compilation.spec)
 
 
 def lattice_solver_of(compilation: Compilation, target: str = "auto") -> LatticeSolver:
     """The same for a lattice."""
     from phigen.runtime.lattice import LatticeSolver
 
-    return LatticeSolver(*_loaded(compilation.program, target))
+    return LatticeSolver(*_loaded(compilation.program, target), compilation.spec)
 
 
 def _loaded(program: Program, target: str) -> tuple[Any, Any]:

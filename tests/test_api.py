@@ -8,6 +8,7 @@ from systems import slow_but
 import phigen
 from phigen import resources, spec
 from phigen.compiler import compile_spec
+from phigen.geometry.system import system_from_spec
 from phigen.spec import json_schema
 
 RIGID_BODY = resources.bundled_specs() / "rigid_body.yaml"
@@ -47,8 +48,11 @@ def test_compile_takes_what_one_has(source):
 def test_lattices_compile_anew_to_another_order_and_are_no_system():
     compilation = phigen.api.compilation_of("fput", order=2)
     assert phigen.api.compilation_of(compilation, order=4).order.order == 4
+    lattice = phigen.load("fput")
+    assert isinstance(lattice, phigen.LatticeSystem)
+    assert phigen.api.compilation_of(lattice, order=2).cell == compilation.cell
     with pytest.raises(phigen.SpecError, match=r"phigen\.compile takes it as it is"):
-        phigen.load("fput")
+        system_from_spec(lattice.spec)
 
 
 def from_sympy(**more):

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from phigen import resources
-from phigen.api import load
+from phigen import resources, spec
 from phigen.drawing.leaf import Leaf, net
 from phigen.drawing.palette import PALETTE, SERIES, styled
-from phigen.geometry.system import System
+from phigen.geometry.system import System, system_from_spec
 from phigen.paper.plate import Finding, Plate
 from phigen.study.measures import poisson_matrix
 from phigen.symbolic.arrays import Floats
@@ -25,7 +24,7 @@ SPHERES, PARABOLOIDS, PLANES = (0.1, 0.4, 1.0), (0.25, 1.5), (-2.0, 0.0, 2.0)
 
 def foliation_plate() -> Plate:
     """Three foliations side by side."""
-    systems = [load(resources.bundled_specs() / f"{name}.yaml") for name in SYSTEMS]
+    systems = [system_from_spec(spec.load(resources.bundled_specs() / f"{name}.yaml")) for name in SYSTEMS]
     parameters = {p.name: float(p.value) for p in systems[0].parameters}
 
     def rank(system: System, x: tuple[float, ...]) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, lattice_ensemble, lattice_gradients
+from phigen.runtime import arguments, lattice_ensemble, lattice_gradients, runs
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.gradients import Pullback
 from phigen.runtime.interface import (
@@ -36,6 +36,8 @@ from phigen.writing import replacing
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+
+    from phigen.spec.model import Spec
 
 
 class LatticeSession(Protocol):
@@ -251,8 +253,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     cannot be made `phigen.StepError`. Safe to use from several threads.
     """
 
-    def __init__(self, backend: LatticeBackend, interface: LatticeInterface) -> None:
-        self.backend, self.interface = backend, interface
+    def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
+        self.backend, self.interface, self.spec = backend, interface, spec
 
     def __repr__(self) -> str:
         about = self.interface
@@ -306,6 +308,43 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         found = self._trajectory(t, frames.array, np.array(run.energy), steps, at)
         frames.finish(found)
         return found
+
+    def run(
+        self,
+        name: str | None = None,
+        *,
+        x0: ArrayLike | None = None,
+        sizes: Sequence[int] | None = None,
+        step: float | None = None,
+        steps: int | None = None,
+        stride: int | None = None,
+        seed: int | None = None,
+        output: str | Path | None = None,
+        checkpoints: str | Path | None = None,
+        progress: Progress | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> LatticeTrajectory:
+        """Integrate a run of the spec, the first by default, and return what `integrate` returns.
+
+        The start, the bonds, and parameters at sites and bonds are made as the run says, from its formulas, files and
+        random numbers, at its ``sizes`` or at others. The remaining arguments take the place of the settings of the
+        spec; ``x0`` (coordinates, *sizes) is another start, ``seed`` that of the noise. Raises `ValueError` for a name
+        that is no run, and `SpecError` for a start that does not fit the sizes.
+        """
+        from phigen.lattice.states import start_of
+
+        base = runs.run_named(self.spec, name)
+        assert self.spec is not None
+        chosen = runs.changed(self.spec, base, runs.Settings(step=step, steps=steps, stride=stride, sizes=sizes))
+        start = start_of(self.spec, chosen)
+        return self.integrate(
+            start.state if x0 is None else x0, float(chosen.step), chosen.steps, chosen.stride,
+            t0=float(chosen.start) if self.interface.time else None,
+            seed=chosen.seed if seed is None and self.interface.noise else seed,
+            output=output, checkpoints=checkpoints, progress=progress,
+            parameters=start.arguments | arguments.together(parameters, more),
+        )  # fmt: skip
 
     def step(
         self,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from phigen.runtime.interface import Interface
+
+if TYPE_CHECKING:
+    from phigen.spec.model import Spec
 
 
 class _Backend(Protocol):
@@ -20,6 +23,13 @@ class Named(Generic[B, N]):
 
     backend: B
     interface: N
+    #: The spec that was compiled; None of a back end that was loaded without one.
+    spec: Spec | None = None
+
+    @property
+    def runs(self) -> tuple[str, ...]:
+        """Names of the runs of the spec, which `run` takes."""
+        return tuple(self.spec.runs) if self.spec else ()
 
     @property
     def target(self) -> str:

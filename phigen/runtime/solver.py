@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, gradients
+from phigen.runtime import arguments, gradients, runs
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.backend import Backend
 from phigen.runtime.crossings import SIGNS, CrossingFinder, Function, Section
@@ -25,6 +25,9 @@ from phigen.runtime.retrying import Retrying
 from phigen.runtime.session import Followed, Session, rows_along
 from phigen.runtime.timed import along_until, states_at
 from phigen.runtime.trajectory import Trajectory, Turned, turned_into
+
+if TYPE_CHECKING:
+    from phigen.spec.model import Run, Spec
 
 _ADVICE = {
     "NO_CONVERGENCE": "the inner iteration did not converge; a smaller step helps",
@@ -57,9 +60,10 @@ class Solver(Named[Backend, Interface]):
     Solvers can be copied and pickled; compiled C is compiled again where the cache does not have it.
     """
 
-    def __init__(self, backend: Backend, interface: Interface) -> None:
+    def __init__(self, backend: Backend, interface: Interface, spec: Spec | None = None) -> None:
         self.backend = backend
         self.interface = interface
+        self.spec = spec
 
     def __repr__(self) -> str:
         about = self.interface
@@ -130,6 +134,67 @@ class Solver(Named[Backend, Interface]):
         except BackendError as error:
             raise self.failure(error, at.h, made(error.states, error.step), at.values) from error
         return made(states, steps)
+
+    def run(
+        self,
+        name: str | None = None,
+        *,
+        x0: ArrayLike | None = None,
+        step: float | None = None,
+        steps: int | None = None,
+        until: float | None = None,
+        stride: int | None = None,
+        every: float | None = None,
+        seed: int | None = None,
+        progress: Progress | None = None,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> Trajectory:
+        """Integrate a run of the spec, the first by default, and return what `integrate` returns.
+
+        Arguments take the place of the settings of the spec: the start ``x0`` (DIM,), the ``step``, the number of
+        ``steps`` or the time ``until`` where it ends, the ``stride`` or the time ``every`` between rows, the ``seed``
+        of the noise, and parameters. A run with ``stop`` ends where that expression first passes through zero. Raises
+        `ValueError` for a name that is no run; `runs` lists them.
+        """
+        spec, settings = self.spec, runs.Settings(step, steps, until, stride, every)
+        base = runs.run_named(spec, name)
+        assert spec is not None
+        chosen = runs.changed(spec, base, settings)
+        start = [float(value) for value in chosen.initial] if x0 is None else x0
+        values: dict[str, float] = {n: float(v) for n, v in chosen.parameters.items()}
+        values |= arguments.together(parameters, more)
+        t0 = float(chosen.start) if self.interface.time else None
+        drawn = {"seed": chosen.seed if seed is None and self.interface.noise else seed}
+        if chosen.stop is None and chosen.every is None:
+            length: dict[str, Any] = {"steps": chosen.steps} if chosen.until is None else {"until": float(chosen.until)}
+            return self.integrate(
+                start, float(chosen.step), stride=chosen.stride, t0=t0, seed=drawn["seed"], progress=progress,
+                parameters=values, **length,
+            )  # fmt: skip
+        arguments.expect_no_noise("every", self.interface)
+        return self._rows(chosen, self._beginning(start, "x0", float(chosen.step), values, {}, t0, drawn))
+
+    def _rows(self, run: Run, at: Beginning) -> Trajectory:
+        """Return the trajectory of a run that stops at a zero, or whose rows are equal times apart."""
+        from phigen.study.sections import function_of
+
+        names = self.interface
+        stop = function_of(run.stop, names.coordinates, at.values, names.time) if run.stop is not None else None
+        session = self._started(at)
+        end = runs.end_of(session, run, stop, timed=bool(names.time))
+        rows: list[tuple[Floats, float, float, Floats]] = []
+
+        def trajectory() -> Trajectory:
+            x, tau, passed, element = (np.array(column) for column in zip(*rows, strict=True))
+            return self._trajectory(x, Marks(tau, passed, element, end.steps + end.part), at)
+
+        try:
+            for there, done in runs.rows_of(session, run, end):
+                rows.append((there.state(), done * at.h, there.time(), there.element()))
+        except BackendError as error:
+            raise self.failure(error, at.h, trajectory(), at.values) from error
+        return trajectory()
 
     def _until(self, course: Retrying, span: float, stride: int, at: Beginning) -> Trajectory:
         """`integrate` for a span of time."""

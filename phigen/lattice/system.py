@@ -1,0 +1,50 @@
+"""A lattice as `phigen.load` returns it: its spec and its cell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell import Cell
+from phigen.spec.model import Spec
+
+
+@dataclass(frozen=True)
+class LatticeSystem:
+    """A lattice of any size: ``spec`` is the whole file, ``cell`` holds the fields, brackets and densities of a site.
+
+    `phigen.compile` takes it, as it takes a `System`.
+    """
+
+    spec: Spec = field(repr=False)
+    cell: Cell
+
+    def __repr__(self) -> str:
+        relation = f"on axes {', '.join(self.axes)}" if self.axes else f"related by {self.cell.relation}"
+        return f"<LatticeSystem {self.name}: ({', '.join(self.coordinates)}) at each site, {relation}>"
+
+    @property
+    def name(self) -> str:
+        """Name of the spec."""
+        return self.spec.name
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the coordinates of a site."""
+        return self.spec.coordinates
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Names of the axes of a grid, the slowest first; none for graphs and pairs."""
+        return self.cell.axes
+
+    def _repr_latex_(self) -> str:
+        """Return brackets, H, Casimirs and invariants as formulas, for notebooks."""
+        from phigen.notation import lattices
+
+        return lattices.document(self.cell)
+
+
+def lattice_from_spec(spec: Spec) -> LatticeSystem:
+    """Return the lattice of a spec. Raises `SpecError` as `cell_from_spec` does."""
+    return LatticeSystem(spec, cell_from_spec(spec))

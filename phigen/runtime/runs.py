@@ -1,0 +1,146 @@
+"""Named runs of a spec from Python: `Solver.run` and `LatticeSolver.run`.
+
+`changed` is the run of a spec with other settings; `rows_of` makes the trajectory of an ordinary run that stops where a
+function vanishes, or whose rows are equal times apart, which `Solver.integrate` alone does not.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from phigen.runtime import arguments
+from phigen.runtime.crossings import Function
+from phigen.runtime.ending import End, after_steps, at_time, where_zero
+from phigen.runtime.session import Session
+from phigen.runtime.timed import EQUAL, reached, steps_until
+from phigen.spec import limits
+from phigen.spec.model import Run, Spec
+from phigen.spec.problems import did_you_mean
+from phigen.spec.runs import with_step
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings of a run that a caller gives in place of those of the spec; None keeps the spec's."""
+
+    step: float | None = None
+    steps: int | None = None
+    until: float | None = None
+    stride: int | None = None
+    every: float | None = None
+    sizes: Sequence[int] | None = None
+
+
+def run_named(spec: Spec | None, name: str | None) -> Run:
+    """Return the run of that name, the first by default.
+
+    Raises `ValueError` if there is none, or the solver was made without a spec.
+    """
+    if spec is None or not spec.runs:
+        raise ValueError("the spec of this solver has no runs; solver.integrate takes a start and a step")
+    if name is None:
+        return next(iter(spec.runs.values()))
+    if name not in spec.runs:
+        hint = did_you_mean(name, spec.runs)
+        names = ", ".join(spec.runs)
+        raise ValueError(f"there is no run {name!r}; the spec has {names}" + (f"; {hint}" if hint else ""))
+    return spec.runs[name]
+
+
+def changed(spec: Spec, run: Run, settings: Settings) -> Run:
+    """Return the run with the settings of the caller. Raises `ValueError` and `TypeError` for those that do not fit."""
+    if settings.steps is not None and settings.until is not None:
+        raise TypeError("a run takes either steps or until, not both")
+    if settings.stride is not None and settings.every is not None:
+        raise TypeError("a run takes either stride or every, not both")
+    if settings.steps is not None:
+        steps = arguments.count(settings.steps, "steps", 1, limits.STEPS)
+        run = replace(run, steps=steps, stride=min(run.stride, steps), duration=None, until=None)
+    if settings.until is not None:
+        run = replace(run, until=_number(settings.until, "until"), duration=None)
+    if settings.step is not None:
+        step = Fraction(arguments.step_size(settings.step))
+        run = with_step(run, step, parts=spec.monitor is None and spec.lattice is None)
+    if run.until is not None and (run.until - run.start) / run.step <= 0:
+        raise ValueError(f"until = {float(run.until)!r} is never reached by steps of {float(run.step)!r}")
+    if settings.stride is not None:
+        run = replace(run, stride=arguments.count(settings.stride, "stride", 1), every=None)
+    if settings.every is not None:
+        every = _number(settings.every, "every")
+        if every <= 0:
+            raise ValueError(f"every must be positive, not {settings.every!r}")
+        run = replace(run, every=every)
+    return _resized(spec, run, settings.sizes)
+
+
+def _resized(spec: Spec, run: Run, sizes: Sequence[int] | None) -> Run:
+    """Return the run of a lattice at other sizes."""
+    if sizes is None or run.lattice is None or spec.lattice is None:
+        return run
+    if spec.lattice.graph:
+        raise ValueError(f"{spec.name} is a graph: its bonds say how many sites there are")
+    if len(sizes) != len(spec.lattice.indices):
+        raise ValueError(f"sizes must be those of the axes ({', '.join(spec.lattice.indices)}), not {tuple(sizes)!r}")
+    numbers = tuple(arguments.count(size, "sizes", 1, limits.SITES) for size in sizes)
+    return replace(run, lattice=replace(run.lattice, sizes=numbers))
+
+
+def _number(value: float, name: str) -> Fraction:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{name} must be a finite number, not {value!r}")
+    return Fraction(value)
+
+
+def end_of(session: Session, run: Run, stop: Function | None, *, timed: bool) -> End:
+    """Return where a run ends, for a session at its start, which is left as it is.
+
+    ``stop`` is a function of states whose first zero ends the run; ``timed`` tells whether it takes the time too.
+    """
+    h, t0 = float(run.step), float(run.start)
+    last = at_time(session.branch(), h, float(run.until) - t0) if run.until is not None else None
+    most = run.steps if last is None else last.steps + last.part
+    zero = where_zero(session.branch(), h, most, stop, t0, timed=timed) if stop else None
+    if zero and (last is None or abs(zero.span) < abs(last.span)):
+        return zero
+    if last is not None:
+        return last
+    whole = after_steps(session.branch(), h, run.steps)
+    return whole if math.isfinite(whole.span) else replace(whole, span=h * run.steps)
+
+
+def rows_of(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
+    """Yield a session at each row of a run up to its end, the start first, with the steps made, the last one in part.
+
+    Rows are ``run.every`` apart in time, or every ``run.stride``-th step. The caller reads a session before it asks for
+    the next. Raises `BackendError`.
+    """
+    yield session, 0.0
+    yield from _timed_rows(session, run, end) if run.every is not None else _strided_rows(session, run, end)
+    session.advance(float(run.step), end.steps - session.steps)
+    yield end.finish(session)
+
+
+def _strided_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
+    """Yield every stride-th step before the end."""
+    for mark in range(run.stride, end.steps + end.part, run.stride):
+        session.advance(float(run.step), mark - session.steps)
+        yield session, float(mark)
+
+
+def _timed_rows(session: Session, run: Run, end: End) -> Iterator[tuple[Session, float]]:
+    """Yield the states at multiples of ``every`` before the end, each by a part of a step from the step before it."""
+    assert run.every is not None
+    h, every = float(run.step), float(run.every) * math.copysign(1.0, float(run.step))
+    rows = math.ceil(abs(end.span / every) * (1 - EQUAL))
+    for k in range(1, rows):
+        passed = session.time() if math.isfinite(session.time()) else session.steps * h
+        steps, left = steps_until(session, h, k * every - passed)
+        session.advance(h, steps)
+        if abs(left) <= EQUAL * abs(k * every):
+            yield session, float(session.steps)
+        else:
+            there, size = reached(session, h, left)
+            yield there, session.steps + size / h
