@@ -103,6 +103,11 @@ class Compilation:
         return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
 
     @property
+    def notes(self) -> list[str]:
+        """Decisions of the compiler that the user may not expect, a line each."""
+        return [note for note in (self.order.note, *self.gauge.notes) if note]
+
+    @property
     def exact(self) -> bool:
         """Whether a step starts and ends at the ends of one p to round-off; see `poisson`."""
         return self.realisation is None or self.realisation.exact

@@ -30,7 +30,7 @@ from phigen.scheme.assemble import build_program
 from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise, expect_affordable, is_large
-from phigen.scheme.gauge import Gauge, choose, given
+from phigen.scheme.gauge import Gauge, choose, fixed_gauge_named, given
 from phigen.scheme.logarithmic import composition_of, logarithmic_of
 from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order
@@ -236,15 +236,16 @@ def _compiled(
     plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
     monitor, affordable = gauged.gauge.monitor, early is not None and gauged.system is source
-    reached = clock.timed(
-        "generating function",
-        lambda: discretise(
-            gauged.system, realisation, gauged.series, plan, spec.composition, monitor, affordable=affordable
-        ),
-    )
-    group = _group(spec, source, realisation.kind)
-    described |= {"solver": spec.solver, "group": group}
-    program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))
+    with fixed_gauge_named(gauged.gauge, source):
+        reached = clock.timed(
+            "generating function",
+            lambda: discretise(
+                gauged.system, realisation, gauged.series, plan, spec.composition, monitor, affordable=affordable
+            ),
+        )
+        group = _group(spec, source, realisation.kind)
+        described |= {"solver": spec.solver, "group": group}
+        program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))
     return Compilation(
         spec, source, realisation, plan, program, gauged.gauge, clock.seconds, gauged=gauged, scheme=reached
     )

@@ -105,8 +105,8 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options) 
             console.detail(f"{spec.name}: {time.perf_counter() - start:.2f} s ({stages})")
     collector.finish()
     for compilation in compilations:
-        if compilation.order.note:
-            console.note(f"{compilation.spec.name}: {compilation.order.note}")
+        for note in compilation.notes:
+            console.note(f"{compilation.spec.name}: {note}")
     return compilations
 
 

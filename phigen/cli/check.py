@@ -120,6 +120,8 @@ def _collect(examination: Examination, collector: Collector, console: Console) -
     counts = Counter(s.verdict for s in examination.statements)
     told = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
     console.note(f"{examination.spec.file}: {told or 'nothing was proved'}")
+    for note in examination.compilation.notes if examination.compilation else ():
+        console.note(f"{examination.spec.file}: {note}")
     mistakes = [s.name for _, s in examination.mistakes]
     if mistakes:
         hints = dict.fromkeys(hint_of(examination.spec, group) for group, _ in examination.mistakes)
@@ -181,6 +183,7 @@ def _described(examination: Examination) -> dict[str, object]:
         "refuted": len(examination.refuted),
         "statements": listed,
         "obstacles": obstacle,
+        "notes": examination.compilation.notes if examination.compilation else [],
         "unexamined": examination.unexamined,
     }
 

@@ -8,10 +8,11 @@ fixed λ the step is an exact Poisson map; trajectories with different λ are st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
-from phigen.errors import Diagnostic, SpecError
+from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import hamilton_jacobi
@@ -28,17 +29,24 @@ MOST_GROWTH = 1.3
 #: The error term whose size the gauge minimises.
 GUIDE = 3
 
+#: Operations of π∇S_3, by `guide_operations`, up to which a gauge is searched for. The search evaluates π∇S_3 at 32
+#: states for 7 values of λ, up to four times for each λ: some ten million operations, a hundredth of a second, at the
+#: start of each trajectory. The systems of the corpus take at most 2,600.
+MOST_GUIDE_OPERATIONS = 10_000
+
 
 @dataclass(frozen=True)
 class Gauge:
     """``free``: Casimirs whose λ the solver chooses; ``fixed``: the part subtracted once for all.
 
-    A ``monitor`` g makes K = g(H + e) of H before that (`phigen.scheme.monitor`); then no λ is free.
+    A ``monitor`` g makes K = g(H + e) of H before that (`phigen.scheme.monitor`); then no λ is free. ``omitted`` maps
+    Casimirs whose λ would cost more to choose than it gains to the reason.
     """
 
     free: tuple[str, ...] = ()
     fixed: Mapping[str, Expression] = field(default_factory=dict)
     monitor: Expression | None = None
+    omitted: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -57,10 +65,18 @@ class Gauge:
 
     @property
     def facts(self) -> list[str]:
-        """What the header says of the gauge."""
+        """The lines of the header about the gauge."""
         free = [f"gauge: the multiple of {', '.join(self.free)} is chosen at the start of each trajectory"]
         fixed = ", ".join(f"({value}) {name}" for name, value in self.fixed.items())
-        return (free if self.free else []) + ([f"gauge: {self.letter} - {fixed}"] if fixed else [])
+        return (free if self.free else []) + ([f"gauge: {self.letter} - {fixed}"] if fixed else []) + self.notes
+
+    @property
+    def notes(self) -> list[str]:
+        """A line for each reason why Casimirs are left out of an automatic gauge for their cost."""
+        names: dict[str, list[str]] = {}
+        for name, reason in self.omitted.items():
+            names.setdefault(reason, []).append(name)
+        return [f"gauge: auto leaves out {', '.join(group)}: {reason}" for reason, group in names.items()]
 
     @property
     def letter(self) -> str:
@@ -104,8 +120,8 @@ def choose(
     """The system in the gauge of a setting: ``none``, ``auto``, or a value for some Casimirs.
 
     ``auto`` frees a Casimir if S_3 depends on its λ (in log-canonical structures it never does) and has hardly
-    more terms with it (on tops it has many more, for little); none where H depends on the time, forces act or there
-    is noise, or with a monitor.
+    more terms with it (on tops it has many more, for little), and if π∇S_3 is cheap enough to search for λ; none where
+    H depends on the time, forces act or there is noise, or with a monitor.
     """
     if not isinstance(setting, str):
         return _gauged(system, realisation, replace(given(system, setting), monitor=monitor))
@@ -113,11 +129,71 @@ def choose(
     open_ = setting != "none" and realisation.exact and realisation.symmetric
     if not open_ or system.driven or monitor:
         return plain
+    omitted: dict[str, str] = {}
     for name in system.casimirs:
         candidate = _gauged(system, realisation, Gauge((*chosen.gauge.free, name)))
-        if _worthwhile(plain, candidate, Symbol(GAUGE, name)):
+        reason = unaffordable(candidate.system)
+        if reason:
+            omitted[name] = reason
+        elif _worthwhile(plain, candidate, Symbol(GAUGE, name)):
             chosen = candidate
-    return chosen
+    return replace(chosen, gauge=replace(chosen.gauge, omitted=omitted)) if omitted else chosen
+
+
+def unaffordable(system: System) -> str:
+    """The reason why λ is not searched for with this H, which contains λ; empty if the search is cheap enough."""
+    try:
+        operations = guide_operations(system)
+    except OverflowError as error:
+        return f"the search for its multiple needs {error}"
+    if operations <= MOST_GUIDE_OPERATIONS:
+        return ""
+    return (
+        "the search for its multiple evaluates the leading error of a step, which would take about "
+        f"{operations} operations; the limit is {MOST_GUIDE_OPERATIONS}"
+    )
+
+
+def guide_operations(system: System) -> int:
+    """An estimate of the operations of π∇S_3, counted from H and π before S_3 is computed.
+
+    Up to factors, S_3 is the sum of ∂_i∂_jH v_i v_j with v = π∇H: the estimate is the number of products of monomials
+    in it. Where it matters, with thousands of them, the operations were 0.6 to 1 of the estimate (measured). Raises
+    `OverflowError` if H or its derivatives are too large to be counted.
+    """
+    h, tensor = system.hamiltonian, system.poisson
+    entries = [e for row in tensor for e in row if not e.is_zero]
+    names = dict.fromkeys([*system.coordinates, *symbols_of(h, *entries)])
+    tower = Tower(list(names), [h, *entries], system.coordinates)
+    slopes = tower.gradient(tower.convert(h), system.coordinates)
+    field_terms = [
+        sum(len(tower.convert(e)) * len(slope) for e, slope in zip(row, slopes, strict=True) if not e.is_zero)
+        for row in tensor
+    ]
+    operations = 0
+    for slope, left in zip(slopes, field_terms, strict=True):
+        if left and len(slope):
+            rows = tower.gradient(slope, system.coordinates)
+            operations += sum(len(e) * left * right for e, right in zip(rows, field_terms, strict=True))
+    return operations
+
+
+@contextmanager
+def fixed_gauge_named(gauge: Gauge, system: System) -> Iterator[None]:
+    """Errors about the size of the program name the gauge that the spec gives, if it gives one."""
+    try:
+        yield
+    except (LimitError, OverflowError) as error:
+        if not gauge.fixed:
+            raise
+        diagnostics = error.diagnostics if isinstance(error, LimitError) else [Diagnostic(f"the spec needs {error}")]
+        place = system.locations.get(("gauge",))
+        named = [Diagnostic(f"with this gauge {d.message}", place, _gauge_hint(d.hint)) for d in diagnostics]
+        raise LimitError(named) from error
+
+
+def _gauge_hint(other: str) -> str:
+    return f"gauge: none, or {other}" if other else "gauge: none"
 
 
 def _gauged(system: System, realisation: BiRealisation, gauge: Gauge) -> Gauged:

@@ -1,18 +1,26 @@
 """The Casimir gauge: chosen for each trajectory, the same in both targets, and an exact Poisson map when held fixed."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 from support import NAMES, files, golden, slow_but, spec_of
 
 from phigen import spec
 from phigen.api import solver_of
+from phigen.cli import group
 from phigen.compiler import compile_spec
-from phigen.errors import SpecError
+from phigen.errors import LimitError, SpecError
+from phigen.geometry.system import system_from_spec
+from phigen.realisations.catalogue import realise
 from phigen.runtime.modules import load_module
+from phigen.scheme.gauge import MOST_GUIDE_OPERATIONS, choose, guide_operations
+from phigen.scheme.lowering import cost
+from phigen.series.hamilton_jacobi import HamiltonJacobi
 from phigen.spec.model import Extras
 from phigen.symbolic.numeric import evaluate
 
@@ -174,3 +182,47 @@ def test_the_gauge_of_what_is_no_casimir_is_refused():
     text = "phigen: 1\nname: t\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: q**2+p**2\n"
     with pytest.raises(SpecError, match="D is not a Casimir of this system"):
         compile_spec(spec.loads(f"{text}gauge: {{D: 1}}\n"))
+
+
+@pytest.mark.parametrize("name", GAUGED)
+def test_operations_of_the_error_term_are_estimated_before_it_is_derived(name):
+    program = gauged(name).program
+    estimate = guide_operations(gauged(name).gauge.applied(gauged(name).system))
+    assert cost(program.gauge.guide.roots) <= 1.3 * estimate <= 8 * cost(program.gauge.guide.roots)
+    assert estimate <= MOST_GUIDE_OPERATIONS / 3
+    assert not gauged(name).notes
+
+
+def neural(terms, rest=""):
+    """Tanh terms on so(3)*, whose S_3 grows like the cube of their number."""
+    numbers = range(terms)
+    declared = ", ".join(f"{letter}{k}: {(7 * k + i) % 5 - 2.3}" for k in numbers for i, letter in enumerate("auvwc"))
+    h = " + ".join(f"a{k}*tanh(u{k}*x + v{k}*y + w{k}*z + c{k})" for k in numbers)
+    text = f"phigen: 1\nname: neural\ncoordinates: [x, y, z]\nparameters: {{{declared}}}\norder: 2\n"
+    return f"{text}poisson: {{lie_algebra: {{name: so(3)}}}}\nhamiltonian: {h}\n{rest}"
+
+
+def test_a_gauge_that_costs_more_than_it_gains_is_left_out_and_said(tmp_path, monkeypatch):
+    """Of eight terms S_3 has 53,000 monomials, and deriving it took a minute."""
+    monkeypatch.setattr(HamiltonJacobi, "polynomial", lambda *_: pytest.fail("the series was derived"))
+    source = spec.loads(neural(8))
+    system = system_from_spec(source)
+    chosen = choose(system, realise(system, source.birealisation), "auto")
+    assert not chosen.gauge.free
+    (note,) = chosen.gauge.notes
+    assert re.fullmatch(r"gauge: auto leaves out C1: the search .* about \d{6} operations; the limit is 10000", note)
+    monkeypatch.undo()
+    file = tmp_path / "neural.yaml"
+    file.write_text(neural(3))
+    for command in (["check"], ["build", "-o", str(tmp_path)], ["show"]):
+        result = CliRunner().invoke(group, [command[0], str(file), *command[1:]])
+        assert result.exit_code == 0 and "gauge: auto leaves out C1" in result.output, result.output
+    assert "gauge: auto leaves out C1" in " ".join((tmp_path / "neural" / "neural.c").read_text().split())
+
+
+def test_a_program_too_large_by_the_gauge_of_its_spec_names_the_gauge():
+    text = "phigen: 1\nname: t\ncoordinates: [x, y, z]\nparameters: {a: 1}\norder: 8\ncomposition: none\n"
+    text += "poisson: {lie_algebra: {name: so(3)}}\nhamiltonian: x**2 + 2*y**2 + z\n"
+    text += "casimirs: {C: (x**2 + y**2 + z**2)**14}\ngauge: {C: a}\n"
+    with pytest.raises(LimitError, match=r":10:1: error: with this gauge S_1 … S_7 .*\n  hint: gauge: none, or"):
+        compile_spec(spec.loads(text))
