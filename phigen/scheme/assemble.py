@@ -27,6 +27,7 @@ from phigen.scheme.kernels import (
     observables,
     path_elimination,
     step_inputs,
+    transposed_elimination_kernel,
 )
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.mean import along_mean
@@ -144,8 +145,9 @@ def _step(
             prepare, linearise, inner, solvers.eliminate, solvers.invert, solvers.factors, centred, refresh=refresh
         )
         if extras.adjoint:
-            transposed = newton_adjoint(linearise, coefficients)
-            newton = replace(newton, adjoint=completed(coefficients, [transposed], prepare, refresh))
+            adjoint = completed(coefficients, [newton_adjoint(linearise, coefficients)], prepare, refresh)
+            eliminate = transposed_elimination_kernel(linearise) if solvers.eliminate else None
+            newton = replace(newton, adjoint=adjoint, eliminate_transposed=eliminate)
         return coefficients.settled(newton)
     tangent = explicit_jacobian(increment, system.coordinates, coefficients) if extras.tangent else None
     refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)

@@ -7,6 +7,7 @@ lattices and trees as sparse as the matrix.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -80,6 +81,17 @@ class Factors:
             x[k] = (b[k] - total(e * x[j] for j, e in rows[k])) * self.reciprocals[k]
         return x
 
+    def solved_transposed(self, side: Sequence[Expression]) -> list[Expression]:
+        """The solution for a right-hand side and the transpose of the matrix, P Uᵀ Lᵀ Pᵀ."""
+        z, columns = list(side), defaultdict[int, list[tuple[int, Expression]]](list)
+        for (k, j), e in self.upper.items():
+            columns[j].append((k, e))
+        for k in self.order:
+            z[k] = (z[k] - total(e * z[m] for m, e in columns[k])) * self.reciprocals[k]
+        for (i, k), factor in reversed(self.lower.items()):
+            z[k] = z[k] - factor * z[i]
+        return z
+
 
 def factorise(pattern: Pattern) -> Factors:
     """The factors of the matrix with entries ``J:i:j`` where the pattern has them."""
@@ -106,6 +118,12 @@ def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, .
     """The solution for the right-hand side ``r:i``, and the reciprocal pivots."""
     factors = factorise(pattern)
     return factors.solved([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
+
+
+def transposed_elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
+    """As `elimination`, for the transpose of the matrix: its zeros are elsewhere, its pivots are the same."""
+    factors = factorise(pattern)
+    return factors.solved_transposed([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
 def inversion(pattern: Pattern) -> tuple[list[Expression], list[Expression]]:

@@ -9,7 +9,15 @@ from fractions import Fraction
 
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.protocol import BiRealisation
-from phigen.scheme.elimination import Factors, Pattern, elimination, factorise, inversion, operations
+from phigen.scheme.elimination import (
+    Factors,
+    Pattern,
+    elimination,
+    factorise,
+    inversion,
+    operations,
+    transposed_elimination,
+)
 from phigen.scheme.generating import GeneratingFunction
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Observables
@@ -103,13 +111,24 @@ class Solvers:
 
 def newton_solvers(linearised: Kernel, *, centred: bool) -> Solvers:
     """Elimination by the pattern of the Jacobian, where it is worth writing out; ``centred`` as in `is_centred`."""
-    jacobian, slope = (_pattern(o.values) for o in linearised.outputs[2:])
+    jacobian, slope = _patterns(linearised)
     n = len(jacobian)
     if n <= UNROLLED:
         return Solvers(_elimination_kernel(jacobian), inverse(jacobian, centred=centred))
     if operations(jacobian) > min(SPARSE * n**3, limits.OPERATIONS):
         return Solvers()
     return Solvers(_elimination_kernel(jacobian), factors=_factorisation(factorise(jacobian), slope))
+
+
+def transposed_elimination_kernel(linearised: Kernel) -> Kernel:
+    """Elimination for the transpose of the Jacobian, by the pattern of the Jacobian itself."""
+    return _elimination_kernel(_patterns(linearised)[0], transposed=True)
+
+
+def _patterns(linearised: Kernel) -> tuple[Pattern, Pattern]:
+    """Where the Jacobian and the slope of the increment may differ from zero."""
+    _, _, jacobian, slope = linearised.outputs
+    return _pattern(jacobian.values), _pattern(slope.values)
 
 
 def _pattern(entries: Sequence[Expression]) -> Pattern:
@@ -122,12 +141,13 @@ def full(n: int) -> Pattern:
     return [[True] * n] * n
 
 
-def _elimination_kernel(pattern: Pattern) -> Kernel:
+def _elimination_kernel(pattern: Pattern, *, transposed: bool = False) -> Kernel:
     n = len(pattern)
-    solution, reciprocals = elimination(pattern)
+    solution, reciprocals = transposed_elimination(pattern) if transposed else elimination(pattern)
+    whose = " for the transpose of the matrix" * transposed
     return Kernel(
-        "eliminate",
-        "elimination without pivoting: the solution, and the reciprocals of the pivots",
+        "eliminate_transposed" if transposed else "eliminate",
+        f"elimination without pivoting{whose}: the solution, and the reciprocals of the pivots",
         {"matrix": _entries("J", n), "side": tuple(Symbol("r", i) for i in range(n))},
         (Output("solution", tuple(solution)), Output("reciprocal", reciprocals)),
     )

@@ -112,8 +112,9 @@ class Factorisation:
 class Newton(_Staged):
     """α(y, ∇S_h(y)) = x, solved for y by Newton's method; then x + (β − α)(y, ∇S_h(y)).
 
-    ``eliminate`` solves with one matrix; of ``invert`` and ``factors``, for many right-hand sides, there is at most
-    one. What is None is left to a loop. ``centred`` says that y is the mean of x and x'.
+    ``eliminate`` solves with one matrix, ``eliminate_transposed`` with the transpose of one, if the adjoint was asked
+    for; of ``invert`` and ``factors``, for many right-hand sides, there is at most one. What is None is left to a loop.
+    ``centred`` says that y is the mean of x and x'.
     """
 
     linearise: Kernel
@@ -122,6 +123,7 @@ class Newton(_Staged):
     invert: Kernel | None = None
     factors: Factorisation | None = None
     centred: bool = False
+    eliminate_transposed: Kernel | None = None
 
     #: What the operation counts of `main` refer to.
     unit = "Newton iteration"
@@ -137,7 +139,7 @@ class Newton(_Staged):
     def kernels(self) -> tuple[Kernel, ...]:
         """All kernels, each once."""
         factors = (self.factors.factorise, self.factors.substitute) if self.factors else ()
-        own = (self.prepare, self.refresh, self.linearise, self.eliminate, self.invert)
+        own = (self.prepare, self.refresh, self.linearise, self.eliminate, self.eliminate_transposed, self.invert)
         return _present((*own, *factors, *self.transposed))
 
 

@@ -1,10 +1,11 @@
 """Unrolled elimination for matrices of a known pattern of zeros."""
 
 import mpmath
+import numpy as np
 import pytest
 from support import values
 
-from phigen.scheme.elimination import elimination, factorise, operations, pivot_order
+from phigen.scheme.elimination import elimination, factorise, operations, pivot_order, transposed_elimination
 from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import symbol
 from phigen.symbolic.numeric import evaluate
@@ -64,6 +65,18 @@ def test_factors_solve_as_elimination_does(name):
     assert evaluate(factors.named("f").solved(side), at | kept) == pytest.approx(
         evaluate(elimination(PATTERNS[name])[0], at), rel=1e-13
     )
+
+
+@pytest.mark.parametrize("name", PATTERNS)
+def test_transposed_elimination_solves_with_the_transpose_and_by_the_same_pivots(name):
+    pattern = PATTERNS[name]
+    n = len(pattern)
+    matrix = np.array([[float(entry(i, j)) * pattern[i][j] for j in range(n)] for i in range(n)])
+    at = {Symbol("J", i, j): matrix[i, j] for i in range(n) for j in range(n)}
+    at |= {Symbol("r", i): i - 2.5 for i in range(n)}
+    solution, reciprocals = transposed_elimination(pattern)
+    assert matrix.T @ evaluate(solution, at) == pytest.approx(np.arange(n) - 2.5, abs=1e-12)
+    assert evaluate(list(reciprocals), at) == evaluate(list(elimination(pattern)[1]), at)
 
 
 @pytest.mark.parametrize("name", PATTERNS)

@@ -14,7 +14,7 @@ from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Rows, Traces, in_
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
-from phigen.scheme.steps import Adjoint, Explicit, Implicit, Path, PathAdjoint, Splitting, Sweeps
+from phigen.scheme.steps import Adjoint, Explicit, Implicit, Newton, Path, PathAdjoint, Splitting, Sweeps
 from phigen.spec.model import Parameter
 from phigen.targets.c import functions, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
@@ -291,6 +291,8 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
         own = [step.prepare, step.main]
     if isinstance(step, Implicit) and has["UNROLLED"]:
         own.append(step.eliminate)
+    if isinstance(step, Newton) and has["UNROLLED_TRANSPOSE"]:
+        own.append(step.eliminate_transposed)
     own += program.choice
     own += [program.monitor.elapsed] if program.monitor else []
     own += [step.tangent] if isinstance(step, Explicit) else []

@@ -192,17 +192,14 @@ static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM],
 static phi_status phi_stage_adjoint(const double *coef, const double y[PHI_DIM], phi_cotangent *bar,
     double coef_bar[PHI_COEFFICIENTS])
 {
-    double displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM], transposed[PHI_DIM * PHI_DIM];
+    double displacement[PHI_DIM], increment[PHI_DIM], jacobian[PHI_DIM * PHI_DIM], slope[PHI_DIM * PHI_DIM];
     double back[PHI_DIM], minus[PHI_DIM], slopes[PHI_COEFFICIENTS];
     phi_linearise(coef, y, displacement, increment, jacobian, slope);
     for (int i = 0; i < PHI_DIM; ++i) {
         back[i] = 0.0;
-        for (int k = 0; k < PHI_DIM; ++k) {
-            back[i] += slope[k * PHI_DIM + i] * bar->x[k];
-            transposed[i * PHI_DIM + k] = jacobian[k * PHI_DIM + i];
-        }
+        for (int k = 0; k < PHI_DIM; ++k) back[i] += slope[k * PHI_DIM + i] * bar->x[k];
     }
-    if (!phi_solve(transposed, back)) return PHI_SINGULAR;
+    if (!phi_solve_transposed(jacobian, back)) return PHI_SINGULAR;
     for (int i = 0; i < PHI_DIM; ++i) minus[i] = -back[i];
     phi_linearise_adjoint(coef, y, minus, bar->x, slopes);
     for (int k = 0; k < PHI_COEFFICIENTS; ++k) coef_bar[k] += slopes[k];

@@ -120,5 +120,34 @@ static int phi_solve(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
 }
 
 #endif
+#if PHI_NEWTON && PHI_ADJOINT
+/* Solve matrix^T * solution = side, both overwritten; the zeros of the matrix^T are not where those of the matrix are.
+   0 if singular. */
+static int phi_solve_transposed(double matrix[PHI_DIM * PHI_DIM], double side[PHI_DIM])
+{
+#if PHI_UNROLLED_TRANSPOSE
+    double solution[PHI_DIM], reciprocal[PHI_DIM], largest = 0.0;
+    phi_eliminate_transposed(matrix, side, solution, reciprocal);
+    for (int i = 0; i < PHI_DIM; ++i)
+        if (!(fabs(reciprocal[i]) <= largest)) largest = fabs(reciprocal[i]);
+    if (largest < PHI_LARGEST_RECIPROCAL) {
+        memcpy(side, solution, sizeof solution);
+        return 1;
+    }
+#endif
+    for (int i = 0; i < PHI_DIM; ++i)
+        for (int j = 0; j < i; ++j) {
+            const double swap = matrix[i * PHI_DIM + j];
+            matrix[i * PHI_DIM + j] = matrix[j * PHI_DIM + i];
+            matrix[j * PHI_DIM + i] = swap;
+        }
+#if PHI_UNROLLED
+    return phi_solve_pivoting(matrix, side);
+#else
+    return phi_solve(matrix, side);
+#endif
+}
+
+#endif
 #endif
 #endif
