@@ -38,7 +38,7 @@ static void phi_keep_steps(const phi_solver *s, size_t steps)
     for (size_t step = 0; step < steps; ++step) {
         double *kept = s->kept + step * of_step;
         for (int number = 0; number < PHI_OWN_FLOWS; ++number) {
-            const int own = PHI_FLOWS > 1 && number == 0 && (step > 0 || s->open) ? PHI_FLOWS : number;
+            const int own = phi_joined(number, step > 0 || s->open);
             phi_flow flow;
             phi_find_flow(s, s->steps + step, own, &flow);
             for (int k = 0, sweep; (sweep = phi_sweep_of(s, own, k)) >= 0; ++k) {
@@ -93,7 +93,7 @@ static double *phi_flow_back(const phi_solver *s, const phi_transpose *g, size_t
 }
 
 /* Pull the cotangents of all sweeps of the step after so many back, from where its sweeps have kept what they changed. */
-static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int joined, double *kept)
+static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, int continues, double *kept)
 {
     PHI_PARALLEL
     {
@@ -101,7 +101,7 @@ static void phi_step_back(const phi_solver *s, phi_transpose *g, size_t steps, i
         double *left = kept + g->of_step;
         memcpy(x, g->x, sizeof x);
         for (int flow = PHI_OWN_FLOWS - 1; flow >= 0; --flow)
-            left = phi_flow_back(s, g, steps, flow == 0 && joined ? PHI_FLOWS : flow, left, x, g->bar);
+            left = phi_flow_back(s, g, steps, phi_joined(flow, continues), left, x, g->bar);
     }
     double *left = kept; /* what the step began with */
     int seen[PHI_DIM] = { 0 };

@@ -14,6 +14,10 @@
 /* The sweeps that steps consist of where they are joined: without the last flow, unless that is all. */
 #define PHI_OWN_FLOWS (PHI_FLOWS > 1 ? PHI_FLOWS - 1 : 1)
 
+/* The number of such a flow among all flows: the first of a step that continues another is joined to the last of that one, unless
+   steps are one flow. */
+static int phi_joined(int flow, int continues) { return PHI_FLOWS > 1 && flow == 0 && continues ? PHI_FLOWS : flow; }
+
 #endif
 /* What is pulled back through steps, and the memory for it. */
 typedef struct phi_transpose {

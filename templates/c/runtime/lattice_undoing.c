@@ -139,7 +139,7 @@ static void phi_steps_back(const phi_solver *s, const phi_transpose *g, size_t b
 #endif
     for (size_t left = steps * PHI_OWN_FLOWS; left-- > 0;) {
         const size_t step = before + left / PHI_OWN_FLOWS;
-        const int flow = (int)(left % PHI_OWN_FLOWS), number = flow == 0 && step > g->first_step ? PHI_FLOWS : flow;
+        const int number = phi_joined((int)(left % PHI_OWN_FLOWS), step > g->first_step);
         phi_flow_back(s, g, step, number, g->bar, flows, &count, depth);
     }
     phi_go_all_back(s, flows, count);
@@ -166,13 +166,13 @@ static void phi_step_back_anew(phi_solver *s, const phi_transpose *g, size_t bef
             phi_flow flow;
             size_t count = 0;
             for (int number = 0; number <= last; ++number) {
-                phi_find_flow(s, before, number == 0 && before > g->first_step ? PHI_FLOWS : number, &flow);
+                phi_find_flow(s, before, phi_joined(number, before > g->first_step), &flow);
                 phi_sweep_part(s, flow.part, flow.coef PHI_AND_FAR(g->far));
             }
 #if PHI_TAKES
             if (last == PHI_OWN_FLOWS - 1) phi_hand_nothing(s, g, phi_number_of(before + 1, 0));
 #endif
-            phi_flow_back(s, g, before, last == 0 && before > g->first_step ? PHI_FLOWS : last, g->bar, &flow, &count, 1);
+            phi_flow_back(s, g, before, phi_joined(last, before > g->first_step), g->bar, &flow, &count, 1);
 #if PHI_TAKES
             if (last == 0) phi_hand_last(s, g, phi_number_of(before, 0), g->bar);
 #endif
