@@ -368,7 +368,8 @@ class Sweep:
         return self.kernel.name.startswith("tangent")
 
 
-#: The kernels of an equation that read variations.
+#: The kernels of an equation that read the start of a stage, and those that read variations.
+STARTED = frozenset({"relax", "slope", "side"})
 VARIED = frozenset({"slope", "side", "follow"})
 
 

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweeps
-from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol, kind_of
 
 
 def tables(program: Program, step: Sweeps, listed: Callable[[Sequence[object]], str]) -> dict[str, object]:
@@ -50,22 +49,3 @@ def switches(step: Sweeps) -> dict[str, bool]:
         "GRAPH": step.others.graph,
         "BY_COLOUR": bool(step.by_colour),
     }
-
-
-def begins(step: Sweeps) -> tuple[Symbol, ...]:
-    """What is 1 where a site at an offset has a colour, and is on the seams of a sweep, in the order of kernels."""
-    read = (s for sweep in step.sweeps for s in sweep.kernel.inputs["present"])
-    return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == BEGINS))
-
-
-def weights(program: Program, step: Sweeps) -> tuple[Symbol, ...]:
-    """What is 1 for terms of H that reach beyond no open end, in the order in which kernels read it."""
-    own = (*(sweep.kernel for sweep in step.sweeps), *(step.equation.kernels if step.equation else ()))
-    read = (w for kernel in (*own, *program.observables.kernels) for w in kernel.inputs["present"])
-    return tuple(dict.fromkeys(w for w in read if isinstance(w, Symbol) and kind_of(w) == PRESENT))
-
-
-def bounds(weight: Symbol) -> list[tuple[int, int]]:
-    """The least and the largest offset of a term along each axis."""
-    ends = [int(k) for k in weight.key]
-    return list(zip(ends[::2], ends[1::2], strict=True))

@@ -39,9 +39,7 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
     yield Feature("TRACED", lambda p: (blocks or traces) and isinstance(p.step, Implicit), ("ADJOINT",))
     blocked = blocks or traces  # their reverse pass solves in lanes, and leaves few stages to single steps
-    yield Feature(
-        "UNROLLED_TRANSPOSE", lambda p: isinstance(p.step, Newton) and not blocked, ("UNROLLED", "ADJOINT")
-    )
+    yield Feature("UNROLLED_TRANSPOSE", lambda p: isinstance(p.step, Newton) and not blocked, ("UNROLLED", "ADJOINT"))
     yield Feature("NARROW", lambda p: traces and traces.narrow, ("TRACED",))
     yield Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")

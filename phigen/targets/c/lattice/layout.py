@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from phigen.ir.lattice import begins, weights
 from phigen.lattice.adjoint import BACK
 from phigen.lattice.collecting import AROUND
 from phigen.lattice.undoing import can_be_undone, transposes
@@ -109,12 +110,12 @@ def layout_of(program: Program, step: Sweeps) -> Layout:
     """The layout of a lattice."""
     sites = step.sites
     offsets = [offset for _, offset in sites.places.values()]
-    offsets += [tuple(map(int, s.key[1:])) for s in lattice.begins(step)]
+    offsets += [tuple(map(int, s.key[1:])) for s in begins(step)]
     offsets += [tuple(-o for o in offset) for offset in offsets] if step.adjoint else []
     lines = dict.fromkeys([(0,) * (len(sites.axes) - 1), *sorted({o[:-1] for o in offsets})])
     halo = max((abs(o[-1]) for o in offsets), default=0)
     arrays = (*program.coordinates, *sites.parameters, *sites.increments)
-    found = Layout(step, tuple(lines), halo, lattice.weights(program, step), arrays)
+    found = Layout(step, tuple(lines), halo, weights(program, step), arrays)
     banded = found.band > 0 and program.offers("recurrences")
     return replace(found, slopes=program.profile == "fast" or program.extras.tangent or banded or bool(step.adjoint))
 

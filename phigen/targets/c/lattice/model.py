@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
+from phigen.ir.lattice import bounds
 from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Sweeps
 from phigen.spec.model import Parameter
@@ -17,7 +18,6 @@ from phigen.targets.c.lattice.layout import (
     switches,
 )
 from phigen.targets.header import plain
-from phigen.targets.lattice import bounds
 from phigen.targets.rendering import render
 
 
@@ -192,7 +192,7 @@ def _tables_of_sites(program: Program, step: Sweeps, layout: Layout, has: Mappin
         "ends": several or has["BANDED"],
         "open": ", ".join(str(int(o)) for o in sites.open),
         "lines": ", ".join(_braced([*line, 0]) for line in layout.lines),
-        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w)]) for w in layout.weights if several),
+        "weights": ", ".join(_braced([_braced(pair) for pair in bounds(w.key)]) for w in layout.weights if several),
         "colours": ", ".join(map(str, sites.weights)) if sites.colours > 1 and (several or sites.seams) else "",
         "seams": ", ".join(_braced([s.period, s.wide, s.near]) for s in sites.seams),
         "graph": layout.graph,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
 
+from phigen.ir.lattice import begins, bounds
 from phigen.lattice.collecting import AROUND
 from phigen.lattice.pairing import HERE, THERE
 from phigen.scheme.kernel import Kernel
@@ -13,7 +14,6 @@ from phigen.symbolic.symbols import BEGINS, CHOSEN, COEFFICIENT, GATHERED, INCRE
 from phigen.targets.c.kernels import members, printer
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.code import Code
-from phigen.targets.lattice import begins, bounds
 from phigen.targets.names import Scope
 from phigen.targets.reserved import C_RESERVED
 
@@ -174,7 +174,7 @@ class SiteNames:
         k = self.layout.weights.index(s)
         named = f"w{k}"
         self.scope.bind(s, named)
-        low, high = bounds(s)[-1]
+        low, high = bounds(s.key)[-1]
         tests = [f"i - {-low} >= 0"] * (low < 0) + [f"i + {high} < row->s->length"] * (high > 0)
         if tests:
             there = "1.0"

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from phigen.ir.lattice import bounds
 from phigen.lanes.lowering import Rows
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
@@ -29,7 +30,6 @@ from phigen.targets.c.lattice.loops import (
 from phigen.targets.c.lattice.partners import gathering, partners, told_of_bonds
 from phigen.targets.c.lattice.seen import seen_loop
 from phigen.targets.c.lattice.turned import orders, other_ways, turned, turned_increments
-from phigen.targets.lattice import bounds
 from phigen.targets.rendering import render
 
 
@@ -428,7 +428,7 @@ def over_rows(
     They have the numbers 1, 2, …, or those of ``labels``. On the way ``back``, sites beside open ends are whole vectors
     of 8, so that those between are too.
     """
-    last = [bounds(w)[-1] for w in layout.weights]
+    last = [bounds(w.key)[-1] for w in layout.weights]
     low, one_row = max([0, *(-low for low, _ in last)]), len(layout.step.sites.axes) == 1
     low = (low + 7) // 8 * 8 if back else low
     seamed = bool(layout.step.sites.seams)

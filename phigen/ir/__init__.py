@@ -1,0 +1,1 @@
+"""The loop IR: typed statements and loops between kernels and text."""

@@ -1,0 +1,181 @@
+"""Builder of the loops of a lattice: from kernels at a site to functions with loops over sites, bonds or pairs.
+
+The meaning of every symbol that kernels read is decided here, once for all targets. The functions are on the level of
+sites; their stores hold whole expression graphs until `phigen.ir.passes.temporaries`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+
+from phigen.ir import nodes as ir
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import STARTED, VARIED, Ends, Gather, Sweep, Sweeps
+from phigen.symbolic import symbols
+from phigen.symbolic.expression import Expression, number, symbol
+from phigen.symbolic.symbols import Symbol, kind_of
+
+#: The share of each of two sites in the energy between them.
+_HALF = number(Fraction(1, 2))
+
+
+@dataclass(frozen=True)
+class LatticeLoops:
+    """The functions of the kernels of one program."""
+
+    program: Program
+    step: Sweeps
+
+    def sweep(self, sweep: Sweep) -> ir.Function:
+        """Return the function that adds a sweep to the fields, or its derivative to their variation."""
+        storage = ir.Storage.VARIATION if sweep.is_tangent else ir.Storage.STATE
+        arrays = (ir.Array(storage, k, self.program.coordinates[k]) for k in sweep.moved)
+        stores = [ir.Store(array, e) for array, e in zip(arrays, sweep.kernel.roots, strict=True)]
+        coloured = self.step.sites.colours > 1
+        selection = ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window)
+        role = ir.Role.TANGENT_SWEEP if sweep.is_tangent else ir.Role.SWEEP
+        parameters = ("coef", "state", *["varied"] * sweep.is_tangent, "sites", *["colour"] * bool(self.step.by_colour))
+        return self._over_sites(sweep.kernel, role, parameters, stores, sweep.gather, selection)
+
+    def stage(self, kernel: Kernel) -> ir.Function:
+        """Return the function of a kernel of the equation of a stage, whose fields are those of y."""
+        gather = self.step.others.varied if kernel.name in VARIED else self.step.others.field
+        read = gather if kernel.inputs["gathered"] else None
+        starts, varied = kernel.name in STARTED, kernel.name in VARIED
+        parameters = ("coef", *["start"] * starts, "state", *["varied"] * varied, "sites", "out")
+        return self._over_sites(kernel, ir.Role.STAGE, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
+
+    def observable(self, kernel: Kernel) -> ir.Function:
+        """Return the function of a density, an energy or the vector field; sites share the energy of bonds."""
+        others = self.step.others
+        gather = {"energy": others.energy, "vector_field": others.field}.get(kernel.name)
+        body: list[ir.Statement] = [*self._outputs(ir.Storage.OBSERVABLE, kernel.roots)]
+        if kernel.name == "energy" and others.energy.names:
+            shared, out = Symbol(symbols.GATHERED, "energy"), ir.Array(ir.Storage.OBSERVABLE, 0)
+            body.insert(0, ir.real(shared, ir.Load(ir.Array(ir.Storage.SUM, 0))))
+            body.append(ir.Store(out, _HALF * symbol(shared)))
+        gather = gather if gather and gather.names else None
+        return self._over_sites(kernel, ir.Role.OBSERVABLE, ("params", "state", "sites", "out"), body, gather)
+
+    def sums(self, ends: Ends) -> ir.Function:
+        """Return the function that sums over the bonds of one kind, or over the pairs, of each site."""
+        kernel = ends.kernel
+        once, reads = self._reads(kernel, ())
+        kind = "bonds" if self.step.others.graph else "pairs"
+        body = (*reads, *self._outputs(ir.Storage.SUM, kernel.roots, adds=True))
+        loop = ir.Loop(kind, body, end=ends.end, chosen=ends.chosen)
+        source = "params" if "params" in kernel.inputs else "coef"
+        varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
+        colour = source == "coef" and bool(self.step.by_colour)
+        parameters = (source, "state", *["varied"] * varied, "sites", *["colour"] * colour)
+        return ir.Function(kernel.name, kernel.purpose, ir.Role.GATHER, parameters, (*once, loop))
+
+    def _over_sites(
+        self,
+        kernel: Kernel,
+        role: ir.Role,
+        parameters: tuple[str, ...],
+        updates: Sequence[ir.Statement],
+        gather: Gather | None,
+        selection: ir.Selection = ir.ALL_SITES,
+    ) -> ir.Function:
+        once, reads = self._reads(kernel, gather.names if gather else ())
+        gathered = (ir.GatherSums(tuple(k.name for k in gather.kernels)),) if gather else ()
+        body = (*gathered, *once, ir.Loop("sites", (*reads, *updates), selection=selection))
+        return ir.Function(kernel.name, kernel.purpose, role, parameters, body)
+
+    def _outputs(self, storage: ir.Storage, values: Sequence[Expression], *, adds: bool = False) -> list[ir.Store]:
+        return [ir.Store(ir.Array(storage, k), e, adds) for k, e in enumerate(values)]
+
+    def _reads(self, kernel: Kernel, sums: Sequence[str]) -> tuple[list[ir.Statement], list[ir.Statement]]:
+        """Return the declarations of what is read once, and of what is read at each site, in the order of inputs."""
+        once: list[ir.Statement] = []
+        reads: list[ir.Statement] = []
+        for s in _symbols(kernel):
+            meaning = self.meaning(s, sums)
+            at_all_sites = isinstance(meaning, ir.Coefficient | ir.SystemParameter | ir.Time)
+            (once if at_all_sites else reads).append(ir.real(s, meaning))
+        return once, reads
+
+    def meaning(self, s: str, sums: Sequence[str] = ()) -> ir.Value:
+        """Return the value that a symbol of a kernel stands for; ``sums`` are the names of the gathered sums."""
+        sites, fields = self.step.sites, self.program.coordinates
+        key = s.key if isinstance(s, Symbol) else ()
+        match kind_of(s):
+            case symbols.COEFFICIENT:
+                return ir.Coefficient(int(key[0]))
+            case symbols.PRESENT:
+                return ir.Inside(self.weights.index(s), tuple(bounds(key)))
+            case symbols.BEGINS:
+                return ir.OnSeam(self.seams.index(s), int(key[0]), tuple(int(o) for o in key[1:]))
+            case symbols.CHOSEN:
+                return ir.HasColour()
+            case symbols.GATHERED:
+                return ir.Load(ir.Array(ir.Storage.SUM, [*sums].index(s), str(s)))
+            case symbols.VARIATION:
+                return self._load(str(key[0]), ir.Storage.VARIATION)
+            case symbols.INITIAL:
+                return ir.Load(ir.Array(ir.Storage.START, fields.index(str(key[0])), str(key[0])))
+        if s == self.program.time:
+            return ir.Time()
+        if s in sites.at_bonds:
+            return ir.BondParameter(sites.at_bonds.index(s), s)
+        if s in sites.places or s in sites.ends:
+            return self._load(s, ir.Storage.STATE)
+        return ir.SystemParameter(s)
+
+    def _load(self, place: str, storage: ir.Storage) -> ir.Load:
+        sites = self.step.sites
+        base, end = sites.ends.get(place, ("", ""))
+        offset: tuple[int, ...] = ()
+        if not end:
+            base, offset = sites.places[place]
+        return ir.Load(ir.Array(storage, self.arrays.index(base), base), tuple(offset), end)
+
+    @cached_property
+    def arrays(self) -> tuple[str, ...]:
+        """The arrays of the state."""
+        sites = self.step.sites
+        return (*self.program.coordinates, *sites.parameters, *sites.increments)
+
+    @cached_property
+    def neighbours(self) -> list[tuple[int, ...]]:
+        """The offsets of all neighbours."""
+        return sorted({offset for _, offset in self.step.sites.places.values() if any(offset)})
+
+    @cached_property
+    def weights(self) -> tuple[Symbol, ...]:
+        """The weights of terms at open ends, in the order in which kernels read them."""
+        return weights(self.program, self.step)
+
+    @cached_property
+    def seams(self) -> tuple[Symbol, ...]:
+        """The tests for boundary seams, in the order in which kernels read them."""
+        return begins(self.step)
+
+
+def _symbols(kernel: Kernel) -> Iterator[str]:
+    return (s for listed in kernel.inputs.values() for s in listed)
+
+
+def begins(step: Sweeps) -> tuple[Symbol, ...]:
+    """Return the symbols that are 1 where a site at an offset has a colour and lies on the seams of a sweep."""
+    read = (s for sweep in step.sweeps for s in sweep.kernel.inputs["present"])
+    return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == symbols.BEGINS))
+
+
+def weights(program: Program, step: Sweeps) -> tuple[Symbol, ...]:
+    """Return the symbols that are 1 for terms of H that lie within the open ends, in the order of kernels."""
+    own = (*(sweep.kernel for sweep in step.sweeps), *(step.equation.kernels if step.equation else ()))
+    read = (w for kernel in (*own, *program.observables.kernels) for w in kernel.inputs["present"])
+    return tuple(dict.fromkeys(w for w in read if isinstance(w, Symbol) and kind_of(w) == symbols.PRESENT))
+
+
+def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
+    """Return the least and the largest offset of a term along each axis, from the key of its weight."""
+    ends = [int(k) for k in key]
+    return list(zip(ends[::2], ends[1::2], strict=True))

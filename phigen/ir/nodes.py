@@ -1,0 +1,364 @@
+"""Nodes of the loop IR. Real arithmetic is an `Expression` over symbols that statements declare.
+
+There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops go
+over sites, bonds or pairs. Each target has one lowering pass from there to the level of *memory*, where `Entry`,
+`Member` and plain loops say which array element is meant. Printers accept the level of memory only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import Enum, auto
+
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import Symbol
+
+#: The kind of symbols that are printed as they are, since the printed function reserves them.
+FIXED = "fixed"
+
+
+class Type(Enum):
+    """Type of a declared value."""
+
+    REAL = auto()
+    INDEX = auto()
+    ARRAY = auto()  # of a language without pointers
+
+
+@dataclass(frozen=True)
+class Pointer:
+    """Pointer to reals; a ``constant`` one is only read through, a ``restricted`` one has no alias that is written."""
+
+    constant: bool = True
+    restricted: bool = False
+
+
+@dataclass(frozen=True)
+class Vector:
+    """Local array of reals."""
+
+    length: int
+
+
+class Storage(Enum):
+    """Kinds of arrays over the sites."""
+
+    STATE = "x"  # fields, then parameters at sites, then increments of noise
+    VARIATION = "varied"
+    START = "start"  # the fields at the start of a stage
+    OUTPUT = "out"
+    OBSERVABLE = "observable"  # output for callers, without padding between rows
+    SUM = "gathered"  # sums over bonds or pairs
+
+
+@dataclass(frozen=True)
+class Array:
+    """Array over the sites: its number among those of one kind of storage."""
+
+    storage: Storage
+    number: int
+    name: str = ""
+
+
+# ---- values; beside these, every `Expression` is a value
+
+
+@dataclass(frozen=True)
+class Name:
+    """A declared name."""
+
+    symbol: str
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number in its shortest form, a string, or nothing."""
+
+    value: int | float | str | None
+
+
+@dataclass(frozen=True)
+class Load:
+    """Element of an array at an offset from the site of the loop, or at the ``end``, a or b, of a bond or pair."""
+
+    array: Array
+    offset: tuple[int, ...] = ()
+    end: str = ""
+
+
+@dataclass(frozen=True)
+class Coefficient:
+    """State-independent value that ``prepare`` has computed."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class SystemParameter:
+    """Parameter that is the same at all sites."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class BondParameter:
+    """Parameter at the bond of the loop; an ``oriented`` one has the opposite sign seen from the end b."""
+
+    number: int
+    name: str
+    oriented: bool = False
+
+
+@dataclass(frozen=True)
+class Time:
+    """Physical time."""
+
+
+@dataclass(frozen=True)
+class Inside:
+    """1 where a term with these least and largest offsets along each axis lies within the open ends, else 0."""
+
+    number: int
+    bounds: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True)
+class HasColour:
+    """1 at sites of the colour of the sweep, else 0."""
+
+
+@dataclass(frozen=True)
+class OnSeam:
+    """1 where the site at an offset has a colour and lies on the boundary seams of the sweep, else 0."""
+
+    number: int
+    colour: int
+    offset: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Member:
+    """Member of a record."""
+
+    record: Value
+    name: str
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Element of an array in memory."""
+
+    array: Value
+    index: Value
+
+
+@dataclass(frozen=True)
+class Binary:
+    """Infix operator on two values."""
+
+    operator: str
+    left: Value
+    right: Value
+
+
+@dataclass(frozen=True)
+class Select:
+    """One of two values by a condition."""
+
+    condition: Value
+    then: Value
+    otherwise: Value
+
+
+@dataclass(frozen=True)
+class Listed:
+    """Values in the brackets of a list."""
+
+    values: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Called:
+    """Value of a function, or of a method of an ``instance``."""
+
+    name: str
+    arguments: tuple[Value, ...] = ()
+    instance: Value | None = None
+
+
+Value = (
+    Expression | Name | Constant | Load | Coefficient | SystemParameter | BondParameter | Time | Inside | HasColour
+    | OnSeam | Member | Entry | Binary | Select | Listed | Called
+)  # fmt: skip
+
+
+# ---- statements
+
+
+@dataclass(frozen=True)
+class Declare:
+    """Constants of one type; those ``in_place`` get no name: their value is printed wherever they are used."""
+
+    type: Type | Pointer | Vector
+    items: tuple[tuple[str, Value], ...]
+    in_place: bool = False
+    note: str = ""
+    mutable: bool = False
+
+
+@dataclass(frozen=True)
+class Unpack:
+    """Constants that are the members, or the items, of one value."""
+
+    names: tuple[str, ...]
+    value: Value
+
+
+@dataclass(frozen=True)
+class Store:
+    """The element at the site becomes a value, or grows by it."""
+
+    array: Array
+    value: Value
+    adds: bool = True
+
+    @property
+    def graph(self) -> Expression:
+        """The value, before it is lowered to memory."""
+        assert isinstance(self.value, Expression)
+        return self.value
+
+
+@dataclass(frozen=True)
+class GatherSums:
+    """The sums over bonds or pairs are computed for all sites by the functions of these names."""
+
+    functions: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Assign:
+    """A place in memory becomes a value, or grows by it."""
+
+    target: Value
+    value: Value
+    adds: bool = False
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The sites that a sweep updates: of one ``colour``, away from boundary seams, or on those of a ``window``."""
+
+    colour: int | None = None
+    inside: bool = False
+    window: int | None = None
+
+
+ALL_SITES = Selection()
+
+
+@dataclass(frozen=True)
+class Loop:
+    """Loop over sites, bonds or pairs; in memory over a variable from ``low`` to before ``high``.
+
+    ``end`` and ``chosen`` say which bonds a loop over bonds takes, as in `phigen.scheme.steps.Ends`.
+    """
+
+    kind: str
+    body: Block
+    variable: str = "i"
+    low: Value | None = None
+    high: Value | None = None
+    selection: Selection = ALL_SITES
+    end: str = ""
+    chosen: str = ""
+
+
+@dataclass(frozen=True)
+class If:
+    """Statements under a condition."""
+
+    condition: Value
+    then: Block
+
+
+@dataclass(frozen=True)
+class Within:
+    """Statements in a context, such as one that silences warnings."""
+
+    context: Value
+    body: Block
+
+
+@dataclass(frozen=True)
+class Continue:
+    """Go on with the next iteration."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function called for its effect."""
+
+    name: str
+    arguments: tuple[Value, ...]
+    instance: Value | None = None
+
+
+@dataclass(frozen=True)
+class Return:
+    """The end of a function."""
+
+    value: Value | None = None
+
+
+Statement = Declare | Unpack | Store | GatherSums | Assign | Loop | If | Within | Continue | Call | Return
+Block = tuple[Statement, ...]
+
+
+#: The parameters of functions on the level of sites; a target gives them its own names.
+PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
+
+
+class Role(Enum):
+    """Purpose of a function."""
+
+    SWEEP = auto()
+    TANGENT_SWEEP = auto()
+    STAGE = auto()  # a kernel of the equation of a stage
+    OBSERVABLE = auto()
+    GATHER = auto()  # sums over bonds or pairs
+
+
+@dataclass(frozen=True)
+class Function:
+    """A function; ``doc`` is its purpose. On the level of sites its parameters are some of `PARAMETERS`."""
+
+    name: str
+    doc: str
+    role: Role
+    parameters: tuple[str, ...]
+    body: Block
+
+    def with_body(self, *body: Statement) -> Function:
+        """Return the function with other statements."""
+        return replace(self, body=body)
+
+
+def fixed(name: str) -> Name:
+    """Return a name that is printed as it is."""
+    return Name(Symbol(FIXED, name))
+
+
+def real(name: str, value: Value) -> Declare:
+    """Return the declaration of one real constant."""
+    return Declare(Type.REAL, ((name, value),))
+
+
+def index(name: Name, value: Value) -> Declare:
+    """Return the declaration of one index."""
+    return Declare(Type.INDEX, ((name.symbol, value),))
+
+
+def plus(value: Value, offset: int) -> Value:
+    """Return a value moved by an integer."""
+    return Binary("+" if offset > 0 else "-", value, Constant(abs(offset))) if offset else value

@@ -1,0 +1,1 @@
+"""Passes of the loop IR, each a pure function from functions to functions."""

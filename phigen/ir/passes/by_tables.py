@@ -1,0 +1,179 @@
+"""Lowering by tables: the fields of all sites in one array, and neighbours by tables of site numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.lattice import LatticeLoops
+from phigen.ir.walk import names_in, statements
+from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
+
+SITE, OTHER, NUMBER, SITES, COUNT, COLOUR = (ir.fixed(name) for name in ("i", "j", "k", "sites", "count", "colour"))
+
+#: The arrays of each kind of storage, and the parameters of functions that have another name here.
+_ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
+_PARAMETERS = {"state": "x", "varied": "v"}
+
+
+def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
+    """Return the function on memory."""
+    parameters = tuple(_PARAMETERS.get(p, p) for p in function.parameters)
+    if not any(isinstance(s, ir.Store) for s in statements(function.body)):
+        return replace(function, parameters=parameters, body=())
+    return _Tables(replace(function, parameters=parameters), lattice).lowered()
+
+
+@dataclass
+class _Tables:
+    """The lowering of one function; ``head`` are the declarations before its loops, ``hoisted`` their names."""
+
+    function: ir.Function
+    lattice: LatticeLoops
+    head: list[ir.Statement] = field(default_factory=list)
+    hoisted: set[str] = field(default_factory=set)
+
+    @property
+    def params(self) -> ir.Value:
+        """The parameters of the system."""
+        return ir.fixed("params") if "params" in self.function.parameters else ir.Member(SITES, "params")
+
+    def lowered(self) -> ir.Function:
+        """Return the function on memory."""
+        calls: list[ir.Statement] = []
+        loops: list[ir.Statement] = []
+        for s in self.function.body:
+            if isinstance(s, ir.GatherSums):
+                calls += self._gather_sums(s)
+            elif isinstance(s, ir.Loop):
+                loops.append(self._loop(s))
+            else:
+                self.head += self._lowered(s, ir.Selection())
+        counted = [ir.Unpack(("count",), SITES)] if COUNT.symbol in names_in(tuple(loops)) else []
+        return self.function.with_body(*calls, *counted, *self.head, *loops)
+
+    def _gather_sums(self, s: ir.GatherSums) -> Iterator[ir.Statement]:
+        others = [p for p in self.function.parameters if p not in ("coef", "params", "start", "out")]
+        source = self.params if self.function.role in (ir.Role.STAGE, ir.Role.OBSERVABLE) else ir.fixed("coef")
+        yield ir.Call("fill", (ir.Constant(0),), ir.Member(SITES, "sums"))
+        yield from (ir.Call(name, (source, *map(ir.fixed, others))) for name in s.functions)
+
+    def _loop(self, s: ir.Loop) -> ir.Loop:
+        body = tuple(new for inner in s.body for new in self._lowered(inner, s.selection))
+        here, chosen = ir.fixed("here"), ir.fixed("chosen")
+        if s.kind != "sites":
+            self.head.append(ir.Unpack(("sums",), SITES))
+        if s.kind == "pairs":
+            other = ir.If(ir.Binary("==", OTHER, SITE), (ir.Continue(),))
+            return _counted("i", COUNT, (_counted("j", COUNT, (other, *body)),))
+        if s.kind == "bonds":
+            bonds = ir.Called("bonds", (ir.Constant(s.end), ir.Constant(s.chosen), *[COLOUR] * bool(s.chosen)), SITES)
+            self.head.append(ir.Unpack(("here", "there", "bond"), bonds))
+            return _counted(
+                "k",
+                ir.Member(here, "length"),
+                (ir.index(SITE, ir.Entry(here, NUMBER)), ir.index(OTHER, ir.Entry(ir.fixed("there"), NUMBER)), *body),
+            )
+        sites = _sites_of(s.selection)
+        if not sites:
+            return _counted("i", COUNT, body)
+        self.head.insert(0, ir.Declare(ir.Type.ARRAY, ((chosen.symbol, sites),)))
+        return _counted("k", ir.Member(chosen, "length"), (ir.index(SITE, ir.Entry(chosen, NUMBER)), *body))
+
+    def _lowered(self, s: ir.Statement, selection: ir.Selection) -> Iterator[ir.Statement]:
+        match s:
+            case ir.Store(array, value, adds):
+                yield ir.Assign(self._element(array, SITE), value, adds)
+            case ir.Declare(items=((name, ir.Load() as load),)):
+                yield from self._neighbour(load)
+                in_place = load.array.storage is not ir.Storage.STATE
+                yield replace(s, items=((name, self._element(load.array, self._site(load))),), in_place=in_place)
+            case ir.Declare(items=((name, value),)):
+                yield replace(s, items=((name, self._value(value, selection)),), in_place=_in_place(value))
+            case _:
+                yield s
+
+    def _value(self, value: ir.Value, selection: ir.Selection) -> ir.Value:
+        match value:
+            case ir.Coefficient(k):
+                return ir.Entry(ir.fixed("coef"), ir.Constant(k))
+            case ir.SystemParameter(name):
+                return ir.Member(self.params, name)
+            case ir.Time():
+                return ir.Member(SITES, "t")
+            case ir.BondParameter(_, name):
+                return ir.Entry(self._parameter(name), ir.Entry(ir.fixed("bond"), NUMBER))
+            case ir.Inside(k):
+                return ir.Entry(
+                    self._hoisted(Symbol(PRESENT, k), ir.Entry(ir.Member(SITES, "present"), ir.Constant(k))), SITE
+                )
+            case ir.HasColour():
+                own = ir.Binary("==", ir.Entry(ir.Member(SITES, "colours"), SITE), COLOUR)
+                return ir.Select(own, ir.Constant(1), ir.Constant(0))
+            case ir.OnSeam(k):
+                window = ir.Constant(selection.window or 0)
+                return ir.Entry(
+                    self._hoisted(Symbol(BEGINS, k), ir.Called("begins", (ir.Constant(k), window), SITES)), SITE
+                )
+        return value
+
+    def _element(self, array: ir.Array, site: ir.Value) -> ir.Value:
+        fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
+        if array.storage is not ir.Storage.STATE or array.name in fields:
+            own = ir.fixed(_ARRAYS.get(array.storage, "out"))
+            sums = array.storage is ir.Storage.SUM and self.function.role is not ir.Role.GATHER
+            return ir.Entry(ir.Member(SITES, "sums") if sums else own, _of_field(site, array.number))
+        if array.name in increments:
+            drawn = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))
+            return ir.Entry(drawn, _of_field(site, increments.index(array.name)))
+        return ir.Entry(self._parameter(array.name), site)
+
+    def _parameter(self, name: str) -> ir.Name:
+        """Return the array of a parameter at sites or at bonds."""
+        return self._hoisted(Symbol("at", name), ir.Member(self.params, name))
+
+    def _hoisted(self, name: Symbol, value: ir.Value) -> ir.Name:
+        if name not in self.hoisted:
+            self.hoisted.add(name)
+            self.head.append(ir.Declare(ir.Type.ARRAY, ((name, value),)))
+        return ir.Name(name)
+
+    def _site(self, load: ir.Load) -> ir.Value:
+        if load.end or not any(load.offset):
+            return OTHER if load.end == "b" else SITE
+        return ir.Name(Symbol("beside", self.lattice.neighbours.index(load.offset)))
+
+    def _neighbour(self, load: ir.Load) -> Iterator[ir.Statement]:
+        """Yield the declaration of the site that is read, where it is a new one."""
+        site = self._site(load)
+        if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
+            number = self.lattice.neighbours.index(load.offset)
+            table = self._hoisted(Symbol("near", number), ir.Entry(ir.Member(SITES, "near"), ir.Constant(number)))
+            self.hoisted.add(site.symbol)
+            yield ir.index(site, ir.Entry(table, SITE))
+
+
+def _counted(variable: str, end: ir.Value, body: ir.Block) -> ir.Loop:
+    return ir.Loop("plain", body, variable, ir.Constant(0), end)
+
+
+def _of_field(site: ir.Value, number: int) -> ir.Value:
+    """Return the index of a site in an array of all fields."""
+    if number == 0:
+        return site
+    return ir.Binary("+", site, COUNT if number == 1 else ir.Binary("*", ir.Constant(number), COUNT))
+
+
+def _sites_of(selection: ir.Selection) -> ir.Value | None:
+    """Return the list of the sites that a sweep updates; None where it updates all."""
+    if selection.window is not None:
+        return ir.Member(SITES, "beside")
+    if selection.colour is None and not selection.inside:
+        return None
+    colour = ir.Constant("all" if selection.colour is None else selection.colour)
+    return ir.Entry(ir.Member(SITES, "inside" if selection.inside else "coloured"), colour)
+
+
+def _in_place(value: ir.Value) -> bool:
+    return isinstance(value, ir.Inside | ir.HasColour | ir.OnSeam)

@@ -1,0 +1,27 @@
+"""Simultaneous updates: all changes of a sweep are computed before any field is changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.walk import map_blocks
+
+
+def simultaneous(function: ir.Function) -> ir.Function:
+    """Return a sweep with a name for each change, where it makes several; other functions as they are."""
+    if function.role not in (ir.Role.SWEEP, ir.Role.TANGENT_SWEEP):
+        return function
+
+    def change(body: ir.Block) -> Iterator[ir.Statement]:
+        stores = [s for s in body if isinstance(s, ir.Store)]
+        if len(stores) < 2:
+            yield from body
+            return
+        names = [ir.fixed(f"change{k}") for k in range(len(stores))]
+        yield from (s for s in body if not isinstance(s, ir.Store))
+        yield from (ir.real(n.symbol, s.value) for n, s in zip(names, stores, strict=True))
+        yield from (replace(s, value=n) for n, s in zip(names, stores, strict=True))
+
+    return map_blocks(function, change)

@@ -1,0 +1,37 @@
+"""Temporaries: expression graphs become statements.
+
+Powers become products, shared or long values get names, and declarations that nothing reads disappear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.walk import map_blocks, names_in, statements
+from phigen.scheme.lowering import assign, expand_powers
+
+
+def temporaries(function: ir.Function) -> ir.Function:
+    """Return the function with named temporaries and without unread declarations."""
+    function = map_blocks(function, _named)
+    read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Store)))
+
+    def without_unread(body: ir.Block) -> Iterator[ir.Statement]:
+        kept = []
+        for s in reversed(body):
+            if not isinstance(s, ir.Declare) or any(name in read for name, _ in s.items):
+                read.update(names_in(s))
+                kept.append(s)
+        return reversed(kept)
+
+    return map_blocks(function, without_unread)
+
+
+def _named(body: ir.Block) -> Iterator[ir.Statement]:
+    stores = [s for s in body if isinstance(s, ir.Store)]
+    assignments, trees = assign(expand_powers([s.graph for s in stores]))
+    yield from (s for s in body if not isinstance(s, ir.Store))
+    yield from (ir.real(a.target, a.value) for a in assignments)
+    yield from (replace(s, value=tree) for s, tree in zip(stores, trees, strict=True))

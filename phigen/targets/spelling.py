@@ -1,0 +1,86 @@
+"""Values of the loop IR as text: what the printers of all languages share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+from phigen.ir import nodes as ir
+from phigen.ir.walk import statements
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import Symbol
+from phigen.targets.language import Language
+from phigen.targets.names import Scope
+
+#: Binding strength of operators, as in `phigen.targets.printer`, and of what needs no parentheses.
+_STRENGTH = {"and": 1, "==": 2, "!=": 2, "<": 2, ">=": 2, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
+_ATOM = 9
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """Spelling of values in a language: ``operators`` and ``functions`` that have another name there."""
+
+    language: Language
+    operators: Mapping[str, str] = field(default_factory=dict)
+    functions: Mapping[str, str] = field(default_factory=dict)
+    select: str = "{0} ? {1} : {2}"
+    pointers: frozenset[str] = frozenset()  # names whose members are behind an arrow
+    quote: str = '"{0}"'
+
+
+class Spelling:
+    """The identifiers of one function, and its values as text."""
+
+    def __init__(self, dialect: Dialect, reserved: Iterable[str], function: ir.Function) -> None:
+        """Names of the spec come first, so that they are changed only where they are ``reserved``."""
+        self.dialect = dialect
+        self.scope = Scope(dialect.language.reserved | reserved)
+        declared = (s.items for s in statements(function.body) if isinstance(s, ir.Declare) and not s.in_place)
+        for name in (name for items in declared for name, _ in items if not isinstance(name, Symbol)):
+            self.scope[name]
+        self._arithmetic = dialect.language.printer(self.scope)
+
+    def name(self, symbol: str) -> str:
+        """Return the identifier of a symbol."""
+        if isinstance(symbol, Symbol) and symbol.kind == ir.FIXED:
+            return str(symbol.key[0])
+        return self.scope[symbol]
+
+    def substitute(self, declaration: ir.Declare) -> None:
+        """Print the values of a declaration wherever its symbols occur."""
+        for symbol, value in declaration.items:
+            text, strength = self._spelt(value)
+            self.scope.bind(symbol, text if strength else f"({text})")
+
+    def __call__(self, value: ir.Value, strength: int = 0) -> str:
+        """Return a value as text, in parentheses where it binds less than a strength."""
+        text, own = self._spelt(value)
+        return text if own >= strength else f"({text})"
+
+    def _spelt(self, value: ir.Value) -> tuple[str, int]:
+        match value:
+            case Expression():
+                return self._arithmetic(value), 1 if value.args else _ATOM
+            case ir.Name(symbol):
+                return self.name(symbol), _ATOM
+            case ir.Constant(str() as text):
+                return self.dialect.quote.format(text), _ATOM
+            case ir.Constant(number):
+                return repr(number), _ATOM
+            case ir.Member(record, name):
+                arrow = isinstance(record, ir.Name) and self.name(record.symbol) in self.dialect.pointers
+                return f"{self(record, _ATOM)}{'->' if arrow else '.'}{name}", _ATOM
+            case ir.Entry(array, index):
+                return f"{self(array, _ATOM)}[{self(index)}]", _ATOM
+            case ir.Binary(operator, left, right):
+                own, spelt = _STRENGTH[operator], self.dialect.operators.get(operator, operator)
+                return f"{self(left, own)} {spelt} {self(right, own + (operator != 'and'))}", own
+            case ir.Select(condition, then, otherwise):
+                return self.dialect.select.format(self(condition), self(then), self(otherwise)), 0
+            case ir.Listed(values):
+                return f"[{', '.join(map(self, values))}]", _ATOM
+            case ir.Called(name, arguments, instance):
+                owner = f"{self(instance, _ATOM)}." if instance else ""
+                return f"{owner}{self.dialect.functions.get(name, name)}({', '.join(map(self, arguments))})", _ATOM
+        raise TypeError(value)

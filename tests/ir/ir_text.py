@@ -1,0 +1,82 @@
+"""Functions of the loop IR as text, for tests that compare a function before and after a pass."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from phigen.ir import nodes as ir
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import Symbol
+
+
+def text(function: ir.Function) -> str:
+    """The function, one statement on each line."""
+    head = f"{function.name}({', '.join(function.parameters)})"
+    return "\n".join([head, *_lines(function.body, "  ")])
+
+
+def _lines(body: ir.Block, indent: str) -> Iterator[str]:
+    for s in body:
+        match s:
+            case ir.Declare(items=items):
+                listed = ", ".join(f"{_symbol(name)} {':=' if s.in_place else '='} {_value(v)}" for name, v in items)
+                yield f"{indent}{_kind(s.type)} {listed}"
+            case ir.Store(array, value, adds):
+                yield f"{indent}{_array(array)} {'+=' if adds else '<-'} {_value(value)}"
+            case ir.Assign(target, value, adds):
+                yield f"{indent}{_value(target)} {'+=' if adds else '<-'} {_value(value)}"
+            case ir.Loop():
+                bounds = f" {s.variable} in {_value(s.low)}..{_value(s.high)}" if s.low else ""
+                chosen = "" if s.selection == ir.ALL_SITES else f" of colour {s.selection.colour}"
+                yield f"{indent}{s.kind}{bounds}{chosen}:"
+                yield from _lines(s.body, f"{indent}  ")
+            case ir.If(condition, then):
+                yield f"{indent}if {_value(condition)}:"
+                yield from _lines(then, f"{indent}  ")
+            case ir.Call(name, arguments, instance):
+                yield f"{indent}{_value(ir.Called(name, arguments, instance))}"
+            case ir.Unpack(names, value):
+                yield f"{indent}{', '.join(names)} of {_value(value)}"
+            case ir.Return(value):
+                yield f"{indent}return {_value(value) if value else ''}".rstrip()
+            case _:
+                yield f"{indent}{type(s).__name__}"
+
+
+def _kind(kind: Any) -> str:
+    return kind.name.lower() if isinstance(kind, ir.Type) else type(kind).__name__.lower()
+
+
+def _symbol(name: str) -> str:
+    return str(name.key[0]) if isinstance(name, Symbol) and name.kind == ir.FIXED else str(name)
+
+
+def _array(array: ir.Array) -> str:
+    return f"{array.storage.value}[{array.name or array.number}]"
+
+
+def _value(value: Any) -> str:
+    match value:
+        case Expression():
+            return str(value)
+        case ir.Name(symbol):
+            return _symbol(symbol)
+        case ir.Constant(constant):
+            return repr(constant)
+        case ir.Load(array, offset, end):
+            return f"{_array(array)}{[*offset] if any(offset) else ''}{end}"
+        case ir.BondParameter(_, name, oriented):
+            return f"{'side * ' * oriented}bond {name}"
+        case ir.Member(record, name):
+            return f"{_value(record)}.{name}"
+        case ir.Entry(array, index):
+            return f"{_value(array)}[{_value(index)}]"
+        case ir.Binary(operator, left, right):
+            return f"({_value(left)} {operator} {_value(right)})"
+        case ir.Select(condition, then, otherwise):
+            return f"({_value(then)} if {_value(condition)} else {_value(otherwise)})"
+        case ir.Called(name, arguments, instance):
+            owner = f"{_value(instance)}." if instance else ""
+            return f"{owner}{name}({', '.join(map(_value, arguments))})"
+    return repr(value)

@@ -1,0 +1,115 @@
+"""Each pass of the loop IR, by the text of a function before and after it."""
+
+from textwrap import dedent
+
+from ir.ir_text import text
+from lattice.lattices import LATTICES
+
+from phigen.compiler import compile_spec
+from phigen.ir import nodes as ir
+from phigen.ir.lattice import LatticeLoops
+from phigen.ir.passes.by_tables import by_tables
+from phigen.ir.passes.simultaneous import simultaneous
+from phigen.ir.passes.temporaries import temporaries
+from phigen.scheme.steps import Sweeps
+from phigen.spec import loads
+from phigen.symbolic.expression import call, symbol
+
+Q, P = ir.Array(ir.Storage.STATE, 0, "q"), ir.Array(ir.Storage.STATE, 1, "p")
+
+
+def sweep(*body: ir.Statement, role: ir.Role = ir.Role.SWEEP) -> ir.Function:
+    return ir.Function("sweep", "a sweep", role, ("coef",), (ir.Loop("sites", body),))
+
+
+def lattice(name: str) -> LatticeLoops:
+    program = compile_spec(loads(LATTICES[name])).program
+    assert isinstance(program.step, Sweeps)
+    return LatticeLoops(program, program.step)
+
+
+def expect(function: ir.Function, expected: str) -> None:
+    assert text(function) == dedent(expected).strip()
+
+
+def test_temporaries_name_what_is_shared_and_leave_out_what_is_not_read() -> None:
+    q, sine = symbol("q"), call("sin", symbol("q"))
+    before = sweep(ir.real("q", ir.Load(Q)), ir.real("p", ir.Load(P)), ir.Store(P, sine * q**2 + sine))
+    expect(before, """
+        sweep(coef)
+          sites:
+            real q = x[q]
+            real p = x[p]
+            x[p] += sin(q) + sin(q)*q**2
+        """)  # fmt: skip
+    expect(temporaries(before), """
+        sweep(coef)
+          sites:
+            real q = x[q]
+            real t:1 = sin(q)
+            x[p] += t:1 + t:1*q**2
+        """)  # fmt: skip
+
+
+def test_simultaneous_changes_are_computed_before_any_is_made() -> None:
+    before = sweep(ir.Store(Q, symbol("p")), ir.Store(P, -symbol("q")))
+    expect(simultaneous(before), """
+        sweep(coef)
+          sites:
+            real change0 = p
+            real change1 = -q
+            x[q] += change0
+            x[p] += change1
+        """)  # fmt: skip
+    one, other_role = sweep(ir.Store(Q, symbol("p"))), sweep(*before.body[0].body, role=ir.Role.STAGE)
+    assert simultaneous(one) == one
+    assert simultaneous(other_role) == other_role
+
+
+def test_tables_of_neighbours_are_read_once() -> None:
+    loops = lattice("fput")
+    kick = next(s for s in loops.step.sweeps if s.moved == (1,))
+    expect(by_tables(loops.sweep(kick), loops), """
+        sweep1(coef, x, sites)
+          count of sites
+          real c:0 = coef[0]
+          real c:1 = coef[1]
+          real c:2 = coef[2]
+          array near:1 = sites.near[1]
+          array near:0 = sites.near[0]
+          plain i in 0..count:
+            real q = x[i]
+            index beside:1 = near:1[i]
+            real q[i+1] = x[beside:1]
+            index beside:0 = near:0[i]
+            real q[i-1] = x[beside:0]
+            x[(i + count)] += KICK
+        """.replace("KICK", str(kick.kernel.roots[0])))  # fmt: skip
+
+
+def test_bonds_are_two_lists_of_sites() -> None:
+    loops = lattice("food_web")
+    ends = next(s.gather.ends[0] for s in loops.step.sweeps if s.gather)
+    gathered = temporaries(loops.sums(ends))
+    expect(gathered, """
+        gather1_a(coef, state, sites, colour)
+          bonds:
+            real r[b] = x[r]b
+            real x[b] = x[x]b
+            real A = bond A
+            gathered[0] += A*x[b]*(1 - r[b]/x[b])
+        """)  # fmt: skip
+    expect(by_tables(gathered, loops), """
+        gather1_a(coef, x, sites, colour)
+          array at:r = sites.params.r
+          array at:A = sites.params.A
+          sums of sites
+          here, there, bond of sites.bonds('a', 'there', colour)
+          plain k in 0..here.length:
+            index i = here[k]
+            index j = there[k]
+            real r[b] = at:r[j]
+            real x[b] = x[j]
+            real A = at:A[bond[k]]
+            sums[i] += A*x[b]*(1 - r[b]/x[b])
+        """)  # fmt: skip
