@@ -208,6 +208,7 @@ def interface_of(program: Program) -> Interface:
         noise=program.noise.sources if program.noise else (),
         draws=program.noise.draws if program.noise else 0,
         single=program.single,
+        observables=program.observed,
     )
     if not isinstance(program.step, Sweeps):
         return about

@@ -104,6 +104,7 @@ _RULES: dict[str, Callable[..., Any]] = {
     "mul": operator.mul,
     "abs": abs,
     "power": mpmath.power,
+    "choose": lambda a, b, c: b if a > 0 else c,
     "pi": lambda: +mpmath.pi,
     "E": lambda: +mpmath.e,
     "versin": lambda s: 1 - mpmath.cos(s),

@@ -14,7 +14,7 @@ _FUNCTIONS = {
     "exp": math.exp, "log": math.log, "sin": math.sin, "cos": math.cos, "tan": math.tan, "arcsin": math.asin,
     "arccos": math.acos, "arctan": math.atan, "atan2": math.atan2, "sinh": math.sinh, "cosh": math.cosh,
     "tanh": math.tanh, "arsinh": math.asinh, "arcosh": math.acosh, "artanh": math.atanh,
-    "sgn": lambda v: math.copysign(1, v) if v else 0.0,
+    "sgn": lambda v: math.copysign(1, v) if v else 0.0, "choose": lambda a, b, c: b if a > 0 else c,
 }  # fmt: skip
 
 

@@ -43,7 +43,7 @@ class Past:
 def columns_of(names: Interface) -> list[Column]:
     """The columns of the rows of a run."""
     turned = element_columns(names.attitude, position=names.position)
-    return trajectory_columns(names.coordinates, names.casimirs, turned, monitored=names.monitored)
+    return trajectory_columns(names.coordinates, names.casimirs, turned, names.observables, monitored=names.monitored)
 
 
 def past_of(path: Path, names: Interface, option: str) -> Past:

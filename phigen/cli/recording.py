@@ -29,6 +29,7 @@ from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
 from phigen.runtime.tables import Table, opened
 from phigen.runtime.trajectory import Trajectory
+from phigen.study.averages import averages_of
 from phigen.study.lyapunov import FrameGrowth, Spectrum
 from phigen.study.sections import function_of
 from phigen.study.sketch import POINTS, Sketch, Thinned
@@ -63,6 +64,7 @@ class Recorder:
         run, parameters, names = experiment.run, experiment.parameters, solver.interface
         self.watch = Watch(self.label, compilation.system, run, parameters, experiment.rows)
         self.sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows)
+        self.averages = averages_of(run, len(names.observables))
         self.growth = FrameGrowth(names.dimension, experiment.h) if lyapunov else None
         self.points = Thinned(1 + names.dimension, POINTS)
         self.finder = None
@@ -160,7 +162,9 @@ class Recorder:
         casimirs = self.solver.backend.casimirs(piece.x, self.experiment.parameters)
         tau = about.past.last(["tau"])[0] if monitored and about.past else 0.0
         times = [t, tau + about.h * piece.numbers] if monitored else [t]
-        rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned])
+        observed = self.solver.observed(piece.x, t, self.experiment.parameters)
+        self.averages.see(t, observed)
+        rows = np.column_stack([*times, piece.x, energy, casimirs, piece.turned, observed])
         worked = self.watch.see(t, piece.x)
         self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
         if "output" in self._tables:
@@ -278,6 +282,7 @@ class Recorder:
 
     def _parts(self) -> dict[str, Any]:
         parts = {"watch": self.watch, "sketch": self.sketch, "points": self.points, "growth": self.growth}
+        parts["averages"] = self.averages if self.solver.interface.observables else None
         return {name: part for name, part in parts.items() if part is not None}
 
     def _open(self, arrays: Mapping[str, Any]) -> None:

@@ -36,6 +36,8 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         out(f"  The energy balance is H − ∫ {power} dt, integrated along the stored states by a rule of order 8.")
         if any(s.off > 0.01 for s in summaries):
             out("  They are too far apart for it to say much: a shorter --every, or stride, brings them closer.")
+    if solver.interface.observables:
+        _print_averages(recorder)
     if recorder.experiment.run.members > 1:
         _print_means(recorder)
     if recorder.finder:
@@ -80,6 +82,20 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     return rows
 
 
+def _print_averages(recorder: Recorder) -> None:
+    """Print the time averages of the observables over the rows of the run."""
+    averages = recorder.averages
+    first, last = averages.times
+    out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")
+    header = ["", "mean", "standard error", "least", "largest", "correlation time"]
+    rows = [
+        [name, f"{a.mean:.6g}", f"{a.error:.1g}", f"{a.least:.6g}", f"{a.largest:.6g}", f"{a.correlation_time:.2g}"]
+        for name, a in zip(recorder.solver.interface.observables, averages.results(), strict=True)
+    ]
+    for line in table([header, *rows], right=range(1, 6)):
+        out(f"  {line}")
+
+
 def _print_means(recorder: Recorder) -> None:
     """The means over all members where the run ended, with their statistical errors."""
     run, found = recorder.experiment.run, recorder.means()
@@ -114,6 +130,9 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "final": dict(zip(solver.coordinates, session.state().tolist(), strict=True)),
         "methods": [asdict(s) for s in summaries],
     }
+    if solver.interface.observables:
+        results = zip(solver.interface.observables, recorder.averages.results(), strict=True)
+        told["observables"] = {name: asdict(average) for name, average in results}
     if solver.interface.noise:
         told |= {"seed": experiment.run.seed, "members": experiment.run.members}
         if experiment.run.members > 1:

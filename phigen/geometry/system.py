@@ -33,7 +33,8 @@ class System:
     symbols. ``casimirs`` holds the declared ones first, in the order of the spec, then the found ones
     (``C1``, ``C2``, …; ``declared`` has the names of the former). ``shape`` is what π was recognised as,
     ``form`` what the spec said. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is
-    none. ``notes`` says what was not searched for, and why. ``spec`` is where it comes from, None for a system built in
+    none. ``observables`` are quantities to record, of which nothing is proved. ``notes`` says what was not searched
+    for, and why. ``spec`` is where it comes from, None for a system built in
     Python.
     """
 
@@ -50,6 +51,7 @@ class System:
     forces: Forces | None = None
     noise: tuple[Source, ...] = ()
     declared: tuple[str, ...] = ()
+    observables: Mapping[str, Expression] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
     spec: Spec | None = field(default=None, repr=False, compare=False)
@@ -194,7 +196,7 @@ def system_from_spec(spec: Spec) -> System:
         forces=spec.forces,
         noise=spec.noise,
     )
-    return replace(system, spec=spec)
+    return replace(system, spec=spec, observables=spec.observables)
 
 
 def system_of_lattice(spec: Spec) -> SpecError:
@@ -244,8 +246,8 @@ def build_system(
         acting,
         sources_of(noise or {}),
         tuple(declared),
-        notes,
-        locations,
+        notes=notes,
+        locations=locations,
     )
 
 

@@ -74,6 +74,10 @@ class Backend(Protocol):
         """π∇H at the states (rows, DIM), the same shape."""
         ...
 
+    def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """Return the observables of the spec at the states (rows, DIM), shape (rows, number of observables)."""
+        ...
+
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """σπ∇g of each source of noise at the states (rows, DIM), shape (rows, sources, DIM)."""
         ...

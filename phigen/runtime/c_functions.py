@@ -53,6 +53,7 @@ _EXTRAS = {
     "monitor": (_DOUBLE, (_POINTER, _POINTER)),
     "attitude": (None, (_POINTER, _POINTER)),
     "noise_fields": (None, (_POINTER, _POINTER, _POINTER)),
+    "observables": (None, (_POINTER, _POINTER, _POINTER)),
     "ensemble_of": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _LONG, _WORD, _LONG, _POINTER)),
     "ensemble_attitudes": (_INT, ()),  # as `_of_attitudes` has it
     "set_attitude": (_INT, (_POINTER, _POINTER, _POINTER)),
@@ -90,7 +91,7 @@ def _of_attitudes(offered: Mapping[str, Any], interface: Interface) -> dict[str,
 
 
 def _dated(offered: Mapping[str, Any], interface: Interface) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-    """The signatures of noise with the time among their arguments, where there is one."""
-    places = {"noise_fields": 1, "ensemble_of": 3} if interface.time else {}
+    """Return the signatures of functions that take the time too, where there is one."""
+    places = {"observables": 1, "noise_fields": 1, "ensemble_of": 3} if interface.time else {}
     found = {name: (offered[name], at) for name, at in places.items() if name in offered}
     return {name: (result, (*a[:at], _DOUBLE, *a[at:])) for name, ((result, a), at) in found.items()}

@@ -344,6 +344,11 @@ class CSolver:
         """See `phigen.runtime.backend.Backend`."""
         return self._fill(self._c.vector_field, x, np.empty(x.shape, self._real), parameters, t)
 
+    def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        out = np.empty((len(x), len(self.interface.observables)), self._real)
+        return self._fill(self._c.observables, x, out, parameters, t) if self.interface.observables else out
+
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         out = np.empty((len(x), len(self.interface.noise), x.shape[1]), self._real)

@@ -17,13 +17,14 @@ if TYPE_CHECKING:
 
 
 def to_xarray(trajectory: Trajectory) -> xr.Dataset:
-    """A Dataset: ``x`` (t, coordinate), ``energy`` (t), ``casimir_NAME`` (t); the rest are attributes."""
+    """Return a Dataset: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t), with attributes."""
     xarray = _imported("xarray")
     found: xr.Dataset = xarray.Dataset(
         {
             "x": (("t", "coordinate"), trajectory.x),
             "energy": ("t", trajectory.energy),
             **{f"casimir_{name}": ("t", values) for name, values in trajectory.casimirs.items()},
+            **{name: ("t", values) for name, values in trajectory.observables.items()},
             **({"tau": ("t", trajectory.tau)} if trajectory.monitored else {}),
         },
         coords={"t": trajectory.t, "coordinate": list(trajectory.coordinates)},

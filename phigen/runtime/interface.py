@@ -56,6 +56,7 @@ class Interface:
     noise: tuple[str, ...] = ()  # the sources
     draws: int = 0  # the increments of the noise in a step
     single: bool = False  # whether the C computes in single precision
+    observables: tuple[str, ...] = ()
 
     @property
     def dimension(self) -> int:

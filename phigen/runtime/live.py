@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 class LiveSession:
     """A trajectory that stands somewhere; `Solver.session` makes one.
 
-    ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` (by name), ``attitude`` and ``position`` (None without
-    ``reconstruct``) are those of the state; `step` goes on, `kick` and setting ``x`` move it. What the solver learnt
-    on the way, and a gauge, stay; with a monitor e becomes −H of the new state. ``copy()`` branches; sessions can be
-    pickled, and go on to the last bit.
+    ``x`` (DIM,), ``t``, ``steps``, ``energy``, ``casimirs`` and ``observables`` (by name), ``attitude`` and
+    ``position`` (None without ``reconstruct``) are those of the state; `step` goes on, `kick` and setting ``x`` move
+    it. What the solver learnt on the way, and a gauge, stay; with a monitor e becomes −H of the new state. ``copy()``
+    branches; sessions can be pickled, and go on to the last bit.
     """
 
     def __init__(
@@ -89,6 +89,12 @@ class LiveSession:
     def casimirs(self) -> dict[str, float]:
         """The Casimirs of the state, by name."""
         return self._casimirs_of(self.x)
+
+    @property
+    def observables(self) -> dict[str, float]:
+        """The observables of the spec at the state, by name."""
+        values = self.solver.observed(self.x[np.newaxis], np.array([self.t]), self.parameters)[0].tolist()
+        return dict(zip(self.solver.interface.observables, values, strict=True))
 
     @property
     def leaf(self) -> dict[str, float]:

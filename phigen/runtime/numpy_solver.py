@@ -364,6 +364,13 @@ class NumpySolver:
         when = () if t is None else (t,)
         return np.asarray(self.module.vector_field(x, *when, **parameters), dtype=np.float64)
 
+    def observables(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
+        """See `phigen.runtime.backend.Backend`."""
+        if not self.interface.observables:
+            return np.empty((len(x), 0))
+        when = () if t is None else (t,)
+        return np.asarray(self.module.observables(x, *when, **parameters), dtype=np.float64)
+
     def noise_fields(self, x: Floats, parameters: Mapping[str, float], t: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         when = () if t is None else (t,)

@@ -535,6 +535,28 @@ class Solver(Named[Backend, Interface]):
         found = self.backend.noise_fields(rows, self.values(parameters, more), when)
         return found.reshape(*states.shape[:-1], len(self.interface.noise), self.interface.dimension)
 
+    def observables(
+        self,
+        x: ArrayLike,
+        t: ArrayLike | None = None,
+        *,
+        parameters: Mapping[str, float] | None = None,
+        **more: float,
+    ) -> dict[str, Floats]:
+        """Return the observables of the spec at the states ``x`` (…, DIM), by name, each of shape (…).
+
+        ``t`` as for `hamiltonian`.
+        """
+        states = arguments.states(x, "x", self.interface)
+        rows = states.reshape(-1, self.interface.dimension)
+        when = arguments.times(t, self.interface, states.shape[:-1], more)
+        values = self.backend.observables(rows, self.values(parameters, more), when)
+        return {name: values[:, i].reshape(states.shape[:-1]) for i, name in enumerate(self.interface.observables)}
+
+    def observed(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
+        """Return the observables along a trajectory: of the states (rows, DIM) at the times (rows,), a column each."""
+        return self.backend.observables(x, parameters, t if self.interface.time else None)
+
     def energies(self, x: Floats, t: Floats, parameters: Mapping[str, float]) -> Floats:
         """H along a trajectory: of the states (rows, DIM) at the times (rows,)."""
         return self.backend.hamiltonian(x, parameters, t if self.interface.time else None)
@@ -543,6 +565,7 @@ class Solver(Named[Backend, Interface]):
         casimirs = self.backend.casimirs(x, at.values)
         t = marks.passed if self.interface.monitored else at.t0 + marks.tau
         attitude, position = turned_into(self.interface, marks.turned)
+        observed = self.observed(x, t, at.values)
         return Trajectory(
             tau=marks.tau if self.interface.monitored else t,
             retried=marks.retried,
@@ -557,6 +580,7 @@ class Solver(Named[Backend, Interface]):
             coordinates=self.interface.coordinates,
             attitude=attitude,
             position=position,
+            observables={name: observed[:, i] for i, name in enumerate(self.interface.observables)},
         )
 
     def _beginning(

@@ -29,7 +29,8 @@ if TYPE_CHECKING:
 class Trajectory:
     """States of one integration: row 0 is the initial state, the last row always the final one.
 
-    ``t`` (rows,), ``x`` (rows, DIM), ``energy`` (rows,): H of the rows, and ``casimirs``: name → (rows,).
+    ``t`` (rows,), ``x`` (rows, DIM), ``energy`` (rows,): H of the rows, ``casimirs`` and ``observables``: name →
+    (rows,).
     ``steps`` were made with step size ``h``; the rows are those of every stride-th step and of the last. With a monitor
     h is a step in τ, and ``tau`` (rows,) its values; else that is t. ``retried`` are the numbers of the steps that were
     made in parts. ``attitude`` (rows, 4), a quaternion (w, x, y, z), or (rows, n, n), and ``position`` (rows, 3)
@@ -49,6 +50,7 @@ class Trajectory:
     tau: Floats = field(default_factory=lambda: np.empty(0))
     retried: tuple[int, ...] = ()
     solver: Solver | None = field(default=None, repr=False)
+    observables: Mapping[str, Floats] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if len(self.tau) != len(self.t):
@@ -77,7 +79,9 @@ class Trajectory:
         return run_figure({"phigen": self}, {})
 
     def to_xarray(self) -> xr.Dataset:
-        """An `xarray.Dataset`: ``x`` (t, coordinate), ``energy`` (t), ``casimir_NAME`` (t); the rest are attributes.
+        """An `xarray.Dataset`: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t).
+
+        Step and parameters are attributes.
 
         Raises `MissingPackageError` without xarray.
         """
@@ -115,8 +119,8 @@ class Trajectory:
         """Write a file by the suffix of the path; raises `ValueError` for any other.
 
         ``.csv``: ``t,x1,…,energy,C…``, one line per row; every float reads back as the same float. ``.npz``: the arrays
-        t, x, energy, casimir_NAME, coordinates, and steps, h, parameter_NAME as scalars. With a monitor tau comes
-        after t.
+        t, x, energy, casimir_NAME, observable_NAME, coordinates, and steps, h, parameter_NAME as scalars. With a
+        monitor tau comes after t.
         """
         write(path, self.columns(), self.rows(), self.scalars())
 
@@ -134,14 +138,17 @@ class Trajectory:
         """What `rows` has side by side."""
         shape = () if self.attitude is None else self.attitude.shape[1:]
         turned = element_columns(shape, position=self.position is not None)
-        return trajectory_columns(self.coordinates, tuple(self.casimirs), turned, monitored=self.monitored)
+        observed = tuple(self.observables)
+        return trajectory_columns(self.coordinates, tuple(self.casimirs), turned, observed, monitored=self.monitored)
 
     def rows(self) -> Floats:
         """All columns side by side, (rows, columns), as they are written to files."""
         turned = [] if self.attitude is None else [self.attitude.reshape(len(self), -1)]
         turned += [] if self.position is None else [self.position]
         times = [self.t, self.tau] if self.monitored else [self.t]
-        return np.column_stack([*times, self.x, self.energy, *self.casimirs.values(), *turned])
+        return np.column_stack(
+            [*times, self.x, self.energy, *self.casimirs.values(), *turned, *self.observables.values()]
+        )
 
     def scalars(self) -> dict[str, Any]:
         """What a ``.npz`` holds beside the columns."""
@@ -178,9 +185,17 @@ def element_columns(shape: tuple[int, ...], *, position: bool) -> list[Column]:
 
 
 def trajectory_columns(
-    coordinates: tuple[str, ...], casimirs: tuple[str, ...], turned: Sequence[Column] = (), *, monitored: bool = False
+    coordinates: tuple[str, ...],
+    casimirs: tuple[str, ...],
+    turned: Sequence[Column] = (),
+    observables: tuple[str, ...] = (),
+    *,
+    monitored: bool = False,
 ) -> list[Column]:
-    """The columns of a table of states; no two have one name, so a coordinate ``t`` is in the column ``t_``."""
+    """Return the columns of a table of states, the observables last.
+
+    No two have one name, so a coordinate ``t`` is in the column ``t_``.
+    """
     times = [Column(name, (name,), flat=True) for name in (["t", "tau"] if monitored else ["t"])]
     taken = [name for column in [*times, *turned] for name in column.names]
     own = Reserved(frozenset(["energy", *taken]))
@@ -188,4 +203,5 @@ def trajectory_columns(
     first = [*times, Column("x", named), Column("energy", ("energy",), flat=True)]
     given = identifiers(casimirs, own | named)
     listed = [Column(f"casimir_{name}", (given[name],), flat=True) for name in casimirs]
-    return [*first, *listed, *turned]
+    observed = identifiers(observables, own | named | given.values())
+    return [*first, *listed, *turned, *(Column(f"observable_{o}", (observed[o],), flat=True) for o in observables)]

@@ -105,6 +105,7 @@ def build_program(
         order=order.order,
         step=step,
         observables=observables(system),
+        observed=tuple(system.observables),
         fractions=scheme.fractions,
         gauge=free_gauge(system, gauged),
         monitor=Monitor(rate_kernel(system, gauge.monitor), elapsed, level) if gauge.monitor else None,

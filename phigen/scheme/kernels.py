@@ -249,11 +249,13 @@ def noise_fields(system: System) -> Kernel:
 
 
 def observables(system: System) -> Observables:
-    """The Hamiltonian, the Casimirs and the vector field."""
+    """Return the kernels of H, the Casimirs, the vector field and the observables of the spec."""
     inputs, timeless = system_inputs(system), {"params": system.parameter_names, "x": system.coordinates}
-    field = system.vector_field()
+    field, listed = system.vector_field(), tuple(system.observables.values())
+    named = Kernel("observables", "the observables", inputs, (Output("out", listed),)) if listed else None
     return Observables(
         Kernel("energy", "the Hamiltonian", inputs, (Output("energy", (system.hamiltonian,)),)),
         Kernel("casimirs", "the Casimirs", timeless, (Output("out", tuple(system.casimirs.values())),)),
         Kernel("vector_field", "pi(x) grad H(x)", inputs, (Output("out", field),)),
+        named,
     )

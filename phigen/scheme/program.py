@@ -41,16 +41,17 @@ class About:
 
 @dataclass(frozen=True)
 class Observables:
-    """The Hamiltonian, the Casimirs and the vector field."""
+    """The Hamiltonian, the Casimirs, the vector field, and the observables that the spec names, if it names any."""
 
     energy: Kernel
     casimirs: Kernel
     vector_field: Kernel
+    named: Kernel | None = None
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All of them."""
-        return self.energy, self.casimirs, self.vector_field
+        return (self.energy, self.casimirs, self.vector_field, *([self.named] if self.named else []))
 
 
 @dataclass(frozen=True)
@@ -152,6 +153,7 @@ class Program:
 
     A step of size h is the composition of one ``step`` of each of the ``fractions`` of h. ``time`` is the name of t,
     where H depends on it, ``pushed`` the Casimirs that forces change. ``extras`` are what was asked for beside it,
+    ``observed`` are the names of the observables of the spec.
     ``lanes`` asks for C that does several steps or members at once, ``profile`` (``fast``, ``small``) says how much
     it does for speed. ``compensated`` asks for compensated sums over the steps of a lattice that splits.
     """
@@ -177,6 +179,7 @@ class Program:
     lanes: bool = True
     profile: str = "fast"
     compensated: bool = False
+    observed: tuple[str, ...] = ()
 
     @property
     def version(self) -> str:

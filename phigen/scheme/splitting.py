@@ -84,6 +84,7 @@ def build_splitting(
         order=choice.order.order,
         step=step,
         observables=observables(system),
+        observed=tuple(system.observables),
         noise=Noise(tuple(s.name for s in system.noise), 2, noise_fields(system)) if sources else None,
         attitude=coefficients.settled(attitude),
         extras=extras,

@@ -216,6 +216,14 @@ _BESIDE_RUNS = {
     "time": "start is the time at the start of a run, until that at its end",
 }
 
+AVERAGE = Record(
+    "average",
+    (
+        Field("after", CONSTANT, "rows before this time are left out"),
+        Field("blocks", Integer(2, 10_000), "blocks of rows for the standard error; 20 if not given"),
+    ),
+    example="{after: 200, blocks: 20}",
+)
 RUN = Record(
     "a run",
     (
@@ -248,6 +256,7 @@ RUN = Record(
         Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to run beside it"),
         Field("section", FORMULA, "Poincaré section: where this expression passes through 0, as direction says"),
         Field("direction", Choice(DIRECTIONS), "how the section is crossed: rising, falling or both", default="rising"),
+        Field("average", AVERAGE, "time averages of the observables: which rows they are over"),
         Field("description", PROSE, "what the run shows"),
     ),
     one=("steps", "duration", "until"),
@@ -326,6 +335,11 @@ SPEC = Record(
         Field("noise", MapOf(NAME, SOURCE, least=1), "sources of noise by name: ẋ = … + σ π∇g ∘ dW, Stratonovich"),
         Field("casimirs", MapOf(NAME, Either({Scalar: FORMULA, Mapping: CASIMIR})), "Casimirs by name; checked"),
         Field("invariants", FORMULAS, "further first integrals by name; checked"),
+        Field(
+            "observables",
+            FORMULAS,
+            "quantities to record by name; also with sign, min, max, heaviside, if(a < b, c, d)",
+        ),
         Field(
             "birealisation", Either({Scalar: KIND, Mapping: BIREALISATION}), "the bi-realisation to use", default="auto"
         ),

@@ -6,11 +6,13 @@
     product  = sign (("*" | "/") sign)*
     sign     = ("-" | "+") sign | power
     power    = atom ["**" sign]
-    atom     = number | name | indexed | function "(" sum ("," sum)* ")" | "(" sum ")"
+    atom     = number | name | indexed | function "(" sum ("," sum)* ")" | "(" sum ")" | choice
+    choice   = "if" "(" sum ("<" | "<=" | ">" | ">=") sum "," sum "," sum ")"
 
-Names with an index, ``x[i+1]``, are for lattices: `phigen.spec.indices`. Precedences are Python's: ``-x**2`` is −(x²)
-and ``2**3**2`` is 2⁹. Nothing is ever evaluated as Python; decimals are exact rationals; constants and exponents are
-bounded before anything is computed with them.
+Choices and the other piecewise functions are for observables and ``stop`` alone. Names with an index, ``x[i+1]``, are
+for lattices: `phigen.spec.indices`. Precedences are Python's: ``-x**2`` is −(x²) and ``2**3**2`` is 2⁹. Nothing is ever
+evaluated as Python; decimals are exact rationals; constants and exponents are bounded before anything is computed with
+them.
 """
 
 from __future__ import annotations
@@ -24,8 +26,8 @@ from typing import Protocol
 
 from phigen.spec import limits
 from phigen.spec.indices import Indices
-from phigen.spec.names import SPEC_FUNCTIONS
-from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.names import PIECEWISE_FUNCTIONS, SPEC_FUNCTIONS
+from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.yaml_source import describe
 from phigen.symbolic.expression import (
     EULER,
@@ -60,12 +62,14 @@ class Scope:
 
     ``refused`` holds names that exist but not here, each with the message that says why and a hint.
     With ``open``, any other name is taken for declared. ``indices`` says what may have an index, if anything may.
+    ``piecewise`` allows functions without a derivative (`phigen.spec.names.PIECEWISE_FUNCTIONS`).
     """
 
     names: Mapping[str, Expression]
     refused: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     open: bool = False
     indices: Indices | None = None
+    piecewise: bool = False
 
     def lookup(self, name: str) -> Expression | None:
         """What a name stands for; declared names win over constants."""
@@ -90,7 +94,7 @@ class Scope:
 _TOKEN = re.compile(
     r"[ \t\n]*(?:(?P<number>(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)"
     r"|(?P<name>[A-Za-z_][A-Za-z0-9_]*)"
-    r"|(?P<operator>\*\*|[-+*/(),\[\]])"
+    r"|(?P<operator>\*\*|[<>]=?|[-+*/(),\[\]])"
     r"|(?P<end>\Z)"
     r"|(?P<other>(?s:.)))"
 )
@@ -251,6 +255,10 @@ class Parser:
             return self.abandon(f"unexpected {token.text!r}", token.index, hint)
         if before.kind == "number" and token.text.startswith("_"):
             return self.abandon(f"unexpected {shown(token.text)} after a number", token.index, "digits are not grouped")
+        if token.text[0] in "<>":
+            return self.abandon(
+                f"unexpected {token.text!r}", token.index, "comparisons stand in if(a < b, …), in observables and stop"
+            )
         hint = f"products are written with *: {before.text[-20:]}*{token.text[:20]}"
         return self.abandon(f"an operator is missing before {shown(token.text)}", token.index, hint)
 
@@ -366,6 +374,8 @@ class Parser:
         opening = self.here
         self.position += 1
         arity = SPEC_FUNCTIONS.get(token.text)
+        if arity is None and token.text in PIECEWISE_FUNCTIONS and self.scope.lookup(token.text) is None:
+            return self.piecewise(token, opening)
         if arity is None:
             declared = self.scope.lookup(token.text) is not None
             guess = did_you_mean(token.text, SPEC_FUNCTIONS) or "functions are " + ", ".join(SPEC_FUNCTIONS)
@@ -380,6 +390,36 @@ class Parser:
             self.report(f"{token.text} takes {wanted}, not {len(arguments)}", token.index)
             return ONE
         return self.applied(token, arguments)
+
+    def piecewise(self, token: Token, opening: Token) -> Expression:
+        """Read the arguments of a piecewise function, whose name was read."""
+        name = token.text
+        if not self.scope.piecewise:
+            hint = "H, brackets, Casimirs and what steps depend on need derivatives"
+            raise self.abandon(f"{name} is for observables and stop alone", token.index, hint)
+        arguments = [self.nested(self.condition if name == "if" else self.sum, opening)]
+        while self.accept(","):
+            arguments.append(self.nested(self.sum, opening))
+        self.close(opening)
+        arity = PIECEWISE_FUNCTIONS[name]
+        if len(arguments) != arity:
+            wanted = "a condition and 2 values" if name == "if" else counted(arity, "argument")
+            self.report(f"{name} takes {wanted}, not {counted(len(arguments), 'argument')}", token.index)
+            return ONE
+        return _PIECEWISE[name](*arguments)
+
+    def condition(self) -> Expression:
+        """Read a comparison, as an expression that is positive where it holds."""
+        left = self.sum()
+        token = self.accept("<", "<=", ">", ">=")
+        if token is None:
+            raise self.abandon("if needs a comparison", self.here.index, "if(x > 0, a, b)")
+        self.count(token)
+        right = self.sum()
+        difference = sub(left, right) if token.text[0] == ">" else sub(right, left)
+        if token.text.endswith("="):
+            return call("choose", neg(difference), number(Fraction(-1)), ONE)
+        return difference
 
     # --- operations that can be undefined or too large
 
@@ -430,6 +470,16 @@ class Parser:
                 self.report(f"the exponent {_brief(part.value)} is out of range", token.index, limit=True)
                 return ONE
         return result
+
+
+#: Piecewise functions by ``choose(a, b, c)``, which is b where a > 0, else c; heaviside(0) is 1.
+_PIECEWISE: Mapping[str, Callable[..., Expression]] = {
+    "sign": lambda a: call("sign", a),
+    "heaviside": lambda a: call("choose", neg(a), number(Fraction(0)), ONE),
+    "min": lambda a, b: call("choose", sub(b, a), a, b),
+    "max": lambda a, b: call("choose", sub(a, b), a, b),
+    "if": lambda a, b, c: call("choose", a, b, c),
+}
 
 
 def _brief(value: Fraction) -> str:

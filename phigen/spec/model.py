@@ -183,6 +183,14 @@ NO_EXTRAS = Extras()
 
 
 @dataclass(frozen=True)
+class AverageChoice:
+    """``average:`` of a run: rows from the time ``after`` on, None for all, in at least so many ``blocks``."""
+
+    after: Fraction | None = None
+    blocks: int | None = None
+
+
+@dataclass(frozen=True)
 class Run:
     """A named experiment."""
 
@@ -202,6 +210,7 @@ class Run:
     duration: Fraction | None = None  # what says how many steps there are, if that is a time
     until: Fraction | None = None  # the physical time where it ends, by a part of a step
     every: Fraction | None = None  # of physical time between rows that are stored, in place of the stride
+    average: AverageChoice = AverageChoice()
     stop: Expression | None = None  # it ends where this passes through 0
     description: str = ""
     lattice: LatticeRun | None = None
@@ -329,6 +338,7 @@ class Spec:
     parameters: tuple[Parameter, ...] = ()
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
+    observables: Mapping[str, Expression] = field(default_factory=dict)  # to record; nothing is proved of them
     birealisation: BirealisationChoice = BirealisationChoice()
     order: int | None = DEFAULT_ORDER  # None where terms are given
     terms: int | None = None

@@ -10,6 +10,9 @@ from phigen.symbolic.functions import FUNCTIONS
 #: Functions of expressions with their number of arguments.
 SPEC_FUNCTIONS: dict[str, int] = {"sqrt": 1} | {f.name: f.arity for f in FUNCTIONS.values() if not f.own}
 
+#: Piecewise functions with their number of arguments: for observables and ``stop``, which nothing differentiates.
+PIECEWISE_FUNCTIONS: dict[str, int] = {"sign": 1, "heaviside": 1, "min": 2, "max": 2, "if": 3}
+
 SPEC_NAME = r"[a-z][a-z0-9_]{0,30}"
 IDENTIFIER = r"[A-Za-z_][A-Za-z0-9_]*"
 

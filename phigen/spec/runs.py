@@ -11,7 +11,7 @@ from phigen.spec import limits
 from phigen.spec.declarations import Declarations
 from phigen.spec.grammar import Scope
 from phigen.spec.lattice import run_of_lattice
-from phigen.spec.model import Run, Values
+from phigen.spec.model import AverageChoice, Run, Values
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values as site_values
 from phigen.spec.yaml_source import Scalar
@@ -69,7 +69,8 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         duration=duration,
         until=until,
         every=every,
-        stop=declared.formula(raw.get("stop"), declared.dated_scope()),
+        stop=declared.formula(raw.get("stop"), replace(declared.dated_scope(), piecewise=True)),
+        average=_average(raw.get("average"), declared),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
@@ -77,6 +78,13 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
 
 def _fail(name: str, key: str, message: str, declared: Declarations, hint: str = "") -> None:
     declared.reader.problems.add(message, declared.reader.locations["runs", name, key], hint)
+
+
+def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageChoice:
+    """Return ``average`` of a run."""
+    if raw is None:
+        return AverageChoice()
+    return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"))
 
 
 def _start(name: str, given: Scalar | None, declared: Declarations) -> Fraction:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -84,6 +85,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "parameters": tuple(declared.parameters.values()),
         "casimirs": casimirs,
         "invariants": _formulas(raw.get("invariants", {}), declared, declared.dated_scope()),
+        "observables": _observables(raw.get("observables", {}), declared, casimirs),
         "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
         "order": raw.get("order", None if "terms" in raw else NOISY_ORDER if "noise" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
@@ -122,7 +124,7 @@ SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": (
 
 #: Keys that lattices do not take yet, and the values that do no harm.
 NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
-    "monitor": (), "reconstruct": (), "terms": (),
+    "monitor": (), "reconstruct": (), "terms": (), "observables": (),
     "gauge": ("auto", "none"), "modified_hamiltonian": (0,),
 }  # fmt: skip
 
@@ -149,6 +151,10 @@ NOT_IN_NOISY_RUNS, IN_NOISY_RUNS = ("exact", "compare", "section", "stop", "ever
 
 def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reader) -> None:
     _expect_consistent_with_noise(raw, problems, reader)
+    for name, (_, run_) in raw.get("runs", {}).items() if not raw.get("observables") else ():
+        if run_ and "average" in run_:
+            hint = "observables: {NAME: formula} declares what is averaged"
+            problems.add("average: the spec has no observables", reader.locations["runs", name, "average"], hint)
     for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
             problems.add(f"{key}: not for lattices in this version", reader.locations[key,])
@@ -198,6 +204,23 @@ def _formulas(
     scope = scope or declared.scope()
     values = {name: declared.formula(node, scope) for name, (_, node) in given.items()}
     return {name: value for name, value in values.items() if value is not None}
+
+
+#: Names of what output holds beside the observables.
+RECORDED = ("t", "tau", "x", "energy", "state", "attitude", "position")
+
+
+def _observables(
+    given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, casimirs: Mapping[str, Expression]
+) -> dict[str, Expression]:
+    """Return ``observables``, whose names are those of columns of the output beside coordinates and Casimirs."""
+    taken = dict.fromkeys(declared.coordinates, "a coordinate") | dict.fromkeys(casimirs, "a Casimir")
+    taken |= {name: "a column of every output" for name in (*RECORDED, declared.time) if name}
+    for name, (key, _) in given.items():
+        if name in taken:
+            message = f"observables: {name!r} is the name of {taken[name]}"
+            declared.reader.error(key, message, "choose another name")
+    return _formulas(given, declared, replace(declared.dated_scope(), piecewise=True))
 
 
 def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:

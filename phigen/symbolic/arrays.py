@@ -38,6 +38,8 @@ class Arrays(Arithmetic[Any]):
         """A function that NumPy has."""
         if not args:
             return np.pi if name == "pi" else np.e
+        if name == "choose":
+            return np.where(args[0] > 0, args[1], args[2])
         return getattr(np, FUNCTIONS[name].written["numpy"].removeprefix("np."))(*args)
 
 

@@ -341,8 +341,8 @@ def call(function: str, *args: Expression) -> Expression:
         return number(known.at_zero)
     if function == "log" and first is ONE:
         return ZERO
-    if known.rational and known.value and first.is_number:
-        return number(known.value(None, first.value))
+    if known.rational and known.value and all(a.is_number for a in args):
+        return number(known.value(None, *(a.value for a in args)))
     return _node(function, args)
 
 

@@ -287,6 +287,17 @@ _LISTED = (
         inline=True,
         letters="sgn",
     ),
+    Function(  # b where a > 0, else c: piecewise observables, which nobody differentiates
+        "choose",
+        arity=3,
+        own=True,
+        value=lambda library, a, b, c: b if a > 0 else c,
+        at_zero=None,
+        rational=True,
+        cost=2,
+        written=_languages("({0} > 0.0 ? {1} : {2})", "np.where({0} > 0.0, {1}, {2})", "({0} > 0.0 ? {1} : {2})"),
+        inline=True,
+    ),
     Function(  # base**exponent with an exponent that is not a rational number
         "power",
         arity=2,

@@ -36,6 +36,7 @@ FEATURES = (
     Feature("KICKS", lambda p: isinstance(p.step, Splitting | Sweeps) and p.step.schedule.multiples),
     Feature("TIMED", lambda p: p.time),
     Feature("NOISE", lambda p: p.noise),
+    Feature("OBSERVED", lambda p: p.observed),
     Feature("RENEWED", lambda p: p.step.refresh),
     Feature("GAUGE", lambda p: p.held),
     Feature("MONITOR", lambda p: p.monitor),

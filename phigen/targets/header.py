@@ -64,6 +64,7 @@ def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Call
         "sha256": program.about.spec_sha256,
         "coordinates": listed(program.coordinates),
         "casimirs": listed(program.casimirs),
+        "observed": listed(program.observed) if program.observed else "",
         "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
         "positive": listed([p.name for p in program.parameters if p.positive]),
         "noise": noise is not None,

@@ -94,7 +94,7 @@ C_RESERVED = Reserved(
 _PYTHON = """False None True and as assert async await break class continue def del elif else except finally for from
 global if import in is lambda nonlocal not or pass raise return try while with yield match case type np abs
 print self DIM ORDER CASIMIRS DEFAULT_PARAMETERS StepError step integrate hamiltonian casimirs vector_field
-x0 steps stride parameters _filled _sum _values"""
+OBSERVABLES observables x0 steps stride parameters _filled _sum _values"""
 
 #: Keywords of Python, names that it gives a meaning, and what the generated module calls by name.
 PYTHON_RESERVED = Reserved(frozenset(_PYTHON.split()), re.compile(r"__\w*__"))

@@ -54,8 +54,8 @@ def joined_value(pieces, values=VALUES, functions=None):
 
 @pytest.mark.parametrize("function", [f for f in FUNCTIONS if f not in ("phi0", "phi1", "phi2", "acosh")])
 def test_function_keeps_its_value(function):
-    agrees(call(function, *[prey, y][: FUNCTIONS[function].arity]) * 3 - x)
-    agrees(power(call(function, *[prey, y][: FUNCTIONS[function].arity]), 3) / y)
+    agrees(call(function, *[prey, y, x][: FUNCTIONS[function].arity]) * 3 - x)
+    agrees(power(call(function, *[prey, y, x][: FUNCTIONS[function].arity]), 3) / y)
 
 
 def test_equal_terms_and_equal_factors_are_collected():

@@ -35,6 +35,7 @@ ARGUMENTS |= {
     "sign": (x - y,),
 }
 ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x), "tanhalf": (call("sin", y), call("versin", y))}
+ARGUMENTS |= {"choose": (x - y, x * z, y - z)}
 
 #: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.
 SPECIAL_ARGUMENTS = {"near": x / 5, "near-": -x / 5, "far": 9 * z - 20 * y, "far-": 17 * x - 20 * z}

@@ -161,6 +161,8 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         "n": program.dimension,
         "order": program.order,
         "casimir_count": len(program.casimirs),
+        "observed_count": len(program.observed),
+        "observed": ", ".join(program.observed),
         "modified_power": program.modified.power if program.modified else 0,
         "version": program.version,
         "sha256": program.about.spec_sha256,
@@ -188,6 +190,11 @@ def _observables(program: Program) -> Iterator[tuple[str, Exported]]:
         f"The Hamiltonian{at}; the Casimirs; the right-hand side pi(x) grad H({of}). params may be NULL.",
         [(seen.energy, "hamiltonian", True), (seen.casimirs, "casimirs", False), (seen.vector_field, "", False)],
     )
+    if seen.named:
+        yield (
+            f"The observables{at}, in the order of {program.name}_OBSERVABLES. params may be NULL.",
+            [(seen.named, "observables", False)],
+        )
     if noise and noise.fields:
         said = "sigma pi(x) grad g(x) of each source of noise, one after the other; params may be NULL."
         yield said, [(noise.fields, "", False)]

@@ -18,6 +18,9 @@ import { TIMES } from "./model.mjs";
 // #if RENEWED
 import { MIDDLES, MOMENTS, PREPARED, refresh } from "./model.mjs";
 // #endif
+// #if OBSERVED
+import { OBSERVABLES, observables } from "./model.mjs";
+// #endif
 // #if NOISE
 import { DRAWS, SOURCES, noiseFields } from "./model.mjs";
 import { draw } from "./noise.mjs";
@@ -80,6 +83,9 @@ export class Solver {
   static ORDER = ORDER;
   static COORDINATES = COORDINATES;
   static CASIMIRS = CASIMIRS;
+  // #if OBSERVED
+  static OBSERVABLES = OBSERVABLES;
+  // #endif
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   /** The state; read it freely, and change it by setState and kick only. */
@@ -556,6 +562,23 @@ export class Solver {
     return out;
   }
 
+  // #if OBSERVED
+  /** The observables, in the order of OBSERVABLES. */
+  // #if TIMED
+  observables(x = this.x, t = this.t) {
+    const out = new Float64Array(OBSERVABLES.length);
+    observables(this.params, t, x, out);
+    return out;
+  }
+  // #else
+  observables(x = this.x) {
+    const out = new Float64Array(OBSERVABLES.length);
+    observables(this.params, x, out);
+    return out;
+  }
+  // #endif
+
+  // #endif
   // #if NOISE
   /** sigma pi(x) grad g(x) of each source of noise, one after the other. */
   // #if TIMED

@@ -1,0 +1,136 @@
+"""Time averages of observables along a run, with standard errors from block averages.
+
+Successive rows of a run are correlated, so the standard error of their mean is estimated from means of blocks that are
+longer than the correlation time. Blocks are doubled in length whenever there are twice as many as asked for (Flyvbjerg
+and Petersen, J. Chem. Phys. 91 (1989) 461), so the memory does not depend on the length of the run.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from phigen.runtime.interface import Floats
+from phigen.spec.model import Run
+
+#: Blocks of rows for the standard error, where a run does not say how many. With 20 the standard error has itself a
+#: relative standard deviation of 1/sqrt(2·19) = 0.16.
+BLOCKS = 20
+
+
+@dataclass(frozen=True)
+class Average:
+    """Statistics of one observable over the rows of a run.
+
+    ``error`` is the standard error of the mean, NaN with fewer than two blocks, ``correlation_time`` the integrated
+    autocorrelation time in the time of the run, both estimated from blocks.
+    """
+
+    mean: float
+    error: float
+    variance: float
+    least: float
+    largest: float
+    correlation_time: float
+
+
+class Averages:
+    """Running averages of ``width`` observables; ``state`` is all there is, as arrays.
+
+    Rows before the time ``after``, in the direction of the run, are left out. At least ``blocks`` blocks, and fewer
+    than twice as many, give the standard errors once there are so many rows.
+    """
+
+    def __init__(self, width: int, *, after: float = -math.inf, backwards: bool = False, blocks: int = BLOCKS) -> None:
+        self._after, self._sign, self._blocks = after, -1.0 if backwards else 1.0, blocks
+        self.state: dict[str, Any] = {
+            "count": np.zeros((), dtype=np.int64),
+            "mean": np.zeros(width),
+            "squares": np.zeros(width),  # the sum of squared deviations from the mean
+            "least": np.full(width, math.inf),
+            "largest": np.full(width, -math.inf),
+            "sums": np.empty((0, width)),  # over the rows of each block
+            "open": np.zeros(width),  # the sum over the block that is not yet full
+            "size": np.ones((), dtype=np.int64),  # rows of a block
+            "times": np.full(2, math.nan),  # of the first and the last row
+        }
+
+    @property
+    def count(self) -> int:
+        """Number of rows taken in."""
+        return int(self.state["count"])
+
+    @property
+    def times(self) -> tuple[float, float]:
+        """The times of the first and the last row, NaN if there is none."""
+        first, last = self.state["times"].tolist()
+        return first, last
+
+    def see(self, t: Floats, rows: Floats) -> None:
+        """Take in rows (rows, width) at the times t (rows,), in the order of the run."""
+        used = self._sign * t >= self._sign * self._after if math.isfinite(self._after) else np.full(len(t), True)
+        t, rows = t[used], rows[used]
+        if not len(rows) or not rows.shape[1]:
+            return
+        self._moments(rows)
+        first = t[0] if self.count == len(rows) else self.state["times"][0]
+        self.state["times"] = np.array([first, t[-1]])
+        self._block(rows, self.count - len(rows))
+
+    def _moments(self, rows: Floats) -> None:
+        """Merge mean and variance of rows into those so far (Chan, Golub and LeVeque, 1979)."""
+        state, before = self.state, self.count
+        after = before + len(rows)
+        mean = rows.mean(axis=0)
+        delta = mean - state["mean"]
+        squares = ((rows - mean) ** 2).sum(axis=0) + delta**2 * (before * len(rows) / after)
+        self.state |= {
+            "count": np.asarray(after),
+            "mean": state["mean"] + delta * (len(rows) / after),
+            "squares": state["squares"] + squares,
+            "least": np.minimum(state["least"], rows.min(axis=0)),
+            "largest": np.maximum(state["largest"], rows.max(axis=0)),
+        }
+
+    def _block(self, rows: Floats, before: int) -> None:
+        """Add rows to the blocks; ``before`` rows were there already."""
+        while len(rows):
+            size = int(self.state["size"])
+            room = size - before % size
+            piece, rows = rows[:room], rows[room:]
+            self.state["open"] = self.state["open"] + piece.sum(axis=0)
+            before += len(piece)
+            if before % size == 0:
+                self.state["sums"] = np.vstack([self.state["sums"], self.state["open"]])
+                self.state["open"] = np.zeros_like(self.state["open"])
+            if len(self.state["sums"]) == 2 * self._blocks:
+                self.state["sums"] = self.state["sums"][::2] + self.state["sums"][1::2]
+                self.state["size"] = np.asarray(2 * size)
+
+    def results(self) -> list[Average]:
+        """Return the statistics of each observable; NaN where there are too few rows."""
+        state, n = self.state, self.count
+        if not n:
+            return [Average(*[math.nan] * 6) for _ in state["mean"]]
+        variance = state["squares"] / (n - 1) if n > 1 else np.full_like(state["mean"], math.nan)
+        blocks, size = len(state["sums"]), int(state["size"])
+        error = time = np.full_like(state["mean"], math.nan)
+        if blocks > 1:
+            of_blocks = (state["sums"] / size).var(axis=0, ddof=1)
+            error = np.sqrt(of_blocks / blocks)
+            first, last = self.times
+            apart = abs(last - first) / max(1, n - 1)
+            with np.errstate(all="ignore"):
+                time = np.where(variance > 0, 0.5 * apart * size * of_blocks / variance, 0.0)
+        columns = (state["mean"], error, variance, state["least"], state["largest"], time)
+        return [Average(*map(float, values)) for values in zip(*columns, strict=True)]
+
+
+def averages_of(run: Run, width: int) -> Averages:
+    """Return empty averages of ``width`` observables over the rows that the run says."""
+    choice = run.average
+    after = -math.inf if choice.after is None else float(choice.after)
+    return Averages(width, after=after, backwards=run.step < 0, blocks=choice.blocks or BLOCKS)

@@ -1,0 +1,81 @@
+"""Averages with standard errors by blocks."""
+
+import numpy as np
+import pytest
+
+from phigen.study.averages import Averages
+
+
+def autoregressive(rng, count, a):
+    """A process with the correlation a^k over k rows and the variance 1."""
+    noise = rng.normal(size=count) * np.sqrt(1 - a**2)
+    values = np.empty(count)
+    values[0] = rng.normal()
+    for k in range(1, count):
+        values[k] = a * values[k - 1] + noise[k]
+    return values
+
+
+def averages(values, **options):
+    found = Averages(1, **options)
+    found.see(np.arange(float(len(values))), values[:, np.newaxis])
+    return found
+
+
+def test_moments_are_those_of_the_rows_however_they_come():
+    rng = np.random.default_rng(1)
+    rows, t = 1e6 + rng.normal(size=(1003, 3)), np.arange(1003.0)
+    whole, pieces = Averages(3), Averages(3)
+    whole.see(t, rows)
+    for part in np.split(np.arange(1003), [1, 2, 7, 7, 500]):
+        pieces.see(t[part], rows[part])
+    for column, (one, other) in enumerate(zip(whole.results(), pieces.results(), strict=True)):
+        assert one.mean == pytest.approx(rows[:, column].mean(), rel=1e-14)
+        assert one.variance == pytest.approx(rows[:, column].var(ddof=1), rel=1e-9)
+        assert (one.least, one.largest) == (rows[:, column].min(), rows[:, column].max())
+        assert (other.mean, other.error) == pytest.approx((one.mean, one.error), rel=1e-9)
+        assert other.correlation_time == pytest.approx(one.correlation_time, rel=1e-9)
+
+
+@pytest.mark.parametrize("a", [0.0, 0.9])
+def test_standard_errors_are_the_spread_of_means(a):
+    """The mean of n rows has the variance (1 + a)/(1 − a)/n, and blocks must tell it within what 20 blocks can."""
+    rng = np.random.default_rng(2)
+    count, found = 4000, []
+    for _ in range(60):
+        (average,) = averages(autoregressive(rng, count, a)).results()
+        found.append((average.error**2, average.correlation_time))
+    error, time = np.mean(found, axis=0)
+    ratio = (1 + a) / (1 - a)
+    assert error == pytest.approx(ratio / count, rel=0.15)  # 60 estimates of relative spread √(2/19…39)
+    assert time == pytest.approx(ratio / 2, rel=0.15)
+
+
+def test_a_mean_without_blocks_would_be_too_sure():
+    (average,) = averages(autoregressive(np.random.default_rng(3), 4000, 0.9)).results()
+    assert average.error > 3 * np.sqrt(average.variance / 4000)
+
+
+@pytest.mark.parametrize("blocks", [2, 5, 20])
+def test_the_number_of_blocks_is_the_one_asked_for(blocks):
+    found = averages(np.random.default_rng(4).normal(size=1000), blocks=blocks)
+    assert blocks <= len(found.state["sums"]) < 2 * blocks
+    assert len(found.state["sums"]) * int(found.state["size"]) <= 1000
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_rows_before_a_time_are_left_out(backwards):
+    values = np.arange(10.0)[:, np.newaxis]
+    t = -np.arange(10.0) if backwards else np.arange(10.0)
+    found = Averages(1, after=-6.0 if backwards else 6.0, backwards=backwards)
+    found.see(t, values)
+    assert found.results()[0].mean == pytest.approx(7.5)
+    assert found.times == (t[6], t[9])
+
+
+def test_too_few_rows_are_no_numbers():
+    assert np.isnan(Averages(1).results()[0].mean)
+    (one,) = averages(np.ones(1)).results()
+    assert one.mean == 1
+    assert np.isnan(one.error)
+    assert np.isnan(one.variance)
