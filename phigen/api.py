@@ -13,7 +13,7 @@ import re
 import warnings
 from collections.abc import Callable, Mapping
 from os import PathLike, fspath
-from typing import TYPE_CHECKING, Any, TypeAlias, overload
+from typing import TYPE_CHECKING, Any, TypeAlias, Unpack, overload
 
 from phigen import registry, resources
 from phigen import spec as specs
@@ -24,7 +24,7 @@ from phigen.geometry.system import System, system_from_spec, system_of_lattice
 from phigen.proofs.examination import located
 from phigen.scheme.steps import Sweeps
 from phigen.spec import limits
-from phigen.spec.model import Extras, Spec
+from phigen.spec.model import Overrides, Spec
 from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SCHEMES, SPEC_NAME, TIMED_ARGUMENTS
 from phigen.spec.taken import objection
 
@@ -95,20 +95,16 @@ def compile(
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `PhigenWarning`. ``order``
     overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
-    `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, ``profile`` (``fast``, ``small``)
-    overrides that of the C. Compiled C is cached by its content. Gives a `Solver`, of a lattice a `LatticeSolver`.
+    `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks for. The
+    code is that of the profile ``fast``, or of ``profile``: the one of a spec is about what ``phigen build`` writes.
+    Compiled C is cached by its content. Gives a `Solver`, of a lattice a `LatticeSolver`.
     Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson, and
     `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
     """
     if target != "auto" and not registry.find(target).loader:
         runnable = ", ".join(registry.LOADABLE)
         raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
-    if scheme is not None and scheme not in SCHEMES:
-        raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
-    if profile is not None and profile not in PROFILES:
-        raise ValueError(f"unknown profile {profile!r}; there are {', '.join(PROFILES)}")
-    extras = Extras(tangent=tangent, adjoint=adjoint) if tangent or adjoint else None
-    compilation = compilation_of(source, order, extras, scheme, profile)
+    compilation = compilation_of(source, order=order, scheme=scheme, tangent=tangent, adjoint=adjoint, profile=profile)
     return lattice_solver_of(compilation, target) if compilation.cell else solver_of(compilation, target)
 
 
@@ -122,39 +118,38 @@ def formulas(source: Source, order: int | None = None, *, terms: int | None = No
 
     if terms is not None and not (isinstance(terms, int) and 1 <= terms <= limits.ORDER):
         raise ValueError(f"terms must be an integer from 1 to {limits.ORDER}, not {terms!r}")
-    return sympy_formulas(compilation_of(source, order), terms)
+    return sympy_formulas(compilation_of(source, order=order), terms)
 
 
-def compilation_of(
-    source: Source,
-    order: int | None = None,
-    extras: Extras | None = None,
-    scheme: str | None = None,
-    profile: str | None = None,
-) -> Compilation:
-    """The compilation of a source, proved; see `compile` for its arguments and errors.
+def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
+    """Return the compilation of a source for phigen itself to run, proved; see `compile` for its arguments and errors.
 
-    ``extras`` overrides those of the spec.
+    The options override the spec, see `phigen.spec.model.Spec.overridden`. A compilation stays in its profile.
     """
-    if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
-        raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
+    _expect_valid(**options)
     if isinstance(source, Compilation):
-        same = extras in (None, source.program.extras) and profile in (None, source.program.profile)
-        if order is None and scheme is None and same:
-            return source
-        order = order or source.order.order
-        scheme = scheme or ("splitting" if source.splitting else None if source.cell else "series")
-        source = source.spec if source.cell else source.system
-    wanted: dict[str, Any] = {"order": order, "scheme": scheme, "extras": extras, "profile": profile}
+        spec = source.spec.overridden(**options)
+        return source if spec == source.spec else compile_proved(spec, system=None if source.cell else source.system)
     if isinstance(source, System):
-        return compile_proved(source.spec or _spec_of(source), system=source, **wanted)
+        return compile_proved((source.spec or _spec_of(source)).for_running(**options), system=source)
     if not isinstance(source, Spec | str | PathLike) and isinstance(getattr(source, "spec", None), Spec):
         source = source.spec  # a LatticeSystem, whose room is loaded for lattices alone
     if isinstance(source, Spec):
-        return compile_proved(source, **wanted)
+        return compile_proved(source.for_running(**options))
     if isinstance(source, str | PathLike):
-        return compile_proved(specs.load(resources.file_of(fspath(source))), **wanted)
+        return compile_proved(specs.load(resources.file_of(fspath(source))).for_running(**options))
     raise TypeError(f"cannot compile {type(source).__name__}; give a path, a System, a LatticeSystem or a Spec")
+
+
+def _expect_valid(**options: Unpack[Overrides]) -> None:
+    """Raise `ValueError` for options with values that do not exist."""
+    order, scheme, profile = (options.get(name) for name in ("order", "scheme", "profile"))
+    if order is not None and not (isinstance(order, int) and 1 <= order <= limits.ORDER):
+        raise ValueError(f"order must be an integer from 1 to {limits.ORDER}, not {order!r}")
+    if scheme is not None and scheme not in SCHEMES:
+        raise ValueError(f"unknown scheme {scheme!r}; there are {', '.join(SCHEMES)}")
+    if profile is not None and profile not in PROFILES:
+        raise ValueError(f"unknown profile {profile!r}; there are {', '.join(PROFILES)}")
 
 
 def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
@@ -213,6 +208,7 @@ def interface_of(program: Program) -> Interface:
     if not isinstance(program.step, Sweeps):
         return about
     sites = program.step.sites
+    every_other = bool(program.step.partners and not program.step.partners.graph)
     return LatticeInterface(
         **vars(about),
         axes=sites.axes,
@@ -224,9 +220,10 @@ def interface_of(program: Program) -> Interface:
         first_open=sites.open[0],
         colour_period=sites.colours // math.gcd(sites.colours, sites.weights[0]),
         graph=bool(program.step.partners and program.step.partners.graph),
+        pairs=every_other,
         compensated=program.compensated,
         at_bonds=sites.at_bonds,
-        dear=bool(program.step.equation or (program.step.partners and not program.step.partners.graph)),
+        dear=every_other or program.step.equation is not None,
     )
 
 

@@ -84,6 +84,13 @@ class Compilation:
         return "splitting of a lattice"
 
     @property
+    def method(self) -> str:
+        """The scheme, the bi-realisation if there is one, the order and the profile, as the first lines of runs say."""
+        scheme = self.described["scheme"]
+        named = scheme if self.label.startswith(scheme) else f"{scheme} ({self.label})"
+        return f"scheme {named}, order {self.order.order}, profile {self.program.profile}"
+
+    @property
     def described(self) -> dict[str, Any]:
         """The method for machines; of a lattice its colours too, and why it is the series, or has more of them, where
         sizes of runs ask it."""

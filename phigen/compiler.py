@@ -13,10 +13,10 @@ it, and of the method that was compiled.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 
 from phigen import progress, registry
 from phigen.compilation import Compilation, NoSystem
@@ -36,7 +36,7 @@ from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order
 from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
-from phigen.spec.model import BirealisationChoice, Extras, Spec
+from phigen.spec.model import Overrides, Spec
 from phigen.splitting.forces import force_flows
 from phigen.splitting.parts import split
 
@@ -53,48 +53,40 @@ SITES = 8
 def compile_spec(
     spec: Spec,
     *,
-    order: int | None = None,
-    scheme: str | None = None,
     system: System | None = None,
-    extras: Extras | None = None,
-    profile: str | None = None,
+    **options: Unpack[Overrides],
 ) -> Compilation:
-    """Compile a spec; ``order`` overrides the order (and the terms) that it asks for.
-
-    So do ``scheme``, ``extras`` and ``profile``.
+    """Compile a spec with the options that override it; see `Spec.overridden`.
 
     ``system`` is its system, where the caller has built it already. Nothing is proved: see `compile_proved`. Raises
     `SpecError` (no bi-realisation applies, H does not split, …) and `LimitError` (the program would be too large).
     """
-    clock = _Clock()
+    spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
         from phigen.lattice.building import cell_from_spec
 
         with bounded(spec):
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
-            return _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
+            return _swept(spec, cell, clock)
     with bounded(spec):
         _tell_of_lattice(spec)
         source = system or clock.timed("system", lambda: system_from_spec(spec))
-        return _compiled(spec, source, order, scheme, *spec.asked(extras, profile), clock)
+        return _compiled(spec, source, clock)
 
 
 def examine(
     spec: Spec,
     *,
-    order: int | None = None,
-    scheme: str | None = None,
     system: System | None = None,
-    extras: Extras | None = None,
-    profile: str | None = None,
+    **options: Unpack[Overrides],
 ) -> Examination:
     """Compile a spec, and prove what can be proved about it, as far along the pipeline as it gets.
 
     Raises `SpecError` if the spec does not even define a system.
     """
-    clock = _Clock()
+    spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
-        return _examine_lattice(spec, order, scheme, extras, profile, clock)
+        return _examine_lattice(spec, clock)
     with bounded(spec), progress.stage(spec.name):
         _tell_of_lattice(spec)
         try:
@@ -105,7 +97,7 @@ def examine(
         if refuted(groups):
             return Examination(spec, groups, unexamined=f"the bracket, {UNEXAMINED}")
         try:
-            realisation = _realised_early(spec, source, order, scheme, clock)
+            realisation = _realised_early(spec, source, clock)
         except LimitError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.tensor(source))
@@ -117,8 +109,7 @@ def examine(
         if refuted(signs):
             return Examination(spec, groups, unexamined="the method")
         try:
-            asked = spec.asked(extras, profile)
-            compilation = _compiled(spec, source, order, scheme, *asked, clock, realisation)
+            compilation = _compiled(spec, source, clock, realisation)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: statements.method(compilation))
@@ -128,18 +119,15 @@ def examine(
 def compile_proved(
     spec: Spec,
     *,
-    order: int | None = None,
-    scheme: str | None = None,
     system: System | None = None,
-    extras: Extras | None = None,
-    profile: str | None = None,
+    **options: Unpack[Overrides],
 ) -> Compilation:
     """`compile_spec`, refusing what is refuted.
 
     Raises `CheckError` that names what is refuted, with the residual: no π that is not Poisson, no claimed Casimir
     that is none, no wrong bi-realisation reaches the output. Raises `SpecError` and `LimitError` as `compile_spec`.
     """
-    found = examine(spec, order=order, scheme=scheme, system=system, extras=extras, profile=profile)
+    found = examine(spec, system=system, **options)
     if found.refuted:
         raise CheckError(refutation(found))
     for warning in doubts(found):
@@ -170,9 +158,7 @@ def _tell_of_lattice(spec: Spec) -> None:
         warnings.warn(str(place), PhigenWarning, stacklevel=4)
 
 
-def _examine_lattice(
-    spec: Spec, order: int | None, scheme: str | None, extras: Extras | None, profile: str | None, clock: _Clock
-) -> Examination:
+def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
     """Prove what can be proved about a lattice, for all sizes at once."""
     from phigen.lattice.building import cell_from_spec
     from phigen.proofs import lattices
@@ -188,52 +174,36 @@ def _examine_lattice(
         if refuted(groups):
             return Examination(spec, groups, unexamined=rests)
         try:
-            compilation = _swept(spec, cell, order, scheme, *spec.asked(extras, profile), clock)
+            compilation = _swept(spec, cell, clock)
         except SpecError as error:
             return Examination(spec, groups, obstacle=located(error, spec))
         groups = groups | clock.timed("proofs", lambda: lattices.sweeps(compilation))
     return Examination(spec, groups, compilation)
 
 
-def _realised_early(
-    spec: Spec, source: System, order: int | None, scheme: str | None, clock: _Clock
-) -> BiRealisation | None:
+def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation | None:
     """The bi-realisation of a large system, of which nothing is proved yet. LimitError if it makes steps too large.
 
     None where that cannot be known before the gauge is chosen, and where there is none: for which there may be reasons
     that the proofs tell better.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
-    if (scheme or spec.scheme) == "splitting" or not as_it_is or not is_large(source):
+    if spec.scheme == "splitting" or not as_it_is or not is_large(source):
         return None
     try:
-        realisation = clock.timed("bi-realisation", lambda: realise(source, _choice(spec, order)))
+        realisation = clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
     except SpecError:
         return None
     clock.timed("generating function", lambda: expect_affordable(source, realisation))
     return realisation
 
 
-def _choice(spec: Spec, order: int | None) -> BirealisationChoice:
-    return replace(spec.birealisation, order=order) if order else spec.birealisation
-
-
-def _compiled(
-    spec: Spec,
-    source: System,
-    order: int | None,
-    scheme: str | None,
-    extras: Extras,
-    profile: str,
-    clock: _Clock,
-    early: BiRealisation | None = None,
-) -> Compilation:
+def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | None = None) -> Compilation:
     """Compile a system, by the series or to a splitting; ``early`` is what `_realised_early` has found."""
-    described = _described(spec, extras, profile)
-    if (scheme or spec.scheme) == "splitting":
-        return _split(spec, source, order, described, clock)
-    realisation = early or clock.timed("bi-realisation", lambda: realise(source, _choice(spec, order)))
-    plan = plan_order(order or spec.order, None if order else spec.terms, symmetric=realisation.symmetric)
+    if spec.scheme == "splitting":
+        return _split(spec, source, clock)
+    realisation = early or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
+    plan = plan_order(spec.order, spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
     monitor, affordable = gauged.gauge.monitor, early is not None and gauged.system is source
     with fixed_gauge_named(gauged.gauge, source):
@@ -244,21 +214,22 @@ def _compiled(
             ),
         )
         group = _group(spec, source, realisation.kind)
-        described |= {"solver": spec.solver, "group": group}
-        program = clock.timed("program", lambda: build_program(source, realisation, plan, gauged, reached, **described))
+        program = clock.timed(
+            "program", lambda: build_program(source, realisation, plan, gauged, reached, spec, group=group)
+        )
     return Compilation(
         spec, source, realisation, plan, program, gauged.gauge, clock.seconds, gauged=gauged, scheme=reached
     )
 
 
-def _split(spec: Spec, source: System, order: int | None, described: Mapping[str, Any], clock: _Clock) -> Compilation:
+def _split(spec: Spec, source: System, clock: _Clock) -> Compilation:
     """Compile to a splitting."""
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
     parts = clock.timed("splitting", lambda: split(discretised.frozen))
     pushing = clock.timed("splitting", lambda: force_flows(source.frozen))
     parts = replace(parts, flows=(*parts.flows, *pushing))
-    monitor, wanted = logarithmic_of(spec, source, parts.flows), order or spec.wanted_order
+    monitor, wanted = logarithmic_of(spec, source, parts.flows), spec.wanted_order
     choice = clock.timed(
         "composition",
         lambda: (
@@ -274,28 +245,21 @@ def _split(spec: Spec, source: System, order: int | None, described: Mapping[str
 
         flows = by_angles(discretised, group, choice.splitting.flows, put_back=uniform(source))
         choice = replace(choice, splitting=replace(choice.splitting, flows=flows))
-    described = {**described, "lanes": spec.solver.lanes, "monitor": monitor, "group": group}
-    program = clock.timed("program", lambda: build_splitting(source, choice, gauge, **described))
+    program = clock.timed("program", lambda: build_splitting(source, choice, gauge, spec, monitor=monitor, group=group))
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 
 
-def _swept(
-    spec: Spec, cell: Cell, order: int | None, scheme: str | None, extras: Extras, profile: str, clock: _Clock
-) -> Compilation:
+def _swept(spec: Spec, cell: Cell, clock: _Clock) -> Compilation:
     """Compile a lattice, of any sizes, to sweeps over its sites."""
     from phigen.lattice.building import expect_coloured
     from phigen.lattice.series import SeriesPlan
     from phigen.lattice.sweeps import build_sweeps, plan_sweeps
 
-    asked: dict[str, Any] = {"scheme": scheme or spec.scheme, "composition": spec.composition}
-    asked |= {"order": order or spec.wanted_order, "extras": extras}
-    plan = clock.timed("plan", lambda: plan_sweeps(cell, spec=spec, **asked))
-    compensated = spec.solver.compensated
-    if compensated and (isinstance(plan, SeriesPlan) or extras.adjoint):
+    plan = clock.timed("plan", lambda: plan_sweeps(cell, spec))
+    if spec.solver.compensated and (isinstance(plan, SeriesPlan) or spec.extras.adjoint):
         message = "solver: compensated is for lattices whose H splits, without adjoint"
         raise SpecError([Diagnostic(message, spec.locations.get(("solver",)))])
-    described = _described(spec, extras, profile) | {"lanes": spec.solver.lanes, "compensated": compensated}
-    program = clock.timed("program", lambda: build_sweeps(cell, plan, **described))
+    program = clock.timed("program", lambda: build_sweeps(cell, plan, spec))
     expect_coloured(spec, cell, plan.colouring.periods(cell.boundary))
     nothing: Any = NoSystem(spec)
     return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
@@ -308,12 +272,6 @@ def _group(spec: Spec, source: System, kind: str) -> Group | None:
     from phigen.attitude.group import group_of
 
     return group_of(source, spec.reconstruct, kind)
-
-
-def _described(spec: Spec, extras: Extras, profile: str) -> dict[str, Any]:
-    """What programs of every kind are told of their spec."""
-    about = {"title": spec.title, "licence": spec.license, "spec_sha256": spec.source_sha256}
-    return about | {"extras": extras, "profile": profile}
 
 
 @contextmanager

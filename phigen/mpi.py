@@ -73,7 +73,7 @@ class DistributedLattice:
     def _compiled(self, source: Any, order: int | None) -> LatticeSolver:
         from phigen.api import compilation_of, lattice_solver_of
 
-        compilation = compilation_of(source, order, profile="fast")
+        compilation = compilation_of(source, order=order, profile="fast")
         if self.comm.rank == 0:
             lattice_solver_of(compilation, "c")  # fills the cache
         self.comm.barrier()

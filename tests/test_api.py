@@ -7,10 +7,19 @@ from systems import slow_but
 
 import phigen
 from phigen import resources, spec
+from phigen.api import compilation_of
 from phigen.compiler import compile_spec
 from phigen.geometry.system import system_from_spec
 from phigen.spec import json_schema
+from phigen.spec.model import Extras
 
+OSCILLATOR = """phigen: 1
+name: oscillator
+coordinates: [q, p]
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + q**4/4
+order: 2
+"""
 RIGID_BODY = resources.bundled_specs() / "rigid_body.yaml"
 
 
@@ -82,13 +91,42 @@ def test_the_order_that_nobody_asked_for_is_the_same_everywhere(tmp_path):
     assert phigen.compile(three, target="numpy").order == phigen.compile(three, "numpy", scheme="splitting").order == 4
 
 
-def test_profile_is_that_of_the_spec_or_of_the_call():
+def test_phigen_runs_the_profile_fast_unless_the_call_names_another(tmp_path):
+    """The spec's profile is about code that is built; single precision has no other than small."""
     text = "phigen: 1\nname: lv\ncoordinates: [x, y]\npoisson: {log_canonical: [[0, 1], [-1, 0]]}\nhamiltonian: x + y\n"
-    found, asked = spec.loads(f"{text}profile: small\n"), spec.loads(text)
-    assert [compile_spec(s).program.profile for s in (found, asked)] == ["small", "fast"]
-    assert phigen.compile(asked, target="numpy", profile="small").order == 4
+    (tmp_path / "lv.yaml").write_text(f"{text}profile: small\n")
+    short, plain = spec.load(tmp_path / "lv.yaml"), spec.loads(text)
+    assert [compile_spec(s).program.profile for s in (short, plain)] == ["small", "fast"]
+    sources = [short, str(tmp_path / "lv.yaml"), phigen.load(tmp_path / "lv.yaml"), plain]
+    assert {compilation_of(source).program.profile for source in sources} == {"fast"}
+    assert {compilation_of(source, profile="small").program.profile for source in sources} == {"small"}
+    built = compile_spec(short)
+    assert compilation_of(built) is built
+    assert compilation_of(built, tangent=True).program.profile == "small"
+    assert compilation_of(spec.loads(f"{text}real: float\n"), profile="fast").program.profile == "small"
     with pytest.raises(ValueError, match="unknown profile 'tiny'; there are fast, small"):
-        phigen.compile(asked, profile="tiny")
+        phigen.compile(plain, profile="tiny")
+
+
+def test_options_of_a_call_add_to_what_the_spec_asks_for():
+    text = f"{OSCILLATOR}adjoint: true\nwithout: [ensemble]\nmodified_hamiltonian: 1\nreal: float\n"
+    chosen = spec.loads(text)
+    assert compilation_of(chosen, tangent=True).program.extras == Extras(
+        True, 1, frozenset({"ensemble"}), True, "float"
+    )
+    chosen = spec.loads(f"{OSCILLATOR}tangent: true\n")
+    compilation = compilation_of(chosen, adjoint=True, without=("kicks",), real="float", modified_hamiltonian=2)
+    assert compilation.program.extras == Extras(True, 2, frozenset({"kicks"}), True, "float")
+    again = compilation_of(compilation, order=4)
+    assert (again.order.order, again.program.extras) == (4, compilation.program.extras)
+    assert again.spec.written is chosen
+
+
+def test_an_order_takes_the_place_of_terms_and_reaches_truncations():
+    text = "coordinates: [x, y, z]\npoisson: {nambu: [x**2 + y**2 + z**4]}\nhamiltonian: x*y + z\n"
+    truncated = spec.loads(f"phigen: 1\nname: t\nterms: 3\nbirealisation: {{kind: spray, spray: flat}}\n{text}")
+    chosen = [compile_spec(truncated), compile_spec(truncated, order=2)]
+    assert [(c.order.order, c.order.terms, c.chart.degree) for c in chosen] == [(4, 3, 5), (2, 1, 3)]
 
 
 def test_refuted_mathematics_is_not_compiled():

@@ -11,7 +11,7 @@ import click
 from phigen.cli.completion import runs, specs
 from phigen.registry import LOADABLE
 from phigen.spec import limits
-from phigen.spec.names import SCHEMES
+from phigen.spec.names import PROFILES, SCHEMES
 
 #: What files of figures end in.
 FIGURES = (".png", ".svg", ".pdf")
@@ -41,6 +41,13 @@ settings_option = click.option(
 #: How the one-step map is made, instead of the spec's way.
 scheme_option = click.option(
     "--scheme", type=click.Choice(SCHEMES), help="How steps are made, instead of the spec's scheme."
+)
+
+#: The profile of code that phigen runs itself; ``profile:`` of a spec is about code that ``phigen build`` writes.
+profile_option = click.option(
+    "--profile",
+    type=click.Choice(PROFILES),
+    help="How much the C does for speed.  [default: fast]",
 )
 
 #: Which run of a spec; the argument SPEC stands before it.

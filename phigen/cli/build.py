@@ -189,7 +189,7 @@ def _write(
 def _certify(console: Console, compilations: Sequence[Compilation], options: Options) -> None:
     """Verify what was written; systems that fall short get no certificate, and lose the one they had."""
     from phigen.cli import certificate
-    from phigen.cli.verify import fallen_short, verified, verified_lattice, with_tangent
+    from phigen.cli.verify import fallen_short, verified, verified_lattice
     from phigen.compiler import compile_proved
     from phigen.writing import write
 
@@ -201,10 +201,7 @@ def _certify(console: Console, compilations: Sequence[Compilation], options: Opt
         )
         with collector.collecting():
             path.unlink(missing_ok=True)
-            extras = with_tangent(spec)
-            subject = compile_proved(
-                spec, order=options.order, scheme=options.scheme, extras=extras, profile=options.profile
-            )
+            subject = compile_proved(spec, tangent=True)
             judged = verified_lattice if spec.lattice else verified
             verification = judged(subject, None, False, console, options.targets_of(compilation))
             if verification.failures:

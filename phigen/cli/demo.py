@@ -47,7 +47,7 @@ def command(console: Console, target: str) -> None:
     experiment = prepared(source, RUN)
     solutions: dict[str, Floats] = {}
     for order in ORDERS:
-        compilation = compilation_of(source, order)
+        compilation = compilation_of(source, order=order)
         solver = loaded(compilation, target, console)
         target = solver.target  # said once, if it is not what was asked for
         run = experiment.run

@@ -17,7 +17,7 @@ from phigen.spec.names import PARTS, PROFILES, REALS
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
-    from phigen.spec.model import Extras, Spec
+    from phigen.spec.model import Spec
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -44,21 +44,21 @@ class Options:
         if self.real == "float" and self.profile == "fast":
             raise click.UsageError("single precision has the profile small only: leave out --profile fast")
 
-    def extras_of(self, spec: Spec) -> Extras:
-        """What the code offers beyond the solver: what the spec asks for, and the command line."""
-        from phigen.spec.model import Extras
-
-        given = spec.extras
-        modified = given.modified_hamiltonian if self.modified is None else self.modified
-        without, adjoint = given.without | {*self.without}, self.adjoint or given.adjoint
-        return Extras(self.tangent or given.tangent, modified, without, adjoint, self.real or given.real)
-
     def compiled(self, spec: Spec) -> Compilation:
         """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
         from phigen.compiler import compile_proved
 
-        extras = self.extras_of(spec)
-        return compile_proved(spec, order=self.order, scheme=self.scheme, extras=extras, profile=self.profile)
+        return compile_proved(
+            spec,
+            order=self.order,
+            scheme=self.scheme,
+            profile=self.profile,
+            real=self.real,
+            modified_hamiltonian=self.modified,
+            tangent=self.tangent,
+            adjoint=self.adjoint,
+            without=self.without,
+        )
 
     def targets_of(self, compilation: Compilation) -> tuple[str, ...]:
         """The targets to write: those of the command line, else those of the spec."""
@@ -122,7 +122,7 @@ def generate(compilation: Compilation, target: str, options: Options) -> dict[st
     """The files of one target. Their header names a command that gives the same bytes on any machine."""
     from phigen.compiler import emit
 
-    spec, single = compilation.spec, options.single_file and TARGETS[target].single_file
+    spec, single = compilation.spec.written or compilation.spec, options.single_file and TARGETS[target].single_file
     words = ["phigen build", spec.name if _is_bundled(spec) else f"{spec.name}.yaml"]
     words += ["-t", target] if target not in spec.targets else []
     words += ["--order", str(options.order)] if options.order not in (None, spec.order) else []

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
+from math import prod
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from phigen.cli.arguments import FILMS
-from phigen.cli.console import Console, heading, out, out_json, table
+from phigen.cli.console import Console, counted, heading, out, out_json, table
 from phigen.cli.experiment import expect_positive, setting_of
 from phigen.cli.run_summary import described_spectrum, finite
 from phigen.errors import StepError
@@ -33,6 +33,7 @@ def run_lattice(
     target: str,
     order: int | None,
     scheme: str | None,
+    profile: str | None,
     settings: Iterable[str],
     output: Path | None,
     plot: Path | None,
@@ -50,12 +51,11 @@ def run_lattice(
 
     if output and output.suffix != ".npz":
         raise click.BadParameter("frames of lattices go to .npz files", param_hint="--output")
-    extras = replace(spec.extras, tangent=True) if lyapunov else None
     if plot and plot.suffix.lower() in FILMS:
         from phigen.drawing.films import expect_writer
 
         expect_writer(plot)
-    compilation = compilation_of(spec, order, extras, scheme=scheme)
+    compilation = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
     assert compilation.cell is not None
     start = start_of(spec, run)
     parameters = parameters_of(spec, start, settings)
@@ -68,13 +68,16 @@ def run_lattice(
         spectrum = exponents_of(console, spec, run, solver, start, start.arguments | parameters)
     errors = errors_of(compilation.cell, made)
     largest = {name: float(e.max()) for name, e in errors.items()}
+    threads = solver.backend.threads(prod(start.sizes))
     if as_json:
         sizes = {"sizes": list(start.sizes), "frames": len(made)}
-        method = {"target": solver.target, "order": solver.order, "step": made.h, "steps": made.steps}
+        built = {"profile": compilation.program.profile, "threads": threads}
+        method = {"target": solver.target, **built, "order": solver.order, "step": made.h, "steps": made.steps}
         told = {"name": spec.name, "run": run.name, **sizes, **method, **compilation.described, "errors": largest}
         out_json(finite(told | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
-        told_method = compilation.told(f"{compilation.label}, order {solver.order}, target {solver.target}")
+        target = f"target {solver.target}, {counted(threads, 'thread')}"
+        told_method = compilation.told(f"{compilation.method}, {target}")
         _print(spec, run, start, told_method, made, largest)
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"

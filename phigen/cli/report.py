@@ -44,7 +44,6 @@ def command(
     """
     from phigen.cli.report_lattice import gathered_of_lattice
     from phigen.cli.report_material import gathered
-    from phigen.cli.verify import with_tangent
     from phigen.compiler import examine
     from phigen.proofs.examination import refutation
     from phigen.report.document import document
@@ -58,7 +57,7 @@ def command(
     if run is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
     experiment = prepared(spec, name) if run and not spec.lattice else None
-    found = examine(spec, order=order, scheme=scheme, extras=with_tangent(spec))
+    found = examine(spec.for_running(order=order, scheme=scheme, tangent=True))
     if found.refuted:
         raise CheckError(refutation(found))
     if found.compilation is None:

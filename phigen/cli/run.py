@@ -15,6 +15,7 @@ from phigen.cli.arguments import (
     file_ending,
     one_spec,
     order_option,
+    profile_option,
     run_option,
     scheme_option,
     settings_option,
@@ -42,6 +43,7 @@ _TABLES = (".csv", ".npz")
 @target_option
 @order_option
 @scheme_option
+@profile_option
 @click.option("--step", metavar="H", type=float, help="Step size, instead of the run's; a duration stays.")
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
 @sizes_option
@@ -82,6 +84,7 @@ def command(
     target: str,
     order: int | None,
     scheme: str | None,
+    profile: str | None,
     step: float | None,
     steps: int | None,
     sizes: str | None,
@@ -101,6 +104,7 @@ def command(
 ) -> None:
     """Integrate a run of a spec, and sum up the errors of energy, Casimirs, invariants and solution.
 
+    The code is that of the profile fast unless --profile names another; the spec's is that of code that is built.
     The classical methods that the run names under compare: are run beside it, with the same step size. Files are
     written while the run goes on; one that is interrupted keeps what it has, and goes on with --resume.
     """
@@ -108,7 +112,6 @@ def command(
     from phigen.cli.endings import ended, timed
     from phigen.cli.past import extended, past_of, started_from
     from phigen.cli.recording import Files, Recorder, compared, opened_recorder, record
-    from phigen.cli.verify import with_tangent
 
     if plot:
         from phigen.drawing.palette import require_matplotlib
@@ -119,8 +122,9 @@ def command(
         expect_no(section=section, until=until, every=every, at=at, extend=extend)
         expect_no(**{"from": source})
         chosen = with_seed(spec, with_steps(spec, run_of(spec, name), step, steps), seed)
-        given: Any = {"target": target, "order": order, "scheme": scheme, "settings": settings, "output": output}
-        run_lattice(console, spec, chosen, **given, plot=plot, resume=resume, as_json=as_json, lyapunov=lyapunov)
+        method: Any = {"target": target, "order": order, "scheme": scheme, "profile": profile, "lyapunov": lyapunov}
+        written: Any = {"output": output, "plot": plot, "resume": resume, "as_json": as_json}
+        run_lattice(console, spec, chosen, settings=settings, **method, **written)
         return
     if plot and plot.suffix.lower() in FILMS:
         raise click.BadParameter(f"films are of lattices, and {spec.name} is none", param_hint="--plot")
@@ -132,7 +136,7 @@ def command(
     experiment = replace(experiment, run=with_seed(spec, experiment.run, seed))
     if section and experiment.run.section is None:
         raise click.BadParameter(f"the run {experiment.run.name} has no section: in the spec", param_hint="--section")
-    compilation = compilation_of(spec, order, with_tangent(spec) if lyapunov else None, scheme=scheme)
+    compilation = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
     solver = loaded(compilation, target, console)
     if source:
         experiment = started_from(experiment, past_of(source, solver.interface, "--from"), solver)

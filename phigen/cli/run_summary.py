@@ -21,7 +21,7 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
 
     run, solver = recorder.experiment.run, recorder.solver
     out(heading(f"{compilation.spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
-    chosen = f"{compilation.label}, order {solver.order}, target {solver.target}"
+    chosen = f"{compilation.method}, target {solver.target}"
     times = f"{recorder.experiment.t0:.9g} … {recorder.time:.9g}"
     past = " beyond what there was" if recorder.experiment.past else ""
     out(f"  {told_steps(recorder)}{past}, t = {times}; {chosen}")
@@ -120,6 +120,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "order": solver.order,
         "birealisation": compilation.realisation.kind if compilation.realisation else None,
         **compilation.described,
+        "profile": compilation.program.profile,
         "exact": compilation.exact,
         "step": experiment.h,
         "steps": recorder.steps,

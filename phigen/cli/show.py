@@ -52,7 +52,7 @@ def command(
     Of a lattice it shows the cell; with --expand a small lattice as an ordinary spec, a coordinate for each field of
     each site.
     """
-    from phigen.api import compilation_of
+    from phigen.compiler import compile_proved
     from phigen.symbolic.readable import SHOWN
 
     if as_latex and as_json:
@@ -71,7 +71,7 @@ def command(
     if spec.lattice:
         _show_cell(spec, None if full else SHOWN, as_latex=as_latex, as_json=as_json)
         return
-    compilation = compilation_of(spec, order, scheme=scheme)
+    compilation = compile_proved(spec, order=order, scheme=scheme)
     if as_latex:
         from phigen.notation.latex import document
 

@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 
 import click
 
-from phigen.cli.arguments import FIGURES, file_ending, one_spec, order_option, scheme_option, target_option
+from phigen.cli.arguments import (
+    FIGURES,
+    file_ending,
+    one_spec,
+    order_option,
+    profile_option,
+    scheme_option,
+    target_option,
+)
 from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.sources import load_one
 
@@ -28,6 +36,7 @@ if TYPE_CHECKING:
 @target_option
 @order_option
 @scheme_option
+@profile_option
 @click.option(
     "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the map: FILE.png, FILE.svg or FILE.pdf."
 )
@@ -45,6 +54,7 @@ def command(
     target: str,
     order: int | None,
     scheme: str | None,
+    profile: str | None,
     plot: Path | None,
     shown: str | None,
     as_json: bool,
@@ -69,7 +79,7 @@ def command(
     if shown and shown not in sweep.keep:
         kept = ", ".join(sweep.keep)
         raise click.BadParameter(f"{shown!r} is not kept; the sweep keeps {kept}", param_hint="--show")
-    setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme)
+    setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:
 
         def started(members: int) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from phigen.cli.arguments import FIGURES, file_ending, one_spec, run_option, settings_option
+from phigen.cli.arguments import FIGURES, file_ending, one_spec, profile_option, run_option, settings_option
 from phigen.cli.console import Console, out_json, pass_console, verbosity
 from phigen.cli.experiment import loaded, prepared, run_of
 from phigen.cli.sources import load_one
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 @click.command("tune")
 @one_spec
 @run_option
+@profile_option
 @click.option(
     "--accuracy", type=click.FloatRange(1e-15, 0.5), default=1e-8, show_default=True, metavar="E",
     help="The largest error that is allowed, relative.",
@@ -47,6 +48,7 @@ def command(
     console: Console,
     spec_file: str,
     name: str | None,
+    profile: str | None,
     accuracy: float,
     measure: str,
     horizon: float | None,
@@ -84,7 +86,7 @@ def command(
         raise SpecError([spec.diagnostic(place, message, "--measure orbit compares with a reference solution")])
     run = run_of(spec, name)
     experiment = None if spec.lattice else prepared(spec, name, settings=settings)
-    compilation = compile_proved(spec)
+    compilation = compile_proved(spec.for_running(profile=profile))
     chosen_target("auto", console.note)
     if experiment:
         run, problem = experiment.run, problem_of(compilation, experiment, horizon, console)

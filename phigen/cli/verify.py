@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from phigen.cli.arguments import FIGURES, file_ending, many_specs, order_option, run_option, scheme_option
+from phigen.cli.arguments import (
+    FIGURES,
+    file_ending,
+    many_specs,
+    order_option,
+    profile_option,
+    run_option,
+    scheme_option,
+)
 from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
 from phigen.cli.experiment import Experiment, expect_system, prepared
 from phigen.cli.failures import Collector
@@ -21,7 +29,6 @@ from phigen.registry import loadable
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
-    from phigen.spec.model import Spec
     from phigen.study.backward import Constancy
     from phigen.study.verification import Check, Verification
 
@@ -33,6 +40,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @run_option
 @order_option
 @scheme_option
+@profile_option
 @sizes_option
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
@@ -46,12 +54,13 @@ def command(
     name: str | None,
     order: int | None,
     scheme: str | None,
+    profile: str | None,
     sizes: str | None,
     quick: bool,
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Build every target of specs and measure what the solvers promise.
+    """Build every target of specs, in the profile fast or in that of --profile, and measure what the solvers promise.
 
     The observed order, drift of Casimirs and energy (the largest error, and that of the last tenth of the run over
     that of the first), the Poisson identity with the exact tangent map, reversibility, agreement of the targets, and
@@ -72,7 +81,7 @@ def command(
             spec = resized(given, name, sizes)
             if plot:
                 expect_system(spec)
-            compilation = compile_proved(spec, order=order, scheme=scheme, extras=with_tangent(spec))
+            compilation = compile_proved(spec.for_running(order=order, scheme=scheme, profile=profile, tangent=True))
             judged = verified_lattice if spec.lattice else verified
             verification = judged(compilation, name, quick, console)
             found.append(verification)
@@ -113,13 +122,6 @@ def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
     found = backward.modified(compilation, parameters, gauge)
     method = of_solver(solver_of(compilation, chosen_target("auto")), parameters, gauge)
     return backward.constancy(found, method, x0, experiment.h)
-
-
-def with_tangent(spec: Spec) -> Any:
-    """The extras of a spec, and the tangent map."""
-    from dataclasses import replace
-
-    return replace(spec.extras, tangent=True)
 
 
 def verified(

@@ -18,12 +18,11 @@ from phigen.lattice.parts import Colouring, SiteFields
 from phigen.lattice.realisation import CellRealisation, realise_cell
 from phigen.lattice.variations import along, along_start
 from phigen.scheme.alternation import Schedule
-from phigen.scheme.choosing import Host
 from phigen.scheme.composition import find, orders
 from phigen.scheme.order import Order
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Equation
-from phigen.spec.model import BirealisationChoice, Spec
+from phigen.spec.model import Spec
 from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, number, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import MOMENTUM, Symbol, initial
@@ -75,20 +74,20 @@ class SeriesPlan:
         return Schedule(self.fractions, len(self.fractions) - 1, ((0, 0),))
 
 
-def plan_series(cell: Cell, host: Host, order: int, composition: str, spec: Spec | None) -> SeriesPlan:
+def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
     """The plan for any H. Raises `SpecError` where no bi-realisation is known, and for orders that are not offered."""
-    stages = _stages(host, order, composition)
+    stages = _stages(spec)
     if cell.noise and len(stages[-1]) > 1:
         message = "noise: a step is not composed of others, among which some go back"
-        raise SpecError([Diagnostic(message, host.locations.get(("noise",)), "order: 2")])
+        raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "order: 2")])
     if cell.bond_bracket:
         message = "scheme series: brackets along bonds are not offered"
-        raise SpecError([Diagnostic(message, host.locations.get(("poisson",)))])
-    form = spec.poisson if spec and cell.is_local else None
+        raise SpecError([Diagnostic(message, spec.locations.get(("poisson",)))])
+    form = spec.poisson if cell.is_local else None
     try:
-        found = realise_cell(cell, form, spec.birealisation if spec else BirealisationChoice())
+        found = realise_cell(cell, form, spec.birealisation)
     except SpecError as error:
-        place = host.locations.get(("birealisation",)) or host.locations.get(("poisson",))
+        place = spec.locations.get(("birealisation",)) or spec.locations.get(("poisson",))
         raise SpecError([Diagnostic(d.message, d.location or place, d.hint) for d in error.diagnostics]) from None
     maps = _pushed(cell, found) if cell.forces.vector else (found.middle, found.increment)
     return SeriesPlan(found, *stages, *(_at_covectors(cell, m) for m in maps))
@@ -133,15 +132,16 @@ def _pushed(cell: Cell, found: CellRealisation) -> tuple[dict[str, Expression], 
     return middle, {f: e + impulse[f] for f, e in found.increment.items()}
 
 
-def _stages(host: Host, order: int, composition: str) -> tuple[Order, str, tuple[float, ...]]:
-    """The composition of steps of order 2 that gives an order; odd orders round up."""
+def _stages(spec: Spec) -> tuple[Order, str, tuple[float, ...]]:
+    """The composition of steps of order 2 that gives the order of a spec; odd orders round up."""
+    order, composition = spec.wanted_order, spec.composition
     even = order + order % 2
     note = "" if even == order else f"order {order} was asked for; a symmetric method has even order"
     if even == 2 and composition in ("auto", "none"):
         return Order(2, 1, note), "none", (1.0,)
     found = find(composition, even)
     if found is None:
-        place = host.locations.get(("composition",)) or host.locations.get(("order",))
+        place = spec.locations.get(("composition",)) or spec.locations.get(("order",))
         known = orders(composition) if composition != "none" else []
         listed = ", ".join(map(str, [2, *known] if composition in ("auto", "none") else known)) or "none"
         who = (

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
-from phigen.errors import Diagnostic, Location, SpecError
+from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
 from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfits, since_of, since_seam, told_at
@@ -32,7 +31,7 @@ from phigen.lattice.series import SeriesPlan, equation, plan_series
 from phigen.lattice.variations import along, with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating
-from phigen.scheme.choosing import Choice, Host, is_dated, planned, with_carrier
+from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
 from phigen.scheme.forces import forces_said
 from phigen.scheme.gathering import staged
 from phigen.scheme.kernel import Kernel, Output
@@ -43,19 +42,13 @@ from phigen.scheme.order import Order
 from phigen.scheme.program import About, Noise, Observables, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Ends, Gather, Partners, Seam, Sites, Sweep, Sweeps
-from phigen.spec.model import NO_EXTRAS, Extras, Spec
+from phigen.spec.model import Spec
 from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import total
 from phigen.symbolic.neighbours import steps
-
-
-class _Nowhere:
-    """What has no spec to point at."""
-
-    locations: Mapping[tuple[Any, ...], Location] = {}
 
 
 @dataclass(frozen=True)
@@ -104,47 +97,37 @@ class SplittingPlan:
 LatticePlan = SplittingPlan | SeriesPlan
 
 
-def plan_sweeps(
-    cell: Cell,
-    *,
-    order: int = 4,
-    scheme: str = "auto",
-    composition: str = "auto",
-    extras: Extras = NO_EXTRAS,
-    spec: Spec | None = None,
-) -> LatticePlan:
+def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
     """The parts and the method; by the series where that was asked for, or where H does not split.
 
     Raises `SpecError` where neither is possible, and for what is not offered.
     """
-    host = spec or _Nowhere()
-    _expect_offered(cell, extras, host.locations)
-    if scheme == "series" or (scheme == "auto" and spec and spec.birealisation.kind != "auto"):
-        return plan_series(cell, host, order, composition, spec)
+    _expect_offered(cell, spec)
+    if spec.scheme == "series" or (spec.scheme == "auto" and spec.birealisation.kind != "auto"):
+        return plan_series(cell, spec)
     try:
-        return _plan_splitting(cell, host, order, composition, spec, scheme)
+        return _plan_splitting(cell, spec)
     except SpecError as unsplit:
-        if scheme == "splitting":
+        if spec.scheme == "splitting":
             raise
         try:
-            found = plan_series(cell, host, order, composition, spec)
+            found = plan_series(cell, spec)
             return replace(found, since=unsplit.since) if isinstance(unsplit, MisfitError) else found
         except SpecError as error:
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
 
 
-def _plan_splitting(
-    cell: Cell, host: Host, order: int, composition: str, spec: Spec | None, scheme: str
-) -> SplittingPlan:
+def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     search = GraphSearch if cell.relation == GRAPH else PartSearch
-    parts, forced, since = _coloured(cell, search, host, spec, scheme)
-    noise = tuple(noise_flows(cell, parts.colouring, search, host))
+    parts, forced, since = _coloured(cell, search, spec)
+    noise = tuple(noise_flows(cell, parts.colouring, search, spec))
     flows = (*parts.flows, *forced)
-    choice = planned(host, Splitting(flows), order, composition, lambda: () if cell.forces else _kicks(cell, parts))
+    wanted = spec.wanted_order, spec.composition
+    choice = planned(spec, Splitting(flows), *wanted, lambda: () if cell.forces else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
-        raise SpecError([Diagnostic(message, host.locations.get(("noise",)), "scheme: series takes it")])
+        raise SpecError([Diagnostic(message, spec.locations.get(("noise",)), "scheme: series takes it")])
     if cell.time:  # the flows of colours follow each other in the order of the parts
         choice = replace(choice, carrier=len(flows)) if coloured else with_carrier(choice, cell.time)
     return SplittingPlan(parts, _with_seams(choice, parts.colouring), noise, since)
@@ -170,9 +153,7 @@ def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
         yield replace(flow, motions=(), summands=(), window=window)
 
 
-def _coloured(
-    cell: Cell, search: type[PartSearch], host: Host, spec: Spec | None, scheme: str
-) -> tuple[CellSplitting, tuple[CellFlow, ...], str]:
+def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSplitting, tuple[CellFlow, ...], str]:
     """The parts of H and of the forces, by the fewest colours such as all runs have sizes for, and why not by fewer.
 
     Where there are none, the scheme ``splitting`` has the fewest of all, with which the runs are refused.
@@ -180,30 +161,28 @@ def _coloured(
     best: tuple[CellSplitting, tuple[CellFlow, ...]] | None = None
     misfit: list[Misfit] = []
     refused: SpecError | None = None
-    for parts in splittings(cell, host.locations.get(("hamiltonian",)), search):
+    for parts in splittings(cell, spec.locations.get(("hamiltonian",)), search):
         try:
-            made = parts, force_flows(cell, parts.colouring, host)
+            made = parts, force_flows(cell, parts.colouring, spec)
         except TogetherError as error:
             refused = refused or error
             continue
-        wrong = misfits(spec, cell, parts.colouring.periods(cell.boundary)) if spec else []
+        wrong = misfits(spec, cell, parts.colouring.periods(cell.boundary))
         if not wrong:
             return *made, since_of(misfit, best[0].colouring.count) if best else ""
-        assert spec is not None
-        if seamed := _seamed(cell, parts.colouring, search, host, spec):
+        if seamed := _seamed(cell, parts.colouring, search, spec):
             return *seamed, since_seam(wrong)
         best, misfit = best or made, misfit or wrong
     if best is None:
         assert refused is not None
         raise refused
-    if scheme == "auto":
-        assert spec is not None  # else nothing misfits
+    if spec.scheme == "auto":
         raise MisfitError(told_at(spec, misfit), since_of(misfit, best[0].colouring.count))
     return *best, ""
 
 
 def _seamed(
-    cell: Cell, colouring: Colouring, search: type[PartSearch], host: Host, spec: Spec
+    cell: Cell, colouring: Colouring, search: type[PartSearch], spec: Spec
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
     """The parts of H and of the forces with seams, which take every size; None where some run is too small, where ends
     are open, and where sites near seams have no elementary flow."""
@@ -216,7 +195,7 @@ def _seamed(
     if small or any(b != PERIODIC for b in cell.boundary):
         return None
     try:
-        return search(cell, seamed).splitting(), force_flows(cell, seamed, host)
+        return search(cell, seamed).splitting(), force_flows(cell, seamed, spec)
     except (NoPartError, SpecError):
         return None
 
@@ -226,19 +205,9 @@ def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 
 
-def build_sweeps(
-    cell: Cell,
-    plan: LatticePlan,
-    *,
-    extras: Extras = NO_EXTRAS,
-    title: str = "",
-    licence: str = "0BSD",
-    spec_sha256: str = "",
-    profile: str = "fast",
-    lanes: bool = True,
-    compensated: bool = False,
-) -> Program:
+def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     """The solver of a lattice as a program."""
+    extras = spec.extras
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
     schedule, swept, solved = plan.schedule(), tuple[tuple[Sweep, ...], ...](), None
     if isinstance(plan, SeriesPlan):
@@ -290,7 +259,7 @@ def build_sweeps(
     facts = [_lattice_fact(cell, plan.colouring), *_facts(plan), *_acting_facts(cell, plan), plan.order.note]
     return Program(
         name=cell.name,
-        about=About(title, licence, spec_sha256, tuple(f for f in facts if f), _operations(step)),
+        about=About(spec.title, spec.license, spec.source_sha256, tuple(f for f in facts if f), _operations(step)),
         coordinates=cell.fields,
         time=cell.time,
         parameters=cell.parameters,
@@ -303,9 +272,9 @@ def build_sweeps(
         noise=drawn,
         fractions=plan.fractions if isinstance(plan, SeriesPlan) else (1.0,),
         extras=extras,
-        lanes=lanes,
-        compensated=compensated,
-        profile=profile,
+        lanes=spec.solver.lanes,
+        compensated=spec.solver.compensated,
+        profile=spec.profile,
     )
 
 
@@ -319,12 +288,12 @@ def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
     return replace(of_three, pattern=tuple(backwards.get(flow, flow) for flow in of_three.pattern))
 
 
-def _expect_offered(cell: Cell, extras: Extras, locations: Mapping[tuple[Any, ...], Location]) -> None:
-    problems = []
+def _expect_offered(cell: Cell, spec: Spec) -> None:
+    problems, locations = [], spec.locations
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
         problems.append(Diagnostic(message, locations.get(("poisson",))))
-    asked = ["modified_hamiltonian"] if extras.modified_hamiltonian else []
+    asked = ["modified_hamiltonian"] if spec.extras.modified_hamiltonian else []
     asked += ["reconstruct"] if ("reconstruct",) in locations else []
     problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
     if problems:

@@ -45,7 +45,7 @@ def compiled(name: str, order: int, birealisation: str | None = None) -> tuple[C
     source = spec.load(resources.bundled_specs() / f"{name}.yaml")
     if birealisation:
         source = replace(source, birealisation=replace(source.birealisation, kind=birealisation))
-    compilation = compilation_of(source, order)
+    compilation = compilation_of(source, order=order)
     return compilation, solver_of(compilation, "c")
 
 

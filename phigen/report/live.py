@@ -76,7 +76,7 @@ def gathered(
 def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int]) -> tuple[dict[int, str], str]:
     """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not."""
     own = compilation.order.order
-    spec = replace(compilation.spec, reconstruct="")
+    spec = replace(compilation.spec, reconstruct="", extras=_PRIVATE)
     system = None if spec.lattice else compilation.system
     found: dict[int, str] = {}
     for order in (own, *(o for o in orders if o < own or (spec.lattice and o > own))):
@@ -84,7 +84,7 @@ def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int])
             if order == own and emits(compilation):
                 made = compilation
             else:
-                made = compile_spec(spec, order=order, scheme=scheme, system=system, extras=_PRIVATE)
+                made = compile_spec(spec, order=order, scheme=scheme, system=system)
             (text,) = emit(made.program, "").values()
         except PhigenError as error:
             if order == own:

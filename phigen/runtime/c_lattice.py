@@ -310,6 +310,13 @@ class CLattice:
         wanted |= _NOISY if interface.noise else {}
         self._c = bound(self._library, interface.name, wanted, _OFFERED, single=interface.single)
 
+    def threads(self, sites: int) -> int:
+        """Return the number of threads that share the work on so many sites."""
+        if not self.interface.is_shared(sites):
+            return 1
+        most = getattr(self._library, "omp_get_max_threads", None)  # of the OpenMP that it is linked with
+        return int(most()) if most else 1
+
     def stages(self) -> list[Stage]:
         """The sweeps of a step in order, then the last and the first together, which are apart where there is noise.
 

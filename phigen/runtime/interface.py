@@ -87,9 +87,14 @@ class LatticeInterface(Interface):
     first_open: bool = False  # whether the first axis has open ends
     colour_period: int = 1  # the first axis: after so many planes colours of sites are as before
     graph: bool = False
+    pairs: bool = False  # whether each site acts on each other
     compensated: bool = False  # whether the C saves what rounding has left out of the fields
     at_bonds: tuple[str, ...] = ()
     dear: bool = False  # whether steps take longer than what is kept of them, to go back, takes to be written and read
+
+    def is_shared(self, sites: int) -> bool:
+        """Whether threads share the work on so many sites, by the numbers of the runtime in C."""
+        return sites > (512 if self.pairs else 4096)
 
 
 @dataclass

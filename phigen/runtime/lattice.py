@@ -112,6 +112,10 @@ class LatticeBackend(Protocol):
         """A session at x0 (coordinates, *sizes), at the time t0."""
         ...
 
+    def threads(self, sites: int) -> int:
+        """Return the number of threads that share the work on so many sites."""
+        ...
+
     def pullback(
         self,
         x0: Floats,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from itertools import repeat
@@ -18,9 +19,6 @@ from phigen.runtime.memory import filled
 
 if TYPE_CHECKING:
     from phigen.runtime.lattice import LatticeSolver
-
-#: Sites from which on a lattice has threads of its own, as in the runtime in C.
-_LARGE = 4096
 
 
 def ensemble(
@@ -60,9 +58,8 @@ def ensemble(
             final[m] = error.states[-1]
 
     most = cores() if threads is None else arguments.count(threads, "threads", 1)
-    in_threads(
-        1 if start[0:1].size >= _LARGE * len(solver.coordinates) else max(1, min(most, count)), make, range(count)
-    )
+    shared = solver.interface.is_shared(math.prod(start.shape[2:]))  # then each member has all threads
+    in_threads(1 if shared else max(1, min(most, count)), make, range(count))
     found = final if stride is None else frames
     if failures:
         failed = tuple(sorted(failures))

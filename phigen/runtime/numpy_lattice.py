@@ -163,6 +163,10 @@ class NumpyLattice:
         """A hash of all that decides the results."""
         return hashlib.sha256(f"{np.__version__}\n{self._text}".encode()).hexdigest()[:40]
 
+    def threads(self, sites: int) -> int:
+        """Return 1: NumPy shares nothing."""
+        return 1
+
     def start(
         self, x0: Floats, parameters: Mapping[str, Any], t0: float = 0.0, draws: Draws = FIRST_DRAWS
     ) -> NumpyLatticeSession:

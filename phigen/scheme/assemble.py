@@ -40,7 +40,7 @@ from phigen.scheme.program import About, Monitor, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Explicit, InnerSolve, Newton, Path, PathLanes, PathTangent, Step
 from phigen.scheme.tangent import curvature, explicit_jacobian, tangent_path
-from phigen.spec.model import NO_EXTRAS, Extras, SolverOptions
+from phigen.spec.model import Extras, SolverOptions, Spec
 from phigen.symbolic.symbols import STEP
 
 if TYPE_CHECKING:
@@ -57,25 +57,20 @@ def build_program(
     order: Order,
     gauged: Gauged,
     scheme: Discretisation,
+    spec: Spec,
     *,
     group: Group | None = None,
-    solver: SolverOptions | None = None,
-    extras: Extras = NO_EXTRAS,
-    title: str = "",
-    licence: str = "0BSD",
-    spec_sha256: str = "",
-    profile: str = "fast",
 ) -> Program:
     """The solver of a system as a program. LimitError if a kernel is too large."""
+    extras, solver = spec.extras, spec.solver
     expect_no_adjoint(system, extras.adjoint)
-    solver = solver or SolverOptions()
     gauge, attitude = gauged.gauge, None
     if group:
         from phigen.scheme.attitude import expect_element, stage_attitude
 
         expect_element(system, realisation)
         attitude = stage_attitude(system, group, realisation, scheme.generating, gauge)
-    lanes = solver.lanes and extras.offers("lanes", profile)
+    lanes = solver.lanes and extras.offers("lanes", spec.profile)
     elapsed = elapsed_kernel(system, scheme.generating)
     moved = replace(system, forces=gauged.system.forces)  # with a monitor these are those in τ
     step = _step(moved, realisation, scheme.generating, gauge, solver, extras, lanes=lanes)
@@ -89,9 +84,9 @@ def build_program(
     return Program(
         name=system.name,
         about=About(
-            title,
-            licence,
-            spec_sha256,
+            spec.title,
+            spec.license,
+            spec.source_sha256,
             tuple(fact for fact in _facts(system, realisation, scheme, gauge, step, order) if fact),
             operation_counts(step.main.roots),
         ),
@@ -113,7 +108,7 @@ def build_program(
         attitude=attitude,
         extras=extras,
         lanes=solver.lanes,
-        profile=profile,
+        profile=spec.profile,
     )
 
 

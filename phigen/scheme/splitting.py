@@ -25,7 +25,7 @@ from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Splitting
 from phigen.scheme.tangent import explicit_jacobian
-from phigen.spec.model import NO_EXTRAS, Extras
+from phigen.spec.model import Extras, Spec
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.symbols import LEVEL
@@ -38,17 +38,13 @@ def build_splitting(
     system: System,
     choice: Choice,
     gauge: Gauge,
+    spec: Spec,
     *,
     group: Group | None = None,
-    extras: Extras = NO_EXTRAS,
-    title: str = "",
-    licence: str = "0BSD",
-    spec_sha256: str = "",
-    lanes: bool = True,
-    profile: str = "fast",
     monitor: Logarithmic | None = None,
 ) -> Program:
     """The explicit solver as a program. LimitError if a kernel is too large."""
+    extras = spec.extras
     _expect_no_modified(system, extras)
     sources = driven(system)
     if sources:
@@ -74,7 +70,9 @@ def build_splitting(
     said += [*force_facts(system, ""), *noise_facts(system, weak=2), _clock(choice), choice.order.note]
     return Program(
         name=system.name,
-        about=About(title, licence, spec_sha256, tuple(fact for fact in said if fact), _operations(step)),
+        about=About(
+            spec.title, spec.license, spec.source_sha256, tuple(fact for fact in said if fact), _operations(step)
+        ),
         coordinates=system.coordinates,
         time=system.time,
         forced=system.forces is not None,
@@ -88,8 +86,8 @@ def build_splitting(
         noise=Noise(tuple(s.name for s in system.noise), 2, noise_fields(system)) if sources else None,
         attitude=coefficients.settled(attitude),
         extras=extras,
-        lanes=lanes,
-        profile=profile,
+        lanes=spec.solver.lanes,
+        profile=spec.profile,
         monitor=replace(monitor.monitor(system), level=level) if monitor else None,
     )
 

@@ -7,10 +7,10 @@ symbol ``momentum(NAME)``. Decimals are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from phigen.errors import Diagnostic, Location
 from phigen.registry import DEFAULT
@@ -165,14 +165,14 @@ class Extras:
 
     ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
     parts to leave out (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, along state
-    and parameters. ``real`` are the numbers of the C, double or float; "" stands for those of the spec.
+    and parameters. ``real`` are the numbers of the C, double or float.
     """
 
     tangent: bool = False
     modified_hamiltonian: int = 0
     without: frozenset[str] = frozenset()
     adjoint: bool = False
-    real: str = ""
+    real: str = "double"
 
     def offers(self, part: str, profile: str) -> bool:
         """Whether the code of a profile has a part, where it applies."""
@@ -180,6 +180,19 @@ class Extras:
 
 
 NO_EXTRAS = Extras()
+
+
+class Overrides(TypedDict, total=False):
+    """Options of a command or a call, which override what a spec says; None, False and () leave it as it is."""
+
+    order: int | None
+    scheme: str | None
+    profile: str | None
+    real: str | None
+    modified_hamiltonian: int | None
+    tangent: bool
+    adjoint: bool
+    without: Collection[str]
 
 
 @dataclass(frozen=True)
@@ -325,7 +338,8 @@ class SpecNoise:
 class Spec:
     """A spec file, about a cell where there is a ``lattice``.
 
-    `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``.
+    `locations` gives the place of a part by its path of keys, e.g. ``("casimirs", "C")``. `written` is the spec as the
+    file has it, where options of a command or a call override that.
     """
 
     name: str
@@ -362,6 +376,7 @@ class Spec:
     file: str = "<spec>"
     source: str = ""
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
+    written: Spec | None = field(default=None, repr=False, compare=False)
 
     @property
     def dimension(self) -> int:
@@ -373,11 +388,46 @@ class Spec:
         """The order that is asked for; where it is terms, that of a symmetric method with so many."""
         return self.order or (self.terms or DEFAULT_ORDER) + (self.terms or 0) % 2
 
-    def asked(self, extras: Extras | None, profile: str | None) -> tuple[Extras, str]:
-        """What is asked for in place of what the spec asks for. Single precision has the profile small only."""
-        extras = extras or self.extras
-        extras = replace(extras, real=extras.real or self.extras.real or "double")
-        return extras, "small" if extras.real == "float" else profile or self.profile
+    def overridden(
+        self,
+        *,
+        order: int | None = None,
+        scheme: str | None = None,
+        profile: str | None = None,
+        real: str | None = None,
+        modified_hamiltonian: int | None = None,
+        tangent: bool = False,
+        adjoint: bool = False,
+        without: Collection[str] = (),
+    ) -> Spec:
+        """Return the spec with the options of a command or a call applied.
+
+        ``tangent``, ``adjoint`` and ``without`` add to what the spec asks for, the others replace it; an ``order``
+        replaces ``terms`` too. Single precision has the profile small only.
+        """
+        extras = Extras(
+            tangent or self.extras.tangent,
+            self.extras.modified_hamiltonian if modified_hamiltonian is None else modified_hamiltonian,
+            self.extras.without.union(without),
+            adjoint or self.extras.adjoint,
+            real or self.extras.real,
+        )
+        ordered = replace(self, order=order, terms=None, birealisation=replace(self.birealisation, order=order))
+        return replace(
+            ordered if order else self,
+            scheme=scheme or self.scheme,
+            profile="small" if extras.real == "float" else profile or self.profile,
+            extras=extras,
+            written=self.written or self,
+        )
+
+    def for_running(self, **options: Unpack[Overrides]) -> Spec:
+        """Return the spec with options applied, as phigen itself runs it: in the profile fast unless they name one.
+
+        The ``profile`` of a spec is about the code that ``phigen build`` writes.
+        """
+        options["profile"] = options.get("profile") or "fast"
+        return self.overridden(**options)
 
     def parameters_of(self, run: Run) -> dict[str, float]:
         """The values of all parameters in a run: its own, else the defaults."""

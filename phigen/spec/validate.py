@@ -101,7 +101,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
             raw.get("modified_hamiltonian", 0),
             frozenset(without_repetition(raw.get("without", ()), ("without",), declared)),
             raw.get("adjoint", False),
-            raw.get("real", ""),
+            raw.get("real", "double"),
         ),
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,

@@ -114,7 +114,7 @@ def verify_lattice(
         with progress.stage(f"{name}: paths of the noise"):
             checks += _noise(compilation.cell, subject, quick=quick)
         checks += _single(compilation.cell, subject, single, made) if single else []
-    label = compilation.told(f"{compilation.label}, order {compilation.order.order}")
+    label = compilation.told(compilation.method)
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, SAID)
 
 

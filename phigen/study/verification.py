@@ -151,11 +151,11 @@ def verify(
     # With noise, trajectories may well start where single steps have no scale: at rest, at the origin.
     first = made // STATES if noisy else 0
     states = [rows[i] for i in np.linspace(first, made, STATES, dtype=int)] if made >= STATES else [x]
-    order, symmetry = compilation.order.order, "symmetric" if compilation.symmetric else "not symmetric"
+    symmetry = "symmetric" if compilation.symmetric else "not symmetric"
     return Verification(
         compilation.spec.name,
         run,
-        f"order {order}, {compilation.label}, {symmetry}",
+        f"{compilation.method}, {symmetry}",
         h,
         made,
         tuple(own),

@@ -20,7 +20,7 @@ from phigen.errors import Diagnostic, FileError, SpecError
 from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.memory import expect_room
-from phigen.spec.model import Extras, Run, Spec, Sweep
+from phigen.spec.model import Run, Spec, Sweep
 from phigen.spec.names import KEPT
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
@@ -45,6 +45,7 @@ class Setting:
     target: str = "auto"
     order: int | None = None
     scheme: str | None = None
+    profile: str | None = None
 
 
 @dataclass(frozen=True)
@@ -66,8 +67,13 @@ def made(
     at a time do not fit into memory, and `SweepError`.
     """
     store.imported("zarr")
-    extras = replace(spec.extras, tangent=True) if "lyapunov" in sweep.keep else spec.extras
-    compilation = compilation_of(spec, setting.order, _wanted(extras), setting.scheme)
+    compilation = compilation_of(
+        _with_ensembles(spec),
+        order=setting.order,
+        scheme=setting.scheme,
+        profile=setting.profile,
+        tangent="lyapunov" in sweep.keep,
+    )
     listed = _listed(sweep, spec) if sweep.file else {}
     _expect_names([*(axis.name for axis in sweep.over), *listed], spec)
     target = chosen_target(setting.target)
@@ -102,9 +108,9 @@ def _expect_names(varied: Iterable[str], spec: Spec) -> None:
             raise SpecError([Diagnostic(message, hint="another name for it in the spec")])
 
 
-def _wanted(extras: Extras) -> Extras:
-    """Ensembles are needed, whatever the spec leaves out."""
-    return replace(extras, without=extras.without - {"ensemble", "members"})
+def _with_ensembles(spec: Spec) -> Spec:
+    """Return the spec with code for ensembles, which sweeps need, whatever it leaves out."""
+    return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
 
 
 def _members_of(plan: Plan, number: int) -> int:

@@ -119,7 +119,7 @@ def own_setting(compilation: Compilation) -> Setting:
     if realisation is None:
         return Setting(SPLITTING, order, gauge, spec.composition)
     choice = spec.birealisation
-    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in FORMULAS
+    plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
     composed = len(compilation.program.fractions) > 1
     return Setting(realisation.kind if plain else OWN, order, gauge, spec.composition if composed else "none")
 
@@ -130,7 +130,7 @@ def _of_series(spec: Spec, plan: SeriesPlan, order: int) -> Setting:
     if plan.realisation.site is None:
         return Setting("auto", order, OWN, composition)
     choice, kind = spec.birealisation, plan.realisation.kind
-    plain = choice == BirealisationChoice(choice.kind) and choice.kind not in FORMULAS
+    plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
     return Setting(kind if plain else OWN, order, OWN, composition)
 
 

@@ -134,7 +134,7 @@ def test_terms_that_are_too_many_are_told_and_the_others_shown(phigen, in_tmp, m
     assert "S_h = h S_1 + h^3 S_3 + …" in shown.stdout
     assert "from S_5 on there are too many terms" in shown.stdout
     assert "\\cdots \\\\" in phigen("show", SPECS / "henon_heiles.yaml", "--order", 6, "--latex").stdout
-    reported = method_section(compilation_of(spec.load(SPECS / "henon_heiles.yaml"), 6))
+    reported = method_section(compilation_of(spec.load(SPECS / "henon_heiles.yaml"), order=6))
     assert "From S_5 on there are too many terms" in reported
 
 

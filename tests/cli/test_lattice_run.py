@@ -56,7 +56,7 @@ def test_what_names_the_series_says_which_sizes_would_split(phigen, tmp_path):
     # 3 is a multiple of 3 too, but smaller than the stencil
     said = ": the series, since 5 along i is no multiple of 3, as a splitting with 3 colours needs; 6 would do\n"
     assert f"Bi-realisation (constant in logarithms){said}" in phigen("check", spec).stdout
-    assert f"order 4, target numpy{said}" in phigen("run", spec, "-t", "numpy").stdout
+    assert f"order 4, profile fast, target numpy, 1 thread{said}" in phigen("run", spec, "-t", "numpy").stdout
     assert "since" not in phigen("run", spec, "-t", "numpy", "--sizes", "6").stdout
     why = {"scheme": "series", "colours": 1, "since": said.removeprefix(": the series, since ").strip()}
     (checked,) = json.loads(phigen("check", spec, "--json").stdout)

@@ -16,7 +16,6 @@ from phigen.runtime import members as runs
 from phigen.runtime.gradients import segments
 from phigen.scheme.lowering import cost
 from phigen.scheme.steps import Explicit, Newton, Path, Splitting
-from phigen.spec.model import Extras
 from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import symbols_of, topological
 
@@ -79,7 +78,8 @@ def compilation(kind):
     found = compile_spec(
         spec.loads(f"phigen: 1\nname: t\n{text}"),
         scheme="splitting" if step is Splitting else None,
-        extras=Extras(tangent=True, adjoint=True),
+        tangent=True,
+        adjoint=True,
     )
     assert isinstance(found.program.step, step)
     return found
@@ -428,7 +428,7 @@ def test_c_failure_leaves_state_and_cotangents():
 def test_adjoint_is_refused_where_it_is_not_offered():
     with pytest.raises(SpecError, match="not offered in JavaScript"):
         emit(compilation("newton").program, "js", "phigen build")
-    plain = compile_spec(compilation("newton").spec)
+    plain = compile_spec(compilation("newton").spec.written)
     assert all("adjoint" not in text for target in TARGETS for text in files(plain, target).values())
 
 
@@ -454,8 +454,8 @@ def test_c_defines_functions_of_flows_only_where_flows_call_them():
 
 def test_steps_that_forget_what_was_before_are_pulled_back_too():
     """Where a guess misleads, a step is made again without: then the solver remembers fewer steps than it has made."""
-    both = Extras(tangent=True, adjoint=True)
-    made = solver(compile_spec(spec.loads(f"phigen: 1\nname: t\n{RATTLEBACK}"), extras=both), "c")
+    both = {"tangent": True, "adjoint": True}
+    made = solver(compile_spec(spec.loads(f"phigen: 1\nname: t\n{RATTLEBACK}"), **both), "c")
     x, steps, bar, product = np.array([0.01, 0.5, -1]), 20, weights(3), np.eye(3)
     for _, tangent in made.tangents(x, 0.4, steps):
         product = tangent @ product

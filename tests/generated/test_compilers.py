@@ -23,7 +23,6 @@ from support import (
 
 from phigen import resources
 from phigen.compiler import compile_spec, emit
-from phigen.spec.model import Extras
 
 pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
@@ -96,7 +95,7 @@ BACK = [("g++", name) for name in ("klein_gordon", "lotka_volterra", "pendulum_e
 
 
 def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
-    made = compile_spec(spec_of("rigid_body"), scheme="splitting", extras=Extras(tangent=True, adjoint=True))
+    made = compile_spec(spec_of("rigid_body"), scheme="splitting", tangent=True, adjoint=True)
     files = emit(made.program, "c", "phigen")
     assert "rigid_body_pull_group(" in files["rigid_body.c"]
     write(tmp_path, files)
@@ -106,8 +105,8 @@ def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
 @pytest.mark.parametrize(("compiler", "name"), slow_but(BACK, product(["g++", "clang++"], sorted(resources.bundled()))))
 def test_fast_code_with_derivatives_is_cpp_as_well(compiler, name, tmp_path):
     found = spec_of(name)
-    extras = Extras(tangent=not found.lattice, adjoint=not found.noise)
-    write(tmp_path, emit(compile_spec(found, extras=extras, profile="fast").program, "c", "phigen"))
+    extras = {"tangent": not found.lattice, "adjoint": not found.noise}
+    write(tmp_path, emit(compile_spec(found, **extras, profile="fast").program, "c", "phigen"))
     for standard in ("c++17", "c++20"):
         run([tool(compiler), "-x", "c++", f"-std={standard}", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)
 

@@ -28,7 +28,6 @@ from phigen import spec
 from phigen.compiler import compile_spec
 from phigen.errors import ParameterError, StepError
 from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Newton, Path, Splitting
-from phigen.spec.model import Extras
 
 pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
@@ -222,7 +221,7 @@ STEPS = {"newton": Newton, "gauged": Newton, "explicit": Explicit, "path": Path,
 def kind(name):
     """The compilation of a kind of step, with its tangent map, and with a gauge where that is chosen."""
     found = spec.loads(f"phigen: 1\nname: t\n{KINDS[name]}")
-    compilation = compile_spec(found if name == "gauged" else replace(found, gauge="none"), extras=Extras(tangent=True))
+    compilation = compile_spec(found if name == "gauged" else replace(found, gauge="none"), tangent=True)
     assert isinstance(compilation.program.step, STEPS[name])
     assert bool(compilation.program.gauge) == (name == "gauged")
     return compilation

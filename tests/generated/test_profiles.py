@@ -10,7 +10,6 @@ from support import RawC, compiled, files, setting, small, solver
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
-from phigen.spec.model import Extras
 from phigen.targets.c.emitter import FEW_SCREENS
 
 GENERATED = Path(__file__).resolve().parents[2] / "generated"
@@ -79,7 +78,7 @@ WORDS = {
 def described(name, profile, without=()):
     """The compilation of a system of the corpus, gauge included, without some parts."""
     given = spec.load(resources.bundled_specs() / f"{name}.yaml")
-    return compile_spec(given, order=4, profile=profile, extras=Extras(without=frozenset(without)))
+    return compile_spec(given, order=4, profile=profile, without=without)
 
 
 @pytest.mark.parametrize("part", WORDS)

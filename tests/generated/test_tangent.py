@@ -33,10 +33,8 @@ from support import (
 from phigen import StepError, compile, spec
 from phigen.compiler import compile_spec
 from phigen.scheme.steps import Path
-from phigen.spec.model import Extras
 from phigen.symbolic.arrays import evaluate
 
-TANGENT = Extras(tangent=True)
 #: Each driver, with one stage and with several, small systems first.
 KINDS = ("pendulum_euler", "rigid_body", "volterra5", "lagrange_top", "nambu_pendulum", "sir_epidemic")
 COMPOSED = f"{BODY}order: 6\ncomposition: kahan-li\ngauge: none\n"
@@ -44,7 +42,7 @@ COMPOSED = f"{BODY}order: 6\ncomposition: kahan-li\ngauge: none\n"
 
 @cache
 def with_tangent(name):
-    return compile_spec(plain(spec_of(name)), extras=TANGENT, system=described(name)[1])
+    return compile_spec(plain(spec_of(name)), tangent=True, system=described(name)[1])
 
 
 @cache

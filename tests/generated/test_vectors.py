@@ -8,25 +8,22 @@ from support import run, spec_of, tool, write
 
 from phigen.compiler import compile_spec, emit
 from phigen.runtime import toolchain
-from phigen.spec.model import Extras
 
 pytestmark = pytest.mark.skipif(platform.machine() != "x86_64", reason="other processors have other vectors")
 
 #: As phigen compiles, with vectors of four numbers whatever the processor here has.
 FLAGS = ["-std=c99", "-O3", "-march=haswell", *toolchain.TUNING_FLAGS[1:]]
-BACK = Extras(adjoint=True)
-
 #: One for each kind of code in lanes: how it is compiled, and functions that do most of the work.
 CASES = {
     "equations": ("rigid_body", {}, "evaluate_lanes linearise_lanes invert_lanes apply foresee group_foresee"),
     "paths": ("nambu_pendulum", {}, "curvature_lanes momentum_lanes values_lanes along_mean_lanes follow add_terms"),
-    "explicit": ("pendulum_euler", {"extras": BACK}, "explicit_lanes explicit_adjoint_lanes stage_lanes gain_lanes"),
+    "explicit": ("pendulum_euler", {"adjoint": True}, "explicit_lanes explicit_adjoint_lanes stage_lanes gain_lanes"),
     "flows": ("toda3", {"scheme": "splitting"}, "add_lanes change1_lanes change2_lanes change1_far_lanes settle_lanes"),
     "flows back": (
-        "rigid_body", {"scheme": "splitting", "extras": BACK}, "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes"
+        "rigid_body", {"scheme": "splitting", "adjoint": True}, "flow1_adjoint_lanes flow2_adjoint_far_lanes gain_lanes"
     ),
     "sites": ("heisenberg", {}, "sweep1_near sweep1_far sweep2_near sweep3_far vector_field_row energy_row"),
-    "sites back": ("klein_gordon", {"extras": BACK}, "sweep1 sweep2 sweep1_back sweep2_back"),
+    "sites back": ("klein_gordon", {"adjoint": True}, "sweep1 sweep2 sweep1_back sweep2_back"),
     "pairs": ("outer_planets", {}, "pair_forces sweep1 sweep2"),
     "equations of sites": ("kdv", {}, "slope relax increment"),
 }  # fmt: skip

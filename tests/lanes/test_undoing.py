@@ -14,7 +14,6 @@ from phigen.compiler import compile_spec
 from phigen.lanes.lowering import in_lanes
 from phigen.lanes.undoing import undoing
 from phigen.scheme.lowering import operation_counts, with_numbers_shared
-from phigen.spec.model import Extras
 from phigen.symbolic.expression import ZERO, number, symbol, topological
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.numeric import evaluate
@@ -32,7 +31,7 @@ adjoint: true
 
 @cache
 def made(name):
-    options = {"scheme": "splitting", "profile": "fast", "extras": Extras(adjoint=True)}
+    options = {"scheme": "splitting", "profile": "fast", "adjoint": True}
     return compile_spec(spec.load(SPECS / f"{name}.yaml"), **options).program
 
 

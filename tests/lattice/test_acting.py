@@ -26,7 +26,6 @@ from phigen.proofs import lattices
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.numpy_lattice import NumpyLatticeSession
-from phigen.spec.model import Extras
 from phigen.spec.yaml_text import spec_text
 from phigen.study import lattice_noise
 from phigen.study.lattices import verify_lattice
@@ -353,7 +352,7 @@ def test_runs_report_the_work_of_forces_and_verification_claims_what_holds() -> 
     assert bath is not None
     assert CHANGE in errors_of(bath, solver("langevin").integrate(y, 0.1, 5, parameters=heat))
     start = Start(y.shape[1:], y, heat, np.empty((0, 2), dtype=np.int64))
-    carrying = compile_spec(compiled("langevin").spec, extras=Extras(tangent=True))
+    carrying = compile_spec(compiled("langevin").spec, tangent=True)
     solvers = {"numpy": lattice_solver_of(carrying, "numpy")}
     found = verify_lattice(carrying, solvers, "run", start, 0.05, 20, seed=1, quick=True)
     assert found.failures == []
@@ -395,7 +394,7 @@ def test_headers_say_what_holds_with_forces_and_noise() -> None:
 
 @pytest.mark.parametrize(("name", "target"), [("bath", "numpy"), ("bath", "c"), ("langevin", "numpy")])
 def test_tangent_vectors_are_carried_along_the_path_of_the_noise(name: str, target: str) -> None:
-    made = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+    made = compile_spec(compiled(name).spec, tangent=True)
     found, (x, values) = lattice_solver_of(made, target), given(name)
     along, asked = np.random.default_rng(0).normal(size=x.shape), {"seed": 4, "parameters": values}
     after, (carried,) = found.step_tangent(x, 0.05, along[None], **asked)

@@ -19,7 +19,6 @@ from phigen.lanes.lowering import in_lanes
 from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.resources import bundled
 from phigen.runtime import c_lattice
-from phigen.spec.model import Extras
 from phigen.symbolic.expression import topological
 
 H, STEPS, SITES = 0.05, 4, 6
@@ -363,19 +362,19 @@ def test_fields_before_sweeps_are_found_again():
     """So that they are not kept: rotations and scalings at each site, along bonds, of pairs, and what forces damp."""
     for name in ("ablowitz_ladik", "volterra", "chiral_magnet", "food_web", "outer_planets", "driven", "relaxing"):
         spec = phigen.spec.loads(OWN[name]) if name in OWN else phigen.spec.load(bundled()[name])
-        program = compile_spec(spec, extras=Extras(adjoint=True)).program
+        program = compile_spec(spec, adjoint=True).program
         assert can_be_undone(program, program.step), name
 
 
 def test_derivatives_that_transposes_call_have_the_short_way_of_their_functions():
     spec = phigen.spec.load(bundled()["ablowitz_ladik"])
-    rows = in_lanes(compile_spec(spec, extras=Extras(adjoint=True), profile="fast").program)
+    rows = in_lanes(compile_spec(spec, adjoint=True, profile="fast").program)
     assert {"sinroot", "sinroot1"} <= {*rows.near} == {*rows.limited}
 
 
 def test_functions_of_what_sweeps_keep_are_called_once_on_the_way_back():
     """|ψ|² decides how far a phase turns, and is the same before and after."""
-    program = compile_spec(phigen.spec.load(bundled()["dnls"]), extras=Extras(adjoint=True)).program
+    program = compile_spec(phigen.spec.load(bundled()["dnls"]), adjoint=True).program
     called = [
         sum(e.op in ("sin", "versin", "cos") for e in topological(kernel.roots))
         for part in transposes(program, program.step)

@@ -9,7 +9,6 @@ from systems import slow_but
 
 from phigen.compiler import compile_spec, emit
 from phigen.runtime.arguments import Beginning
-from phigen.spec.model import Extras
 
 #: Chains with open and periodic ends, with colours and with functions; planes, with both kinds of ends, and a box.
 NAMES = ["xxz", "xxz_open", "fput", "volterra", "sheet", "cube"]
@@ -105,6 +104,5 @@ def test_planes_and_stages_that_there_are_not_are_refused() -> None:
 
 @pytest.mark.parametrize(("profile", "without"), [("small", ()), ("fast", ("by-hand",))])
 def test_steps_by_hand_can_be_left_out(profile: str, without: tuple[str, ...]) -> None:
-    extras = Extras(without=frozenset(without))
-    program = compile_spec(compiled("fput").spec, profile=profile, extras=extras).program
+    program = compile_spec(compiled("fput").spec, profile=profile, without=without).program
     assert not any("put_planes" in text for text in emit(program, "c", "phigen").values())

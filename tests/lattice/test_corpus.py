@@ -20,7 +20,6 @@ from phigen.lattice.expansion import expand
 from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of
 from phigen.spec import load, loads
-from phigen.spec.model import Extras
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.expression import total
 from phigen.symbolic.verdict import PROVED
@@ -63,7 +62,7 @@ def test_short_code_is_short_for_any_number_of_sites() -> None:
 @pytest.mark.parametrize("profile", ["small", "fast"])
 def test_code_with_transposes_has_no_function_that_nothing_calls(path: Path, profile: str, tmp_path: Path) -> None:
     spec = load(path)
-    program = compile_spec(spec, profile=profile, extras=Extras(adjoint=not spec.noise)).program
+    program = compile_spec(spec, profile=profile, adjoint=not spec.noise).program
     write(tmp_path, emit(program, "c", "phigen"))
     # Only clang minds those that are inline.
     run([tool("clang"), "-std=c99", *WARNINGS, "-fsyntax-only", f"{path.stem}.c"], tmp_path)

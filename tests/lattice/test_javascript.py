@@ -21,7 +21,7 @@ from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
 from phigen.lattice.states import Start, start_of
 from phigen.runtime.modules import load_module
-from phigen.spec.model import Extras, Spec
+from phigen.spec.model import Spec
 
 CORPUS = {f.stem: f for f in sorted((resources.bundled_specs() / "lattices").glob("*.yaml"))}
 
@@ -193,7 +193,7 @@ CARRYING = {
 
 
 def carrying(compilation: Compilation) -> Compilation:
-    return compile_spec(compilation.spec, extras=Extras(tangent=True))
+    return compile_spec(compilation.spec, tangent=True)
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,6 @@ from phigen.compiler import compile_spec
 from phigen.errors import StepError
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver
-from phigen.spec.model import Extras
 from phigen.study.lattices import verify_lattice
 
 H = 0.2
@@ -38,7 +37,7 @@ H = 0.2
 
 @cache
 def with_tangents(name: str) -> Compilation:
-    return compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+    return compile_spec(compiled(name).spec, tangent=True)
 
 
 @cache
@@ -80,10 +79,10 @@ def test_tangent_vectors_are_carried_by_the_derivative_of_a_step(name: str) -> N
 def test_the_derivative_is_that_of_the_ordinary_system(name: str) -> None:
     x = start(name, (4,))
     spec = replace(compiled(name).spec, composition="suzuki")
-    lattice = lattice_solver_of(compile_spec(spec, extras=Extras(tangent=True)), "numpy")
+    lattice = lattice_solver_of(compile_spec(spec, tangent=True), "numpy")
     scheme = "series" if name in SERIES else "splitting"
     whole = replace(expansion(name, (4,)).spec(), order=4, scheme=scheme, composition="suzuki", gauge="none")
-    ordinary = solver_of(compile_spec(whole, extras=Extras(tangent=True)), "numpy")
+    ordinary = solver_of(compile_spec(whole, tangent=True), "numpy")
     after, carried = lattice.step_tangent(x, H, np.eye(x.size).reshape(-1, *x.shape))
     expected, matrix = ordinary.step_tangent(x.reshape(-1), H)
     np.testing.assert_allclose(after.reshape(-1), expected, rtol=0, atol=1e-14)
@@ -138,7 +137,7 @@ noise: {w: {hamiltonian: T*q**2/2}}
 
 def test_tangent_vectors_go_with_time_forces_and_noise() -> None:
     """The increments of the noise belong to the step: they are the same in both targets, and for all states."""
-    found = compile_spec(specs.loads(PUSHED), extras=Extras(tangent=True))
+    found = compile_spec(specs.loads(PUSHED), tangent=True)
     x, draws = start("fput", (6,)), {"t0": 0.3, "seed": 3, "step0": 5}
     vectors, h, e = np.random.default_rng(0).normal(size=(2, 2, 6)), 0.1, 1e-5
     for target in ("c", "numpy"):
@@ -204,7 +203,7 @@ NOISY = "noise: {kicks: {hamiltonian: x, amplitude: 0.3}, turns: {hamiltonian: z
     ],
 )
 def test_verification_tells_poisson_maps_to_roundoff(kind: type[LatticeSolver], text: str, short: list[str]) -> None:
-    made = compile_spec(specs.loads(text), extras=Extras(tangent=True))
+    made = compile_spec(specs.loads(text), tangent=True)
     plain = lattice_solver_of(made, "numpy")
     x = np.random.default_rng(5).normal(size=(3, 6))
     begin = Start((6,), x, {}, np.empty((0, 2), dtype=np.int64))

@@ -22,7 +22,7 @@ from phigen.lattice.states import Start
 from phigen.proofs import lattices
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.lattice import LatticeSolver
-from phigen.spec.model import Extras, Spec
+from phigen.spec.model import Spec
 from phigen.spec.yaml_text import spec_text
 from phigen.study.lattices import verify_lattice
 from phigen.symbolic.arrays import evaluate
@@ -210,7 +210,7 @@ def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
 @pytest.mark.slow
 def test_verification_judges_the_balance_of_energy() -> None:
     x, values = given("pushed")
-    made = compile_spec(compiled("pushed").spec, order=4, extras=Extras(tangent=True))
+    made = compile_spec(compiled("pushed").spec, order=4, tangent=True)
     start = Start(x.shape[1:], x, values, np.empty((0, 2), dtype=np.int64))
     found = verify_lattice(made, {"numpy": lattice_solver_of(made, "numpy")}, "run", start, 0.1, 60, t0=T0)
     rows = {c.name: c for c in found.checks}

@@ -12,7 +12,6 @@ from phigen.compiler import compile_proved, compile_spec, emit, examine
 from phigen.errors import CheckError
 from phigen.proofs import statements
 from phigen.proofs.independent import GRADIENT, compare
-from phigen.spec.model import Extras
 from phigen.study import measures, verification
 from phigen.study.methods import Method
 
@@ -46,7 +45,7 @@ BODY_START = np.array([0.3, 1.0, 0.2])
 
 
 def compiled_text(text, order=None):
-    return compile_spec(spec.loads(text), order=order, extras=Extras(tangent=True))
+    return compile_spec(spec.loads(text), order=order, tangent=True)
 
 
 @pytest.fixture(scope="module")

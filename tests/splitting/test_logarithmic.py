@@ -8,7 +8,6 @@ from support import javascript
 from phigen import SpecError, StepError, resources, spec
 from phigen.api import solver_of
 from phigen.compiler import compile_spec
-from phigen.spec.model import Extras
 from phigen.study import verification
 
 KEPLER = """phigen: 1
@@ -25,7 +24,7 @@ START = np.array([1 - ECCENTRICITY, 0, 0, np.sqrt((1 + ECCENTRICITY) / (1 - ECCE
 
 
 def compiled_text(text, order=4):
-    return compile_spec(spec.loads(text), order=order, extras=Extras(tangent=True))
+    return compile_spec(spec.loads(text), order=order, tangent=True)
 
 
 @pytest.fixture(scope="module")

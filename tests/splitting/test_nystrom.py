@@ -18,7 +18,6 @@ from phigen.notation.latex import document
 from phigen.scheme import alternation, choosing, nystrom
 from phigen.scheme.order import Order
 from phigen.scheme.splitting import build_splitting
-from phigen.spec.model import Extras
 from phigen.splitting.kicks import kicks
 from phigen.splitting.parts import split
 from phigen.splitting.ring import KICK
@@ -144,7 +143,7 @@ def forced(name, method):
     found = small(compiled(name, method.order, "splitting"))
     (kick,) = [k for k in kicks(found.system, split(found.system)) if k.modified or not method.multiples]
     choice = choosing.chosen(split(found.system), Order(method.order, 0), method, kick)
-    program = build_splitting(found.system, choice, found.gauge, extras=Extras(tangent=True), profile="small")
+    program = build_splitting(found.system, choice, found.gauge, found.spec.overridden(tangent=True, profile="small"))
     return replace(found, program=program, splitting=choice.splitting)
 
 

@@ -26,14 +26,12 @@ from phigen.compiler import compile_proved, compile_spec, emit, examine
 from phigen.errors import CheckError, StepError
 from phigen.scheme.choosing import plan
 from phigen.scheme.splitting import build_splitting
-from phigen.spec.model import Extras
 from phigen.splitting.parts import split
 from phigen.study import measures
 from phigen.study.methods import of_solver
 from phigen.study.verification import verify
 
 SYSTEMS = ["rigid_body", "kowalevski_top", "lotka_volterra", "toda3", "henon_heiles", "charged_particle"]
-TANGENT = Extras(tangent=True)
 
 PLANE = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 ROD = PLANE + "parameters: {g: 1}\nhamiltonian: p**2/2 - g*cos(q)\n"
@@ -41,7 +39,7 @@ ROD = PLANE + "parameters: {g: 1}\nhamiltonian: p**2/2 - g*cos(q)\n"
 
 def splitting_of(name, order):
     """The solver of a system of the corpus as a splitting, with its tangent map."""
-    return compile_spec(described(name)[0], order=order, scheme="splitting", extras=TANGENT)
+    return compile_spec(described(name)[0], order=order, scheme="splitting", tangent=True)
 
 
 @cache
@@ -131,7 +129,7 @@ def test_a_wrong_sign_in_one_flow_falls_short_of_the_order():
     wrong = replace(flow, increment=tuple(-e for e in flow.increment))
     planted = replace(found.splitting, flows=(wrong, *found.splitting.flows[1:]))
     choice = replace(plan(found.system, split(found.system), 4, "auto"), splitting=planted)
-    program = build_splitting(found.system, choice, found.gauge, extras=TANGENT)
+    program = build_splitting(found.system, choice, found.gauge, found.spec.overridden(tangent=True))
     bad = replace(found, program=program, splitting=planted)
     solvers = {target: solver(bad, target) for target in TARGETS}
     verified = verify(bad, solvers, "planted", at.x, at.parameters, at.h, 100, quick=True)

@@ -17,7 +17,6 @@ from phigen.runtime.interface import Interface
 from phigen.runtime.numpy_solver import NumpySolver
 from phigen.runtime.solver import Solver
 from phigen.scheme.assemble import build_program
-from phigen.spec.model import Extras
 from phigen.study import backward, measures, verification
 from phigen.study.meanings import meaning_of
 from phigen.study.methods import by_differences, field_of, of_classical, of_solver
@@ -37,7 +36,7 @@ START = np.array([0.4, 1.0, 0.3])
 
 @cache
 def compilation_of(text=TEXT):
-    return compile_spec(spec.loads(text), extras=Extras(tangent=True))
+    return compile_spec(spec.loads(text), tangent=True)
 
 
 def from_source(compilation, change=lambda source: source):
@@ -131,7 +130,7 @@ def test_a_wrong_sign_of_the_quadratic_term_is_found_out():
     wrong = tuple(-e for e in substitute(compilation.realisation.displacement, names))
     realisation = replace(compilation.realisation, displacement=wrong)
     found = (compilation.system, realisation, compilation.order, compilation.gauged, compilation.scheme)
-    program = build_program(*found, extras=Extras(tangent=True))
+    program = build_program(*found, compilation.spec.overridden(tangent=True))
     bad = replace(compilation, program=program)
     found = verified(bad, {"c": solver_of(bad, "c")})
     assert {"Poisson defect, exact tangent", "observed order"} <= failed(found)
@@ -236,7 +235,7 @@ def test_command_for_machines_and_exit_code(file, monkeypatch):
 
 @pytest.mark.parametrize("name", slow_but(["rigid_body"], ["rigid_body", "predator_prey"]))
 def test_every_row_has_a_meaning_which_the_documentation_gives(name):
-    compilation = compile_spec(compiled(name).spec, extras=Extras(tangent=True))
+    compilation = compile_spec(compiled(name).spec, tangent=True)
     run = next(iter(compilation.spec.runs.values()))
     values = compilation.spec.parameters_of(run)
     solvers = {"numpy": solver_of(compilation, "numpy")}

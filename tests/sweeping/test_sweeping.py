@@ -65,10 +65,10 @@ def cluster(request):
 def compiled_once(monkeypatch):
     """What is compiled is not what is tested here."""
 
-    def once(spec, order, extras, scheme):
-        key = spec.source.partition("sweeps:")[0], extras.tangent
+    def once(spec, **options):
+        key = spec.source.partition("sweeps:")[0], options["tangent"]
         if key not in MADE:
-            MADE[key] = compilation_of(spec, order, extras, scheme)
+            MADE[key] = compilation_of(spec, **options)
         return MADE[key]
 
     monkeypatch.setattr(sweeping, "compilation_of", once)

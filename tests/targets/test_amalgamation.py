@@ -9,7 +9,6 @@ from support import run, spec_of, tool, write
 
 from phigen import resources
 from phigen.compiler import compile_spec
-from phigen.spec.model import Extras
 from phigen.targets.c.emitter import runtime_of
 from phigen.targets.c.macros import Macros
 
@@ -68,8 +67,8 @@ def test_macros_that_are_given_too_little_are_no_code():
 @cache
 def with_derivatives(name, composition):
     """The program of a system of the corpus, with the derivatives of its steps."""
-    extras = Extras(tangent=True, adjoint=True)
-    return compile_spec(replace(spec_of(name), extras=extras, composition=composition), order=4).program
+    chosen = replace(spec_of(name), composition=composition)
+    return compile_spec(chosen, order=4, tangent=True, adjoint=True).program
 
 
 @pytest.mark.parametrize(

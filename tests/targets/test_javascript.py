@@ -31,7 +31,7 @@ import phigen
 from phigen import resources, spec
 from phigen.compiler import compile_spec, emit
 from phigen.scheme import steps as kinds
-from phigen.spec.model import BirealisationChoice, Extras
+from phigen.spec.model import BirealisationChoice
 from phigen.targets.header import is_edited
 from phigen.targets.js.runtime import resolved
 
@@ -107,11 +107,11 @@ def _gauged(profile):
 
 
 def _varied(text):
-    return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), extras=Extras(tangent=True))
+    return compile_spec(spec.loads(f"phigen: 1\nname: t\n{text}"), tangent=True)
 
 
 def _modified(given, order):
-    return compile_spec(given, order=order, extras=Extras(False, 1))
+    return compile_spec(given, order=order, modified_hamiltonian=1)
 
 
 @cache

@@ -13,7 +13,6 @@ import phigen
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec, emit
 from phigen.lattice.states import start_of
-from phigen.spec.model import Extras
 from phigen.study.single_precision import COARSER, ONE_STEP
 from phigen.targets.c.single import single
 
@@ -52,9 +51,7 @@ def test_what_is_written(case):
 @cache
 def in_single(name, **extras):
     """The compilation of a system of the corpus in single precision, and in double with the same short code."""
-    found = (
-        small(as_given(name)) if not extras else compile_spec(spec_of(name), extras=Extras(**extras), profile="small")
-    )
+    found = small(as_given(name)) if not extras else compile_spec(spec_of(name), **extras, profile="small")
     program = replace(found.program, extras=replace(found.program.extras, real="float"))
     return replace(found, program=program), found
 
