@@ -6,7 +6,7 @@ sites; their stores hold whole expression graphs until `phigen.ir.passes.tempora
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -35,11 +35,13 @@ class LatticeLoops:
         storage = ir.Storage.VARIATION if sweep.is_tangent else ir.Storage.STATE
         arrays = (ir.Array(storage, k, self.program.coordinates[k]) for k in sweep.moved)
         stores = [ir.Store(array, e) for array, e in zip(arrays, sweep.kernel.roots, strict=True)]
-        coloured = self.step.sites.colours > 1
-        selection = ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window)
         role = ir.Role.TANGENT_SWEEP if sweep.is_tangent else ir.Role.SWEEP
         parameters = ("coef", "state", *["varied"] * sweep.is_tangent, "sites", *["colour"] * bool(self.step.by_colour))
-        return self._over_sites(sweep.kernel, role, parameters, stores, sweep.gather, selection)
+        return self._over_sites(sweep.kernel, role, parameters, stores, sweep.gather, self._selection(sweep))
+
+    def _selection(self, sweep: Sweep) -> ir.Selection:
+        coloured = self.step.sites.colours > 1
+        return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window)
 
     def stage(self, kernel: Kernel) -> ir.Function:
         """Return the function of a kernel of the equation of a stage, whose fields are those of y."""
@@ -74,17 +76,64 @@ class LatticeLoops:
         parameters = (source, "state", *["varied"] * varied, "sites", *["colour"] * colour)
         return ir.Function(kernel.name, kernel.purpose, ir.Role.GATHER, parameters, (*once, loop))
 
+    def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
+        """Return the transpose of a sweep, whose kernel is ``kernel``."""
+        fields = [self.program.coordinates[k] for k in sweep.moved]
+        stores = self._cotangents(kernel, sweep.gather.names if sweep.gather else (), fields)
+        role = ir.Role.TRANSPOSED_SWEEP
+        return self._over_sites(kernel, role, ("coef",), stores, sweep.gather, self._selection(sweep))
+
+    def transposed_stage(self, kernel: Kernel, gather: Gather | None) -> ir.Function:
+        """Return the transpose of a kernel of the equation of a stage, which reads sums over bonds or pairs or not."""
+        stores = self._cotangents(kernel, gather.names if gather else ())
+        return self._over_sites(kernel, ir.Role.TRANSPOSED_STAGE, ("coef",), stores, gather)
+
+    def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
+        """Return the transpose of the function that sums over bonds or pairs, by their transposed kernel."""
+        once, reads = self._reads(kernel, ())
+        source = "params" if "params" in kernel.inputs else "coef"
+        body = (*reads, *self._cotangents(kernel))
+        loop = ir.Loop("bonds" if self.step.others.graph else "pairs", body, end=ends.end, chosen=ends.chosen)
+        return ir.Function(kernel.name, kernel.purpose, ir.Role.TRANSPOSED_GATHER, (source,), (*once, loop))
+
+    def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
+        """Yield what a transposed kernel stores, zeros left out; ``fields`` are those that it recomputes."""
+        for output in kernel.outputs:
+            array = output.name.removesuffix("_bar")
+            for k, e in enumerate(output.values):
+                if not e.is_zero:
+                    name = kernel.inputs[array][k] if array in kernel.inputs else fields[k]
+                    yield self._cotangent(array, k, name, e, sums)
+
+    def _cotangent(self, array: str, k: int, name: str, value: Expression, sums: Sequence[str]) -> ir.Update:
+        storage, fields, key = ir.Storage.COTANGENT, self.program.coordinates, getattr(name, "key", ("",))
+        match array:
+            case "coef" | "params":
+                return ir.Reduce(array, k, name, value)
+            case "start":
+                number = fields.index(str(key[0]))
+                return ir.Store(ir.Array(ir.Storage.START_COTANGENT, number, str(key[0])), value)
+            case "gathered":
+                return ir.Store(ir.Array(ir.Storage.SUM_COTANGENT, [*sums].index(name)), value, adds=False)
+            case "bonds":
+                number = len(self.arrays) + self.step.sites.at_bonds.index(name)
+                return ir.Store(ir.Array(storage, number, name), value, end="bond")
+            case "site":
+                place = self._load(name, storage)
+                return ir.Store(place.array, value, offset=place.offset, end=place.end)
+        return ir.Store(ir.Array(ir.Storage.STATE, self.arrays.index(name), name), value, adds=False)
+
     def _over_sites(
         self,
         kernel: Kernel,
         role: ir.Role,
         parameters: tuple[str, ...],
-        updates: Sequence[ir.Statement],
+        updates: Iterable[ir.Statement],
         gather: Gather | None,
         selection: ir.Selection = ir.ALL_SITES,
     ) -> ir.Function:
         once, reads = self._reads(kernel, gather.names if gather else ())
-        gathered = (ir.GatherSums(tuple(k.name for k in gather.kernels)),) if gather else ()
+        gathered = (ir.GatherSums(tuple(k.name for k in gather.kernels), len(gather.names)),) if gather else ()
         body = (*gathered, *once, ir.Loop("sites", (*reads, *updates), selection=selection))
         return ir.Function(kernel.name, kernel.purpose, role, parameters, body)
 
@@ -120,6 +169,14 @@ class LatticeLoops:
                 return self._load(str(key[0]), ir.Storage.VARIATION)
             case symbols.INITIAL:
                 return ir.Load(ir.Array(ir.Storage.START, fields.index(str(key[0])), str(key[0])))
+            case symbols.AROUND:
+                offset = tuple(int(o) for o in key[1:])
+                return ir.Load(ir.Array(ir.Storage.SEED, int(key[0]), "change_bar"), offset)
+            case symbols.HERE | symbols.THERE as kind:
+                end = "a" if kind == symbols.HERE else "b"
+                return ir.Load(ir.Array(ir.Storage.SEED, int(key[0]), symbols.HERE), end=end)
+            case str() as kind if kind.endswith("_bar"):
+                return ir.Load(ir.Array(ir.Storage.SEED, int(key[0]), kind))
         if s == self.program.time:
             return ir.Time()
         if s in sites.at_bonds:

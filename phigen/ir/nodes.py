@@ -49,6 +49,10 @@ class Storage(Enum):
     OUTPUT = "out"
     OBSERVABLE = "observable"  # output for callers, without padding between rows
     SUM = "gathered"  # sums over bonds or pairs
+    COTANGENT = "bar"  # of the state, then of parameters at bonds
+    START_COTANGENT = "start_bar"
+    SUM_COTANGENT = "gathered_bar"
+    SEED = "seed"  # cotangents of what a kernel computes
 
 
 @dataclass(frozen=True)
@@ -79,7 +83,10 @@ class Constant:
 
 @dataclass(frozen=True)
 class Load:
-    """Element of an array at an offset from the site of the loop, or at the ``end``, a or b, of a bond or pair."""
+    """Element of an array at an offset from the site of the loop, or at the ``end``, a or b, of a bond or pair.
+
+    In transposed functions, arrays of cotangents are loaded and stored at the end "bond" too: at the bond itself.
+    """
 
     array: Array
     offset: tuple[int, ...] = ()
@@ -171,8 +178,29 @@ class Select:
 
 
 @dataclass(frozen=True)
+class Not:
+    """The opposite of a condition."""
+
+    condition: Value
+
+
+@dataclass(frozen=True)
+class Grouped:
+    """A value in parentheses."""
+
+    value: Value
+
+
+@dataclass(frozen=True)
 class Listed:
     """Values in the brackets of a list."""
+
+    values: tuple[Value, ...]
+
+
+@dataclass(frozen=True)
+class Several:
+    """Values with commas between them."""
 
     values: tuple[Value, ...]
 
@@ -188,7 +216,7 @@ class Called:
 
 Value = (
     Expression | Name | Constant | Load | Coefficient | SystemParameter | BondParameter | Time | Inside | HasColour
-    | OnSeam | Member | Entry | Binary | Select | Listed | Called
+    | OnSeam | Member | Entry | Binary | Select | Not | Grouped | Listed | Several | Called
 )  # fmt: skip
 
 
@@ -216,17 +244,27 @@ class Unpack:
 
 @dataclass(frozen=True)
 class Store:
-    """The element at the site becomes a value, or grows by it."""
+    """The element at the site of the loop becomes a value, or grows by it; so does one that `Load` reads otherwise."""
 
     array: Array
     value: Value
     adds: bool = True
+    offset: tuple[int, ...] = ()
+    end: str = ""
 
-    @property
-    def graph(self) -> Expression:
-        """The value, before it is lowered to memory."""
-        assert isinstance(self.value, Expression)
-        return self.value
+
+@dataclass(frozen=True)
+class Reduce:
+    """The cotangent of a value that is the same at all sites, a coefficient or a parameter, grows by a value."""
+
+    source: str  # coef or params
+    number: int
+    name: str
+    value: Value
+
+
+#: Statements whose values are graphs until temporaries are made.
+Update = Store | Reduce
 
 
 @dataclass(frozen=True)
@@ -234,6 +272,7 @@ class GatherSums:
     """The sums over bonds or pairs are computed for all sites by the functions of these names."""
 
     functions: tuple[str, ...]
+    count: int
 
 
 @dataclass(frozen=True)
@@ -311,7 +350,7 @@ class Return:
     value: Value | None = None
 
 
-Statement = Declare | Unpack | Store | GatherSums | Assign | Loop | If | Within | Continue | Call | Return
+Statement = Declare | Unpack | Store | Reduce | GatherSums | Assign | Loop | If | Within | Continue | Call | Return
 Block = tuple[Statement, ...]
 
 
@@ -327,6 +366,9 @@ class Role(Enum):
     STAGE = auto()  # a kernel of the equation of a stage
     OBSERVABLE = auto()
     GATHER = auto()  # sums over bonds or pairs
+    TRANSPOSED_SWEEP = auto()
+    TRANSPOSED_STAGE = auto()
+    TRANSPOSED_GATHER = auto()
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,7 @@ from dataclasses import replace
 from phigen.scheme.adjoint import completed, pulled_back
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.staging import TABLE, Coefficients
-from phigen.scheme.steps import Adjoint, Equation, Partners, Sweep
-
-#: What is called after a kernel that it is the transpose of.
-BACK = "_back"
+from phigen.scheme.steps import BACK, Adjoint, Equation, Partners, Sweep
 
 #: What kernels at sites read, of which cotangents are found.
 _READ = ("site", "start", "gathered", "bonds", "params")

@@ -14,11 +14,7 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.steps import Sites, Sweep, Sweeps
 from phigen.symbolic.expression import ZERO, Expression, gradient, substitute, symbol, symbols_of, topological, total
 from phigen.symbolic.functions import FUNCTIONS
-from phigen.symbolic.symbols import Symbol
-
-#: The input of a transpose that is cotangents of the change of neighbours, and the kind of its symbols: the number of
-#: the moved field, and the offset.
-AROUND = "change_bar_around"
+from phigen.symbolic.symbols import AROUND, Symbol
 
 #: What a value costs that is handed over, in additions: it is written, and read again by another loop.
 HANDING = 10

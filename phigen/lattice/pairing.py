@@ -12,11 +12,8 @@ from fractions import Fraction
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.symbolic.expression import ZERO, Expression, substitute, symbol
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.symbols import HERE, THERE, Symbol
 from phigen.symbolic.verdict import PROVED, decide_zero
-
-#: The inputs of a transpose that are cotangents of the sums of a site, and of those of the other one.
-HERE, THERE = "sums_bar", "sums_bar_there"
 
 _OTHER = {"a": "b", "b": "a"}
 

@@ -9,12 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from phigen.lattice.adjoint import BACK
 from phigen.lattice.collecting import collecting
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
-from phigen.scheme.steps import Sites, Sweep, Sweeps
+from phigen.scheme.steps import BACK, Sites, Sweep, Sweeps
 from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import PRESENT, Symbol
 

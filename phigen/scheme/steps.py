@@ -23,6 +23,10 @@ PLAUSIBLE = 1.5
 LONGEST_PATH, MOST_PIECES = 128, 512
 
 
+#: The end of the name of a kernel of lattices that is the transpose of another.
+BACK = "_back"
+
+
 @dataclass(frozen=True)
 class PathAdjoint:
     """The path traced back with cotangents (`phigen.scheme.adjoint`): their ``recurrences``, those of the ``used``

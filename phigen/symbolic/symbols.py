@@ -12,6 +12,9 @@ TEMPORARY, WORK, PART = "t", "w", "part"
 #: end, else 0; 1 at sites of the colour that a part of a graph belongs to, else 0; 1 where the site at an offset has a
 #: colour, and lies on the side of a seam that a sweep is for, else 0.
 GATHERED, PRESENT, CHOSEN, BEGINS = "gathered", "present", "chosen", "begins"
+#: Of transposed lattices: the cotangents of the changes of fields at a neighbour, by the number of the field and the
+#: offset; those of sums over bonds or pairs, at the site and at the other end.
+AROUND, HERE, THERE = "change_bar_around", "sums_bar", "sums_bar_there"
 
 
 class Symbol(str):

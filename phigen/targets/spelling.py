@@ -78,6 +78,12 @@ class Spelling:
                 return f"{self(left, own)} {spelt} {self(right, own + (operator != 'and'))}", own
             case ir.Select(condition, then, otherwise):
                 return self.dialect.select.format(self(condition), self(then), self(otherwise)), 0
+            case ir.Not(condition):
+                return f"{self.dialect.operators.get('not', '!')}{self(condition, _ATOM)}", _ATOM
+            case ir.Grouped(inner):
+                return f"({self(inner)})", _ATOM
+            case ir.Several(values):
+                return ", ".join(map(self, values)), 0
             case ir.Listed(values):
                 return f"[{', '.join(map(self, values))}]", _ATOM
             case ir.Called(name, arguments, instance):

@@ -34,6 +34,9 @@ def _lines(body: ir.Block, indent: str) -> Iterator[str]:
             case ir.If(condition, then):
                 yield f"{indent}if {_value(condition)}:"
                 yield from _lines(then, f"{indent}  ")
+            case ir.Within(context, inner):
+                yield f"{indent}with {_value(context)}:"
+                yield from _lines(inner, f"{indent}  ")
             case ir.Call(name, arguments, instance):
                 yield f"{indent}{_value(ir.Called(name, arguments, instance))}"
             case ir.Unpack(names, value):
@@ -76,6 +79,10 @@ def _value(value: Any) -> str:
             return f"({_value(left)} {operator} {_value(right)})"
         case ir.Select(condition, then, otherwise):
             return f"({_value(then)} if {_value(condition)} else {_value(otherwise)})"
+        case ir.Grouped(inner):
+            return f"({_value(inner)})"
+        case ir.Listed(values):
+            return f"[{', '.join(map(_value, values))}]"
         case ir.Called(name, arguments, instance):
             owner = f"{_value(instance)}." if instance else ""
             return f"{owner}{name}({', '.join(map(_value, arguments))})"

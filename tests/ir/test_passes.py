@@ -11,6 +11,7 @@ from phigen.ir.lattice import LatticeLoops
 from phigen.ir.passes.by_tables import by_tables
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
+from phigen.ir.passes.whole_arrays import WholeArrays, identical
 from phigen.scheme.steps import Sweeps
 from phigen.spec import loads
 from phigen.symbolic.expression import call, symbol
@@ -112,4 +113,41 @@ def test_bonds_are_two_lists_of_sites() -> None:
             real x[b] = x[j]
             real A = at:A[bond[k]]
             sums[i] += A*x[b]*(1 - r[b]/x[b])
+        """)  # fmt: skip
+
+
+def test_a_sweep_of_whole_arrays_returns_the_next_state() -> None:
+    loops = lattice("fput")
+    kick = next(s for s in loops.step.sweeps if s.moved == (1,))
+    expect(WholeArrays(loops).sweep(loops.sweep(kick)), """
+        sweep1(coef, x, sites)
+          real c:0 := coef[0]
+          real c:1 := coef[1]
+          real c:2 := coef[2]
+          real q = x[0]
+          real q[i+1] = sites.shifted(x[0], 1)
+          real q[i-1] = sites.shifted(x[0], -1)
+          real moved = x.copy()
+          moved[1] <- (x[1] + (KICK))
+          return moved
+        """.replace("KICK", str(kick.kernel.roots[0])))  # fmt: skip
+
+
+def test_sums_over_all_bonds_are_one_function_of_whole_arrays() -> None:
+    loops = lattice("food_web")
+    gather = next(s.gather for s in loops.step.sweeps if s.gather)
+    both = WholeArrays(loops).sums([loops.sums(ends) for ends in gather.ends])
+    *_, summed, end = text(both).splitlines()
+    assert summed == "    sums <- (sums + np.array([sites.summed(A*x[b]*(-1 + r[b]/x[b]), here)]))"
+    assert end == "  return sums"
+
+
+def test_sweeps_that_differ_in_their_colour_share_a_function() -> None:
+    one = ir.Function("one", "", ir.Role.SWEEP, ("x", "colour=0"), (ir.Return(ir.fixed("x")),))
+    other = ir.Function("other", "", ir.Role.SWEEP, ("x", "colour=1"), one.body)
+    first, second = identical([one, other])
+    assert first == one
+    expect(second, """
+        other(x)
+          return _one(x, colour=1)
         """)  # fmt: skip

@@ -15,12 +15,12 @@ def simultaneous(function: ir.Function) -> ir.Function:
         return function
 
     def change(body: ir.Block) -> Iterator[ir.Statement]:
-        stores = [s for s in body if isinstance(s, ir.Store)]
+        stores = [s for s in body if isinstance(s, ir.Update)]
         if len(stores) < 2:
             yield from body
             return
         names = [ir.fixed(f"change{k}") for k in range(len(stores))]
-        yield from (s for s in body if not isinstance(s, ir.Store))
+        yield from (s for s in body if not isinstance(s, ir.Update))
         yield from (ir.real(n.symbol, s.value) for n, s in zip(names, stores, strict=True))
         yield from (replace(s, value=n) for n, s in zip(names, stores, strict=True))
 

@@ -11,12 +11,13 @@ from dataclasses import replace
 from phigen.ir import nodes as ir
 from phigen.ir.walk import map_blocks, names_in, statements
 from phigen.scheme.lowering import assign, expand_powers
+from phigen.symbolic.expression import Expression
 
 
 def temporaries(function: ir.Function) -> ir.Function:
     """Return the function with named temporaries and without unread declarations."""
     function = map_blocks(function, _named)
-    read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Store)))
+    read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Update)))
 
     def without_unread(body: ir.Block) -> Iterator[ir.Statement]:
         kept = []
@@ -30,8 +31,8 @@ def temporaries(function: ir.Function) -> ir.Function:
 
 
 def _named(body: ir.Block) -> Iterator[ir.Statement]:
-    stores = [s for s in body if isinstance(s, ir.Store)]
-    assignments, trees = assign(expand_powers([s.graph for s in stores]))
-    yield from (s for s in body if not isinstance(s, ir.Store))
+    stores = [s for s in body if isinstance(s, ir.Update)]
+    assignments, trees = assign(expand_powers([s.value for s in stores if isinstance(s.value, Expression)]))
+    yield from (s for s in body if not isinstance(s, ir.Update))
     yield from (ir.real(a.target, a.value) for a in assignments)
     yield from (replace(s, value=tree) for s, tree in zip(stores, trees, strict=True))

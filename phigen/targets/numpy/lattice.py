@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 
+from phigen.ir import nodes as ir
+from phigen.ir.lattice import LatticeLoops
+from phigen.ir.passes.temporaries import temporaries
+from phigen.ir.passes.whole_arrays import WholeArrays, identical, transposed_sums_name
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import VARIED, Gather, Sweep, Sweeps
-from phigen.symbolic.symbols import BEGINS, CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
+from phigen.scheme.steps import BACK, Gather, Sweep, Sweeps
 from phigen.targets import lattice
-from phigen.targets.code import Code, lower
 from phigen.targets.header import facts
-from phigen.targets.names import Scope
-from phigen.targets.numpy import colours, functions, lattice_adjoint
-from phigen.targets.numpy.language import LANGUAGE, listed, quoted
+from phigen.targets.numpy import functions
+from phigen.targets.numpy.language import listed, quoted
+from phigen.targets.numpy.loops import function
 from phigen.targets.rendering import render
-from phigen.targets.reserved import PYTHON_RESERVED
-
-#: How functions are written: those of NumPy, and those that the file defines.
-_OWN = frozenset({"coef", "x", "sites", "parameters", "h", "kick", "np", *LANGUAGE.functions.values()})
-
 
 #: The templates of implicit steps.
 _SERIES = ("lattice_series", "lattice_guesses", "lattice_newton")
@@ -57,16 +54,7 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
         pieces += [render("numpy", f"lattice_adjoint{part}.py", values) for part in (f"_{kind}", "")]
     pieces += [render("numpy", "lattice_seen.py", values), prepare]
     pieces += functions.called(program)
-    pieces += _gathers(program, step)
-    pieces += colours.functions(step, (_sweep(program, step, sweep) for sweep in step.sweeps))
-    if step.equation:
-        pieces += [_at_middle(program, step, kernel) for kernel in step.equation.kernels]
-    else:
-        pieces.append(_table("PARTS", "The sweeps of each part of H.", step.parts))
-        if program.extras.tangent:
-            pieces.append(_table("TANGENTS", "Their derivatives.", step.tangents))
-    pieces += lattice_adjoint.functions(program, step, _body) if step.adjoint else []
-    pieces += [_seen(program, step, kernel) for kernel in program.observables.kernels]
+    pieces += _functions(LatticeLoops(program, step))
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
 
 
@@ -75,150 +63,57 @@ def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]]) -> str:
     return "\n".join([f"# {comment}", f"{name} = (", *listed, ")\n"])
 
 
-def _sweep(program: Program, step: Sweeps, sweep: Sweep) -> tuple[Sweep, str, str, list[str]]:
-    """One sweep as a function from a state to the next, or from a variation of the state to the next: its parts."""
-    kernel, code = sweep.kernel, lower(sweep.kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"v", "moved", "gathered", "colour", "window"})
-    own, given = ("v", "x, v") if sweep.is_tangent else ("x", "x")
-    lines = colours.early(sweep, own)
-    lines += [f"    gathered = _{_sums_of(sweep)}(coef, {given}, sites)"] if sweep.gather else []
-    names = sweep.gather.names if sweep.gather else ()
-    lines += [*_body(program, step, kernel, code, scope, names), f"    moved = {own}.copy()"]
-    show = LANGUAGE.printer(scope)
-    for store in code.stores:
-        place = f"[{sweep.moved[store.index]}]"
-        new = f"{own}{place} + ({show(store.value)})"
-        lines.append(f"    moved{place} = {colours.chosen(step, sweep, new, own + place)}")
-    return sweep, kernel.name, f"coef, {given}, sites", [*lines, "    return moved"]
+def _functions(loops: LatticeLoops) -> Iterator[str]:
+    """Yield the functions of all kernels, with what bonds or pairs add first."""
+    step, lowering = loops.step, WholeArrays(loops)
+
+    def summed(gather: Gather) -> ir.Function:
+        return lowering.sums([temporaries(loops.sums(ends)) for ends in gather.ends])
+
+    if step.partners and not step.others.graph:
+        yield render("numpy", "pairs.py", {})
+    gathers = [s.gather for s in step.sweeps if s.gather]
+    gathers += [g for g in (step.others.energy, step.others.field, step.others.varied) if g.names]
+    yield from (function(summed(gather)) for gather in gathers)
+    swept = [lowering.sweep(temporaries(loops.sweep(sweep))) for sweep in step.sweeps]
+    yield from map(function, identical(swept))
+    if step.equation:
+        stages = step.equation.kernels
+        yield from (function(lowering.stage(temporaries(loops.stage(kernel)))) for kernel in stages)
+    else:
+        yield _table("PARTS", "The sweeps of each part of H.", step.parts)
+        if loops.program.extras.tangent:
+            yield _table("TANGENTS", "Their derivatives.", step.tangents)
+    yield from _transposes(loops, lowering, {k.name: k for k in step.adjoint.steps}) if step.adjoint else ()
+    for kernel in loops.program.observables.kernels:
+        yield function(lowering.observable(temporaries(loops.observable(kernel))))
 
 
-def _sums_of(sweep: Sweep) -> str:
-    """The function that adds up what bonds or pairs do in a sweep."""
-    name = sweep.kernel.name
-    return f"gather_{name}" if sweep.is_tangent else name.replace("sweep", "gather")
+def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str, Kernel]) -> Iterator[str]:
+    """Yield the transposes of all sweeps, or of the kernels of an equation, and the list of those of each part."""
+    step = loops.step
 
+    def swept(sweep: Sweep) -> ir.Function:
+        kernel = kernels[sweep.kernel.name + BACK]
+        return lowering.transposed_sweep(temporaries(loops.transposed_sweep(sweep, kernel)), sweep.moved)
 
-def _at_middle(program: Program, step: Sweeps, kernel: Kernel) -> str:
-    """A kernel of the equation of a stage as a function of y, which is its x, and of x, where the stage starts."""
-    code = lower(kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"start", "gathered", "v"})
-    varied = ", v" if kernel.name in VARIED else ""
-    lines, gathers = [f"def _{kernel.name}(coef, start, x{varied}, sites):"], kernel.inputs["gathered"]
-    names: Sequence[str] = ()
-    if gathers and step.partners:
-        gather = step.partners.varied if varied else step.partners.field
-        names = gather.names
-        lines.append(f"    gathered = _{'slopes' if varied else 'forces'}(sites.parameters, x{varied}, sites)")
-    lines += _body(program, step, kernel, code, scope, names)
-    show = LANGUAGE.printer(scope)
-    values = ", ".join(f"np.broadcast_to({show(s.value)}, sites.sizes)" for s in code.stores)
-    return "\n".join([*lines, f"    return np.array([{values}])\n"])
+    def summed(gather: Gather) -> ir.Function:
+        listed = [loops.transposed_sums(ends, kernels[ends.kernel.name + BACK]) for ends in gather.ends]
+        return lowering.transposed_sums([*map(temporaries, listed)], transposed_sums_name(gather.kernels[0].name))
 
+    def staged(kernel: Kernel) -> ir.Function:
+        seed = next(array for array in kernel.inputs if array.endswith("_bar"))
+        gather = step.others.field if step.partners and kernel.inputs["gathered"] else None
+        return lowering.transposed_stage(temporaries(loops.transposed_stage(kernel, gather)), seed)
 
-def _seen(program: Program, step: Sweeps, kernel: Kernel) -> str:
-    """A kernel as a function that fills arrays over the sites."""
-    code = lower(kernel)
-    scope = Scope(PYTHON_RESERVED | _OWN | {"out", "gathered"})
-    lines, partners = [f"def _{kernel.name}(parameters, x, sites):"], step.partners
-    names: Sequence[str] = ()
-    if partners and partners.field.names and kernel.name == "vector_field":
-        lines.append("    gathered = _forces(parameters, x, sites)")
-        names = partners.field.names
-    lines += _body(program, step, kernel, code, scope, names)
-    lines.append(f"    out = np.empty(({len(code.stores)}, *sites.sizes))")
-    show = LANGUAGE.printer(scope)
-    lines += [f"    out[{s.index}] = {show(s.value)}" for s in code.stores]
-    if partners and partners.energy.names and kernel.name == "energy":
-        lines.append("    out += 0.5 * _energies(parameters, x, sites)")
-    return "\n".join([*lines, "    return out\n"])
-
-
-def _gathers(program: Program, step: Sweeps) -> Iterator[str]:
-    """What bonds or pairs add, as functions of the state."""
-    if step.partners:
-        if not step.partners.graph:
-            yield render("numpy", "pairs.py", {})
-        for sweep in step.sweeps:
-            if sweep.gather:
-                yield _gather(program, step, sweep.gather, _sums_of(sweep), "coef")
-        partners = {"energies": step.partners.energy, "forces": step.partners.field, "slopes": step.partners.varied}
-        for name, gather in partners.items():
-            if gather.names:
-                yield _gather(program, step, gather, name, "parameters")
-
-
-def _gather(program: Program, step: Sweeps, gather: Gather, name: str, first: str) -> str:
-    """Kernels of bonds or pairs, summed up at each site."""
-    varied = ", v" if name == "slopes" or "tangent" in name else ""
-    lines = [f"def _{name}({first}, x{varied}, sites):", "    sums = 0.0"]
-    lines += ['    with np.errstate(all="ignore"):']
-    for ends in gather.ends:
-        code = lower(ends.kernel)
-        scope = Scope(PYTHON_RESERVED | _OWN | {"v", "sums", "gathered", "here", "there", "bond"})
-        body = _body(program, step, ends.kernel, code, scope)
-        show = LANGUAGE.printer(scope)
-        if step.others.graph:
-            body = [f"    here, there, bond = sites.bonds({ends.end!r}, {ends.chosen!r})", *body]
-            added = [f"sites.summed({show(s.value)}, here)" for s in code.stores]
-        else:
-            added = [f"_over_others({show(s.value)}, sites)" for s in code.stores]
-        lines += [f"    {line}" for line in body]
-        lines.append(f"        sums = sums + np.array([{', '.join(added)}])")
-    return "\n".join([*lines, "    return sums\n"])
-
-
-def _body(
-    program: Program, step: Sweeps, kernel: Kernel, code: Code, scope: Scope, gathered: Sequence[str] = ()
-) -> list[str]:
-    """What is read, and the assignments."""
-    lines: list[str] = []
-    for array, symbols in kernel.inputs.items():
-        for i, s in enumerate(symbols):
-            if s not in code.used:
-                continue
-            if isinstance(s, Symbol) and s.kind == GATHERED:
-                scope.bind(s, f"gathered[{list(gathered).index(s)}]")
-            elif isinstance(s, Symbol) and s.kind == CHOSEN:
-                scope.bind(s, "sites.chosen()")
-            elif isinstance(s, Symbol) and s.kind == BEGINS:
-                scope.bind(s, f"sites.begins(window, {', '.join(map(str, s.key))})")
-            elif isinstance(s, Symbol) and s.kind == INITIAL:
-                scope.bind(s, f"start[{program.coordinates.index(str(s.key[0]))}]")
-            elif isinstance(s, Symbol) and s.kind == VARIATION:
-                lines.append(f"    {scope[s]} = {_read(program, step, str(s.key[0]), 'v')}")
-            elif isinstance(s, Symbol) and s.kind == INCREMENT:
-                lines.append(f"    {scope[s]} = {_read(program, step, s)}")
-            elif isinstance(s, Symbol) and s.kind.endswith("_bar"):
-                scope.bind(s, f"{s.kind}[{s.key[0]}]")
-            elif isinstance(s, Symbol):
-                bounds = ", ".join(map(str, s.key))
-                scope.bind(s, f"coef[{i}]" if s.kind == COEFFICIENT else f"sites.present({bounds})")
-            elif array == "bonds":
-                lines.append(f'    {scope[s]} = sites.parameters["{s}"][bond]')
-            elif array == "t":
-                scope.bind(s, "sites.t")
-            elif array == "params":
-                lines.append(f'    {scope[s]} = parameters["{s}"]')
-            else:
-                lines.append(f"    {scope[s]} = {_read(program, step, s)}")
-    show = LANGUAGE.printer(scope)
-    return lines + [f"    {scope[a.target]} = {show(a.value)}" for a in code.assignments]
-
-
-def _read(program: Program, step: Sweeps, name: str, array: str = "x") -> str:
-    fields: Sequence[str] = program.coordinates
-    if name in step.sites.ends:
-        base, end = step.sites.ends[name]
-        text = f"{array}[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
-        if step.others.graph:
-            return f"{text}[{'here' if end == 'a' else 'there'}]"
-        return f"{text}[:, None]" if end == "a" else text
-    base, offset = step.sites.places[name]
-    if base in step.sites.increments:
-        return _shifted(f"sites.dw[{step.sites.increments.index(base)}]", offset)
-    text = f"{array}[{fields.index(base)}]" if base in fields else f'sites.parameters["{base}"]'
-    return _shifted(text, offset)
-
-
-def _shifted(text: str, offset: Sequence[int]) -> str:
-    return f"sites.shifted({text}, {', '.join(map(str, offset))})" if any(offset) else text
+    sweeps = [sweep for part in step.parts for sweep in part]
+    yield from map(function, identical([*map(swept, sweeps)]))
+    yield from (function(summed(sweep.gather)) for sweep in sweeps if sweep.gather)
+    if step.equation:
+        if step.others.field.names:
+            yield function(summed(step.others.field))
+        stages = (step.equation.relax, step.equation.advance)
+        yield from (function(staged(kernels[kernel.name + BACK])) for kernel in stages)
+    else:
+        listed = ["    (" + ", ".join(f"_{sweep.kernel.name}{BACK}" for sweep in part) + ",)," for part in step.parts]
+        yield "\n".join(["# Their transposes.", "PARTS_BACK = (", *listed, ")\n"])

@@ -13,14 +13,12 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from phigen.lanes.lowering import Rows
-from phigen.lattice.adjoint import BACK
-from phigen.lattice.collecting import AROUND
 from phigen.lattice.undoing import apart, can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Adjoint, Ends, Gather, Sweep, Sweeps
+from phigen.scheme.steps import BACK, Adjoint, Ends, Gather, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from phigen.lattice.collecting import AROUND
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import UNDONE
-from phigen.symbolic.symbols import COEFFICIENT, Symbol
+from phigen.symbolic.symbols import AROUND, COEFFICIENT, Symbol
 from phigen.targets.c.lattice.layout import Layout, givers
 from phigen.targets.c.lattice.loops import Loop
 from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, beside, told

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir.lattice import begins, weights
-from phigen.lattice.adjoint import BACK
-from phigen.lattice.collecting import AROUND
 from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
-from phigen.scheme.steps import VARIED, Gather, Partners, Sweep, Sweeps
+from phigen.scheme.steps import BACK, VARIED, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets import lattice
 
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.

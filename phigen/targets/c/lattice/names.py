@@ -6,11 +6,21 @@ from collections.abc import Mapping, Sequence, Set
 from types import MappingProxyType
 
 from phigen.ir.lattice import begins, bounds
-from phigen.lattice.collecting import AROUND
-from phigen.lattice.pairing import HERE, THERE
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.symbolic.symbols import BEGINS, CHOSEN, COEFFICIENT, GATHERED, INCREMENT, INITIAL, VARIATION, Symbol
+from phigen.symbolic.symbols import (
+    AROUND,
+    BEGINS,
+    CHOSEN,
+    COEFFICIENT,
+    GATHERED,
+    HERE,
+    INCREMENT,
+    INITIAL,
+    THERE,
+    VARIATION,
+    Symbol,
+)
 from phigen.targets.c.kernels import members, printer
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.code import Code

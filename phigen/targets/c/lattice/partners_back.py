@@ -10,11 +10,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 
-from phigen.lattice.pairing import HERE, THERE, paired
+from phigen.lattice.pairing import paired
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends
 from phigen.symbolic.expression import ZERO
+from phigen.symbolic.symbols import HERE, THERE
 from phigen.targets.c.lattice.layout import Layout
 from phigen.targets.c.lattice.loops import Loop, in_loops
 from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, told

@@ -1,0 +1,305 @@
+"""Lowering to whole arrays: a statement works on all sites, all bonds or all pairs at once, without loops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.lattice import LatticeLoops
+from phigen.ir.nodes import Role, Storage
+from phigen.symbolic.symbols import HERE
+
+X, V, SITES, NP, BAR, COLOUR, BOND, SUMS, MOVED, OUT, AXIS = (
+    ir.fixed(n) for n in ("x", "v", "sites", "np", "bar", "colour", "bond", "sums", "moved", "out", ":, None")
+)
+#: The arrays of each kind of storage.
+_ARRAYS = {Storage.STATE: "x", Storage.VARIATION: "v", Storage.START: "start", Storage.SUM: "gathered"}
+_ARRAYS |= {Storage.COTANGENT: "bar", Storage.START_COTANGENT: "start_bar"}
+
+#: Values that are printed where they are used.
+_IN_PLACE = ir.Coefficient | ir.Time | ir.Inside | ir.HasColour | ir.OnSeam
+_READ_IN_PLACE = (Storage.START, Storage.SUM, Storage.SEED)
+
+#: The parameters of transposed functions beside those that they read.
+_TRANSPOSED = ("bar", "sites", "coef_bar", "own")
+
+
+def sums_name(kernel: str) -> str:
+    """Return the name of the function that sums over all bonds or pairs, by the kernel of one of their ends."""
+    base = kernel.removesuffix("_a").removesuffix("_b")
+    return {"energy": "energies"}.get(own := base.removeprefix("bond_").removeprefix("pair_"), own)
+
+
+def transposed_sums_name(kernel: str) -> str:
+    """Return the name of its transpose, by the same kernel."""
+    return kernel.removesuffix("_a").removesuffix("_b") + "_back"
+
+
+@dataclass(frozen=True)
+class WholeArrays:
+    """The lowering of the functions of one lattice, whose values have names already."""
+
+    lattice: LatticeLoops
+
+    def sweep(self, function: ir.Function) -> ir.Function:
+        """Return a sweep as a function from a state to the next, or from its variation to the next."""
+        loop, own = _loop(function), V if function.role is Role.TANGENT_SWEEP else X
+        body = [*_unless_beside(loop, own), *self._sums(function), *self._reads(function), *_copied(MOVED, own)]
+        for s in _stores(loop):
+            old = ir.Entry(own, ir.Constant(s.array.number))
+            new = _chosen(loop.selection, ir.Binary("+", old, ir.Grouped(s.value)), old)
+            body.append(ir.Assign(ir.Entry(MOVED, ir.Constant(s.array.number)), new))
+        varied = ("v",) if own is V else ()
+        parameters = ("coef", "x", *varied, "sites", *_argument(loop.selection))
+        return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
+
+    def stage(self, function: ir.Function) -> ir.Function:
+        """Return a kernel of the equation of a stage as a function of y, called x, and of x, called start."""
+        shape = ir.Member(SITES, "sizes")
+        values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in _stores(_loop(function)))
+        result = ir.Return(ir.Called("array", (ir.Listed(tuple(values)),), NP))
+        varied = ("v",) if "varied" in function.parameters else ()
+        parameters = ("coef", "start", "x", *varied, "sites")
+        return replace(function, parameters=parameters, body=(*self._sums(function), *self._reads(function), result))
+
+    def observable(self, function: ir.Function) -> ir.Function:
+        """Return a density, an energy or the vector field as a function of the state."""
+        values, added = _split([*_stores(_loop(function))])
+        sums = () if added else self._sums(function)
+        empty = ir.Called("empty", (ir.fixed(f"({len(values)}, *sites.sizes)"),), NP)
+        body = [*sums, *self._reads(function), ir.real(OUT.symbol, empty)]
+        body += [ir.Assign(ir.Entry(OUT, ir.Constant(s.array.number)), s.value) for s in values]
+        body += [ir.Assign(OUT, s.value, adds=True) for s in added]
+        return replace(function, parameters=("parameters", "x", "sites"), body=(*body, ir.Return(OUT)))
+
+    def sums(self, functions: Sequence[ir.Function]) -> ir.Function:
+        """Return one function that sums over the bonds or pairs that several functions loop over."""
+        body: list[ir.Statement] = []
+        for function in functions:
+            loop = _loop(function)
+            added = (self._summed(s.value) for s in _stores(loop))
+            total = ir.Binary("+", SUMS, ir.Called("array", (ir.Listed(tuple(added)),), NP))
+            body += [*self._bonds(loop), *self._reads(function), ir.Assign(SUMS, total)]
+        quiet = ir.Within(ir.Called("errstate", (ir.fixed('all="ignore"'),), NP), tuple(body))
+        varied = ("v",) if "varied" in functions[0].parameters else ()
+        parameters = (_source(functions[0]), "x", *varied, "sites")
+        statements = (ir.real(SUMS.symbol, ir.Constant(0.0)), quiet, ir.Return(SUMS))
+        return replace(functions[0], name=sums_name(functions[0].name), parameters=parameters, body=statements)
+
+    # ---- transposes
+
+    def transposed_sweep(self, function: ir.Function, moved: Sequence[int]) -> ir.Function:
+        """Return a function from the cotangent after a sweep to that before it, at the state before it."""
+        loop = _loop(function)
+        seeds = (_chosen(loop.selection, ir.Entry(BAR, ir.Constant(k)), ir.Constant(0.0)) for k in moved)
+        body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar").symbol, ir.Listed(tuple(seeds)))]
+        body += [*self._sums(function), *self._reads(function), *_copied(BAR, BAR)]
+        body += self._added_cotangents(loop)
+        body += self._transposed_sums(function, ir.fixed("coef"))
+        parameters = ("coef", "x", *_TRANSPOSED, *_argument(loop.selection))
+        return replace(function, parameters=parameters, body=(*body, ir.Return(BAR)))
+
+    def transposed_stage(self, function: ir.Function, seed: str) -> ir.Function:
+        """Return a function from a cotangent to those of y, called x, and of the start of a stage."""
+        zeros, both = ir.Called("zeros_like", (X,), NP), (BAR, ir.fixed("start_bar"))
+        body = [
+            *self._sums(function),
+            *self._reads(function),
+            ir.Unpack(("bar", "start_bar"), ir.Several((zeros, zeros))),
+        ]
+        body += self._added_cotangents(_loop(function))
+        body += self._transposed_sums(function, ir.Member(SITES, "parameters"))
+        parameters = ("coef", "start", "x", seed, "sites", "coef_bar", "own")
+        return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
+
+    def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
+        """Return the function that adds the cotangents of what bonds or pairs have read, from those of their sums."""
+        end = "here" if self.lattice.step.others.graph else AXIS.symbol.key[0]  # type: ignore[attr-defined]
+        body: list[ir.Statement] = []
+        for function in functions:
+            loop = _loop(function)
+            seeds = ir.real(ir.fixed(HERE).symbol, ir.fixed(f"[g[{end}] for g in gathered_bar]"))
+            body += [*self._bonds(loop), seeds, *self._reads(function), *self._added_cotangents(loop)]
+        parameters = (_source(functions[0]), "x", "gathered_bar", *_TRANSPOSED)
+        return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
+
+    def _transposed_sums(self, function: ir.Function, source: ir.Value) -> Iterator[ir.Statement]:
+        """Yield the call that takes the cotangents of sums over bonds or pairs to what these have read."""
+        for s in function.body:
+            if isinstance(s, ir.GatherSums):
+                stores = [c for c in _stores(_loop(function)) if c.array.storage is Storage.SUM_COTANGENT]
+                values = {c.array.number: c.value for c in stores}
+                listed = (ir.Called("filled", (values.get(k, ir.Constant(0.0)),), SITES) for k in range(s.count))
+                rest = (BAR, SITES, ir.fixed("coef_bar"), ir.fixed("own"))
+                called = f"_{transposed_sums_name(s.functions[0])}"
+                yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
+
+    def _added_cotangents(self, loop: ir.Loop) -> Iterator[ir.Statement]:
+        """Yield the statements that add cotangents where their values were read."""
+        for s in loop.body:
+            match s:
+                case ir.Reduce(source, number, name, value):
+                    into = ir.Entry(ir.fixed("coef_bar"), ir.Constant(number))
+                    into = into if source == "coef" else ir.Entry(ir.fixed("own"), ir.Constant(name))
+                    yield ir.Assign(into, ir.Called("sum", (), self._everywhere(loop, value)), adds=True)
+                case ir.Store(array, value, end="bond"):
+                    place = ir.Entry(ir.fixed("own"), ir.Constant(array.name))
+                    yield ir.Call("add.at", (place, BOND, value), NP)
+                case ir.Store(array, value) if array.storage in (Storage.COTANGENT, Storage.START_COTANGENT):
+                    into = ir.Entry(ir.fixed(_ARRAYS[array.storage]), ir.Constant(array.number))
+                    if array.number >= self.lattice.program.dimension:
+                        into = ir.Entry(ir.fixed("own"), ir.Constant(array.name))
+                    yield ir.Assign(into, self._returned(loop, s, value), adds=True)
+
+    def _returned(self, loop: ir.Loop, s: ir.Store, value: ir.Value) -> ir.Value:
+        """Return a cotangent at the sites that the value was read from."""
+        if s.end and loop.kind == "bonds":
+            return ir.Called("summed", (value, ir.fixed("here" if s.end == "a" else "there")), SITES)
+        if s.end:
+            axis = ir.fixed(f"axis={1 if s.end == 'a' else 0}")
+            return ir.Called("sum", (axis,), self._everywhere(loop, value))
+        if any(s.offset):
+            return ir.Called("returned", (value, *map(ir.Constant, s.offset)), SITES)
+        return value
+
+    def _everywhere(self, loop: ir.Loop, value: ir.Value) -> ir.Value:
+        """Return a value at all sites, bonds or pairs, where it may be the same at all of them."""
+        match loop.kind:
+            case "bonds":
+                return ir.Called("broadcast_to", (value, ir.Member(ir.fixed("here"), "shape")), NP)
+            case "pairs":
+                return ir.Called("_apart", (value, SITES))
+        return ir.Called("filled", (value,), SITES)
+
+    # ---- what is read
+
+    def _sums(self, function: ir.Function) -> Iterator[ir.Statement]:
+        """Yield the statement that computes the sums over bonds or pairs that a function reads."""
+        for s in function.body:
+            if isinstance(s, ir.GatherSums):
+                yield ir.real(ir.fixed("gathered").symbol, self._sums_value(function, s))
+
+    def _sums_value(self, function: ir.Function, s: ir.GatherSums) -> ir.Value:
+        varied = (V,) if "varied" in function.parameters else ()
+        source: ir.Value = ir.fixed("parameters" if function.role is Role.OBSERVABLE else "coef")
+        if function.role in (Role.STAGE, Role.TRANSPOSED_STAGE):
+            source = ir.Member(SITES, "parameters")
+        return ir.Called(f"_{sums_name(s.functions[0])}", (source, X, *varied, SITES))
+
+    def _bonds(self, loop: ir.Loop) -> Iterator[ir.Statement]:
+        if loop.kind == "bonds":
+            which = (ir.fixed(repr(loop.end)), ir.fixed(repr(loop.chosen)))
+            yield ir.Unpack(("here", "there", "bond"), ir.Called("bonds", which, SITES))
+
+    def _summed(self, value: ir.Value) -> ir.Value:
+        if self.lattice.step.others.graph:
+            return ir.Called("summed", (value, ir.fixed("here")), SITES)
+        return ir.Called("_over_others", (value, SITES))
+
+    def _reads(self, function: ir.Function) -> Iterator[ir.Statement]:
+        """Yield the declarations of a function, those in its loop last."""
+        for s in (*function.body, *_loop(function).body):
+            match s:
+                case ir.Declare(items=((name, value),)):
+                    load = isinstance(value, ir.Load) and value.array.storage in _READ_IN_PLACE
+                    yield replace(
+                        s, items=((name, self._value(function, value)),), in_place=load or isinstance(value, _IN_PLACE)
+                    )
+
+    def _value(self, function: ir.Function, value: ir.Value) -> ir.Value:
+        match value:
+            case ir.Coefficient(k):
+                return ir.Entry(ir.fixed("coef"), ir.Constant(k))
+            case ir.SystemParameter(name):
+                return ir.Entry(ir.fixed("parameters"), ir.Constant(name))
+            case ir.Time():
+                return ir.Member(SITES, "t")
+            case ir.BondParameter(_, name):
+                return ir.Entry(ir.Entry(ir.Member(SITES, "parameters"), ir.Constant(name)), BOND)
+            case ir.Inside(_, bounds):
+                return ir.Called("present", tuple(ir.Constant(k) for pair in bounds for k in pair), SITES)
+            case ir.HasColour():
+                return ir.Called("chosen", (), SITES)
+            case ir.OnSeam(_, colour, offset):
+                return ir.Called("begins", (ir.fixed("window"), *map(ir.Constant, (colour, *offset))), SITES)
+            case ir.Load(array, offset, end):
+                if function.role is Role.OBSERVABLE and array.storage is Storage.SUM and function.name == "energy":
+                    return next(self._sums_value(function, s) for s in function.body if isinstance(s, ir.GatherSums))
+                return self._load(array, offset, end)
+        return value
+
+    def _load(self, array: ir.Array, offset: Sequence[int], end: str) -> ir.Value:
+        """Return an array at the sites that are read."""
+        fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
+        storage, number = ir.fixed(_ARRAYS.get(array.storage, array.name)), ir.Constant(array.number)
+        whole: ir.Value = ir.Entry(storage, number)
+        if array.storage is Storage.STATE and array.name in increments:
+            whole = ir.Entry(ir.Member(SITES, "dw"), ir.Constant(increments.index(array.name)))
+        elif array.storage is Storage.STATE and array.name not in fields:
+            whole = ir.Entry(ir.Member(SITES, "parameters"), ir.Constant(array.name))
+        if end and self.lattice.step.others.graph and array.storage is not Storage.SEED:
+            return ir.Entry(whole, ir.fixed("here" if end == "a" else "there"))
+        if end == "a" and array.storage is not Storage.SEED:
+            return ir.Entry(whole, AXIS)
+        return ir.Called("shifted", (whole, *map(ir.Constant, offset)), SITES) if any(offset) else whole
+
+
+def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
+    """Yield the functions; one that differs from an earlier one in its colour or window only calls that one."""
+    first: dict[ir.Block, ir.Function] = {}
+    for function in functions:
+        known = first.setdefault(function.body, function)
+        if known is function:
+            yield function
+        else:
+            plain = tuple(p for p in function.parameters if "=" not in p)
+            called = ir.Called(f"_{known.name}", tuple(map(ir.fixed, function.parameters)))
+            yield replace(function, parameters=plain, body=(ir.Return(called),))
+
+
+def _loop(function: ir.Function) -> ir.Loop:
+    loop = function.body[-1]
+    assert isinstance(loop, ir.Loop)
+    return loop
+
+
+def _stores(loop: ir.Loop) -> Iterator[ir.Store]:
+    return (s for s in loop.body if isinstance(s, ir.Store))
+
+
+def _split(stores: Sequence[ir.Store]) -> tuple[list[ir.Store], list[ir.Store]]:
+    """Return the stores that assign, and those that add."""
+    return [s for s in stores if not s.adds], [s for s in stores if s.adds]
+
+
+def _source(function: ir.Function) -> str:
+    return "coef" if "coef" in function.parameters else "parameters"
+
+
+def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
+    yield ir.real(name.symbol, ir.Called("copy", (), value))
+
+
+def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statement that leaves out a sweep on boundary seams where colours fit the sizes."""
+    if loop.selection.window is not None:
+        beside = ir.Called("any", (), ir.Member(SITES, "beside"))
+        yield ir.If(ir.Not(beside), (ir.Return(unchanged),))
+
+
+def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:
+    """Return the new value at the sites of a selection, the old one elsewhere."""
+    if selection.window is not None:
+        return ir.Select(ir.Member(SITES, "beside"), new, old)
+    colour = ir.Constant(None) if selection.colour is None else COLOUR
+    if selection.inside:
+        return ir.Called("inside", (colour, new, old), SITES)
+    return new if selection.colour is None else ir.Called("coloured", (COLOUR, new, old), SITES)
+
+
+def _argument(selection: ir.Selection) -> tuple[str, ...]:
+    """Return the parameter that says at which sites a sweep updates, with its default."""
+    if selection.window is not None:
+        return (f"window={selection.window}",)
+    return () if selection.colour is None else (f"colour={selection.colour}",)
