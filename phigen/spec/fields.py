@@ -264,6 +264,11 @@ RUN = Record(
     elsewhere=_BESIDE_RUNS,
 )
 
+#: What a sweep keeps; which observables there are is known later.
+KEPT_WORD = Name(
+    r"\w+|\w+ *\( *\w+ *\)", "what is kept", "one of " + ", ".join(KEPT) + ", or M, mean(M), std(M) of an observable M"
+)
+
 AXIS = Record(
     "a range",
     (
@@ -283,7 +288,7 @@ SWEEP = Record(
             "values of parameters, initial coordinates, step, start: a grid; random: N and seed, or file: members.csv",
             required=True,
         ),
-        Field("keep", ListOf(Choice(KEPT), least=1), "what is stored of each member"),
+        Field("keep", ListOf(KEPT_WORD, least=1), "what is stored of each member; also observables M, mean(M), std(M)"),
         Field("frames", Integer(1, limits.STEPS, limit=True), "also the states of every so many steps"),
         Field("description", PROSE, "what the sweep shows"),
     ),

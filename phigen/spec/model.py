@@ -7,14 +7,14 @@ symbol ``momentum(NAME)``. Decimals are exact rationals.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, TypedDict, Unpack
 
 from phigen.errors import Diagnostic, Location
 from phigen.registry import DEFAULT
-from phigen.spec.names import LEFT_OUT
+from phigen.spec.names import LEFT_OUT, STATISTICS
 from phigen.symbolic.expression import ZERO, Expression
 
 #: The order of a method that nobody asked an order of.
@@ -264,10 +264,27 @@ class Axis:
 
 
 @dataclass(frozen=True)
+class Statistic:
+    """What a sweep keeps of an observable: ``mean`` or ``std`` over the run, or, for "", its value at the end."""
+
+    observable: str
+    of: str = ""
+
+    @classmethod
+    def read(cls, word: str, observables: Iterable[str]) -> Statistic | None:
+        """Return what ``M``, ``mean(M)`` or ``std(M)`` asks for; None if that is nothing."""
+        function, opened, rest = word.partition("(")
+        name = rest.removesuffix(")").strip() if opened else function
+        known = name in observables and (not opened or (function in STATISTICS and rest.endswith(")")))
+        return cls(name, function if opened else "") if known else None
+
+
+@dataclass(frozen=True)
 class Sweep:
     """A run for many values: a grid of axes, or so many ``random`` members, or those in a ``file``.
 
-    ``keep`` (`phigen.spec.names.KEPT`) says what is stored of each, and ``frames`` that every so many steps is.
+    ``keep`` (`phigen.spec.names.KEPT`, and statistics of observables) says what is stored of each, and ``frames`` that
+    every so many steps is.
     """
 
     name: str

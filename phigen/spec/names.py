@@ -107,6 +107,8 @@ DIRECTIONS = ("rising", "falling", "both")
 #: What a sweep may vary besides parameters and initial values, and what it may keep.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
+#: What a sweep may keep of an observable M: M at the end, and mean(M) and std(M) over the run.
+STATISTICS = ("mean", "std")
 
 #: How attitudes are given.
 RECONSTRUCTIONS = ("quaternion", "matrix")

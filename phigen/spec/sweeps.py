@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from math import prod
 from typing import Any
 
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations
-from phigen.spec.model import Axis, Run, Sweep
-from phigen.spec.names import SWEEP_NAMES
-from phigen.spec.problems import did_you_mean, shown
+from phigen.spec.model import Axis, Run, Statistic, Sweep
+from phigen.spec.names import KEPT, SWEEP_NAMES
+from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
@@ -19,7 +19,13 @@ _WORDS = ("random", "seed", "file")
 
 
 def sweep(
-    name: str, raw: Mapping[str, Any], runs: Mapping[str, Run], declared: Declarations, *, monitored: bool
+    name: str,
+    raw: Mapping[str, Any],
+    runs: Mapping[str, Run],
+    declared: Declarations,
+    observables: Collection[str] = (),
+    *,
+    monitored: bool,
 ) -> Sweep:
     """The sweep of that name. After errors, which are reported, some of its values are stand-ins."""
     place = ("sweeps", name)
@@ -41,7 +47,7 @@ def sweep(
         random=_integer((*place, "over", "random"), words, limits.SWEPT, declared),
         seed=_integer((*place, "over", "seed"), words, 2**63 - 1, declared),
         file=words.get("file", ""),
-        keep=without_repetition(raw.get("keep", ("final",)), (*place, "keep"), declared),
+        keep=_kept(raw.get("keep"), place, declared, observables),
         frames=raw.get("frames", 0),
         description=raw.get("description", ""),
     )
@@ -50,6 +56,22 @@ def sweep(
     if run in runs and (end := end_of_its_own(found, runs[run], monitored=monitored)):
         _fail((*place, "run") if raw.get("run") else place, end, declared, "give it steps: in place of that")
     return found
+
+
+def _kept(
+    nodes: Sequence[Scalar | None] | None, place: tuple[Any, ...], declared: Declarations, observables: Collection[str]
+) -> tuple[str, ...]:
+    """Return ``keep``: words of `KEPT`, and statistics of observables."""
+    words: list[str | None] = []
+    for node in nodes or ():
+        word = node.text.replace(" ", "") if node is not None else None
+        if node is not None and word not in KEPT and Statistic.read(str(word), observables) is None:
+            known = [*KEPT, *observables]
+            hint = did_you_mean(node.text, known) or one_of([*known, *(f"mean({name})" for name in observables)])
+            declared.reader.error(node, f"keep: {shown(node.text)} is not known", hint)
+            word = None
+        words.append(word)
+    return without_repetition(words, (*place, "keep"), declared) if nodes is not None else ("final",)
 
 
 def end_of_its_own(found: Sweep, run: Run, *, monitored: bool) -> str:

@@ -106,7 +106,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,
         "sweeps": {
-            n: sweep(n, s, runs, declared, monitored="monitor" in raw)
+            n: sweep(n, s, runs, declared, raw.get("observables") or {}, monitored="monitor" in raw)
             for n, (_, s) in raw.get("sweeps", {}).items()
             if s is not None
         },

@@ -19,7 +19,7 @@ from phigen.api import _spec_of
 from phigen.geometry.system import System
 from phigen.runtime import arguments
 from phigen.spec import limits
-from phigen.spec.model import Axis, Run, Spec, Sweep
+from phigen.spec.model import Axis, Run, Spec, Statistic, Sweep
 from phigen.spec.names import KEPT, SWEEP_NAMES
 from phigen.spec.runs import with_step
 from phigen.spec.sweeps import end_of_its_own
@@ -163,9 +163,10 @@ def _sweep_of(
     found = replace(found, **given)
     if end := end_of_its_own(found, run, monitored=spec.monitor is not None):
         raise ValueError(f"{end}; give it steps in place of that")
-    strange = [what for what in found.keep if what not in KEPT]
+    strange = [what for what in found.keep if what not in KEPT and Statistic.read(what, spec.observables) is None]
     if strange:
-        raise ValueError(f"cannot keep {strange[0]!r}; there are {', '.join(KEPT)}")
+        known = ", ".join([*KEPT, *spec.observables, *(f"mean({n}), std({n})" for n in spec.observables)])
+        raise ValueError(f"cannot keep {strange[0]!r}; there are {known}")
     if "crossings" in found.keep and run.section is None:
         raise ValueError(f"crossings: the run {run.name} has no section")
     if "energy_error" in found.keep and spec.time:

@@ -21,10 +21,8 @@ from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.members import Members
 from phigen.runtime.solver import Solver
 from phigen.sweeping import lattices
+from phigen.sweeping.statistics import MOST_BYTES, statistics_of
 from phigen.sweeping.store import Job, open_job
-
-#: Bytes of states that are held to count crossings.
-_MOST_BYTES = 64 * 2**20
 
 #: Members with which nothing was done: their numbers are refused.
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
@@ -113,6 +111,9 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
         found["crossings"] = _spread(_crossings(job, solver, asked), allowed, count)
     if "lyapunov" in plan.keep:
         found["lyapunov"] = _spread(_lyapunov(solver, asked, failures), allowed, count)
+    if statistics := plan.statistics(solver.interface.observables):
+        kept = statistics_of(job, solver, asked, states, statistics)
+        found |= {word: _spread(values, allowed, count) for word, values in kept.items()}
     for name, values in found.items():
         if name not in ("status", "final", "frames"):
             values[status != 0] = np.nan
@@ -139,7 +140,7 @@ def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str
 def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
     """How often the section is crossed in the direction of the run, as seen at the steps."""
     section, time, signs = job.section()
-    room = max(1, _MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
+    room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
     found = np.zeros(len(members))
     for first in range(0, len(members), room):
         part = slice(first, first + room)

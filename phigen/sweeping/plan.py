@@ -7,7 +7,7 @@ whose numbers follow one another.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from math import ceil, prod
 from typing import Any
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from phigen.spec.model import Axis
+from phigen.spec.model import Axis, Statistic
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +47,7 @@ class Plan:
     listed: tuple[str, ...] = ()
     keep: tuple[str, ...] = ("final",)
     frames: int = 0
+    after: float | None = None  # the time from which means of observables are taken
     chunk: tuple[int, ...] = ()
     sizes: tuple[int, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)  # target, version: what else decides the result
@@ -85,6 +86,11 @@ class Plan:
     def rows(self) -> tuple[int, ...]:
         """The numbers of the steps that are stored as frames."""
         return tuple(range(0, self.steps + 1, self.frames)) if self.frames else ()
+
+    def statistics(self, observables: Collection[str]) -> dict[str, Statistic]:
+        """Return what is kept of observables, by the words for it."""
+        read = {word: Statistic.read(word, observables) for word in self.keep}
+        return {word: statistic for word, statistic in read.items() if statistic is not None}
 
     @property
     def bytes_of_member(self) -> int:

@@ -75,7 +75,7 @@ def made(
         tangent="lyapunov" in sweep.keep,
     )
     listed = _listed(sweep, spec) if sweep.file else {}
-    _expect_names([*(axis.name for axis in sweep.over), *listed], spec)
+    _expect_names([*(axis.name for axis in sweep.over), *listed], spec, sweep)
     target = chosen_target(setting.target)
     plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
     beside = _beside(compilation, target, spec)
@@ -100,10 +100,10 @@ def made(
     return Outcome(int(counts[0]), int(counts[1]), plan.size, dict(zip(plan.dims, plan.shape, strict=True)))
 
 
-def _expect_names(varied: Iterable[str], spec: Spec) -> None:
+def _expect_names(varied: Iterable[str], spec: Spec, sweep: Sweep) -> None:
     """`SpecError` for a name under which the store has something else."""
     for name in varied:
-        if name in (*store.OWN, *KEPT):
+        if name in (*store.OWN, *KEPT, *sweep.keep):
             message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
             raise SpecError([Diagnostic(message, hint="another name for it in the spec")])
 
@@ -134,6 +134,7 @@ def _plan(spec: Spec, sweep: Sweep, run: Run, columns: Mapping[str, int], target
         listed=tuple(columns),
         keep=sweep.keep,
         frames=sweep.frames,
+        after=None if run.average.after is None else float(run.average.after),
         sizes=lattices.begun(spec, run, 0).sizes if spec.lattice else (),
         about={"sweep": sweep.name, "run": run.name, "target": target, "phigen": __version__, **_files(spec, run)},
     )
@@ -195,7 +196,8 @@ def _seconds_of_a_member(job: store.Job) -> float:
     except BackendError:
         return _SECONDS / 4096  # nothing is known
     seconds = (time.process_time() - began) / len(x0) * (plan.steps / steps) + 1e-7
-    return seconds * (1 + ("crossings" in plan.keep)) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
+    counted = ("crossings" in plan.keep) + any("(" in word for word in plan.keep)
+    return seconds * (1 + counted) + ("lyapunov" in plan.keep) * _TANGENT * plan.steps
 
 
 def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:

@@ -1,0 +1,84 @@
+"""Observables of the members of a sweep: their values at the end, and means and standard deviations over the run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from phigen.runtime.interface import BackendError, Floats
+from phigen.runtime.members import Members
+from phigen.runtime.solver import Solver
+from phigen.spec.model import Statistic
+from phigen.sweeping.store import Job
+
+#: Bytes of states of members that are held at a time where every step of a run counts.
+MOST_BYTES = 64 * 2**20
+
+
+def statistics_of(
+    job: Job, solver: Solver, members: Members, states: Floats, statistics: Mapping[str, Statistic]
+) -> dict[str, Floats]:
+    """Return the statistics by their words, (members,) each.
+
+    ``states`` (rows, members, DIM) are the frames of the sweep, or the final states alone. Means and standard
+    deviations are over the frames, of a sweep without frames over the start and all steps; rows before ``plan.after``
+    do not count.
+    """
+    names = list(solver.interface.observables)
+    values: dict[str, Floats] = {}
+    if any(not s.of for s in statistics.values()):
+        last = _values(job, solver, members, states[-1:], np.array([members.steps]))[0]
+        values |= {word: last[:, names.index(s.observable)] for word, s in statistics.items() if not s.of}
+    over_run = {word: s for word, s in statistics.items() if s.of}
+    if over_run:
+        mean, deviation = np.full((2, len(members), len(names)), np.nan)
+        for part, some, rows, numbers in _pieces(job, solver, members, states):
+            mean[part], deviation[part] = _moments(job, solver, some, rows, numbers)
+        results = {"mean": mean, "std": deviation}
+        values |= {word: results[s.of][:, names.index(s.observable)] for word, s in over_run.items()}
+    return values
+
+
+def _values(job: Job, solver: Solver, members: Members, states: Floats, numbers: Floats) -> Floats:
+    """Return the observables (rows, members, observables) of states after so many steps each."""
+    when: tuple[Any, ...] = ()
+    if solver.interface.time:
+        when = (members.t0 + numbers[:, np.newaxis] * members.h,)
+    return np.asarray(job.module.observables(states, *when, **members.parameters), dtype=np.float64)
+
+
+def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> tuple[Floats, Floats]:
+    """Return means and standard deviations (members, observables) over rows, NaN where none counts."""
+    values = _values(job, solver, members, rows, numbers)
+    after = job.plan.after
+    if after is not None:
+        t = members.t0 + numbers[:, np.newaxis] * members.h
+        early = np.sign(members.h) * (t - after) < 0
+        values = np.where(early[..., np.newaxis], np.nan, values)
+    counted = np.isfinite(values).sum(axis=0)
+    with np.errstate(all="ignore"):
+        mean = np.nansum(values, axis=0) / counted
+        deviation = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / (counted - 1))
+    return mean, deviation
+
+
+def _pieces(
+    job: Job, solver: Solver, members: Members, states: Floats
+) -> Iterator[tuple[slice, Members, Floats, Floats]]:
+    """Yield members with the states that count of each, and the numbers of their steps, as many as memory holds."""
+    if job.plan.frames:
+        numbers = np.array(job.plan.rows, dtype=np.float64)
+        yield slice(None), members, states[: len(numbers)], numbers
+        return
+    room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
+    for first in range(0, len(members), room):
+        part = slice(first, first + room)
+        some = replace(members.part(part), stride=1)
+        try:
+            rows = solver.backend.ensemble(some, 1)
+        except BackendError as error:
+            rows = error.states
+        yield part, some, rows, np.arange(len(rows), dtype=np.float64)

@@ -1,0 +1,53 @@
+"""Observables that sweeps keep."""
+
+import numpy as np
+import pytest
+
+import phigen
+import phigen.spec
+
+DRIVEN = """\
+phigen: 1
+name: driven
+time: t
+coordinates: [q, p]
+parameters: {A: 0.5, omega: 2}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q) - A*q*cos(omega*t)
+observables: {kinetic: p**2/2 + A*t/100, inside: "if(abs(q) < 1, 1, 0)"}
+order: 2
+runs: {swing: {initial: [0.9, 0.3], step: 0.1, steps: 60, start: 0.5}}
+sweeps:
+  map: {run: swing, over: {A: [0.1, 0.4, 0.8], q: [0.2, 0.9]}, keep: [kinetic, mean(kinetic), "std( inside )"]}
+"""
+
+
+@pytest.mark.slow  # each starts a cluster of workers
+@pytest.mark.parametrize("frames", [0, 7])
+@pytest.mark.parametrize("after", [None, 2.5])
+def test_statistics_are_those_of_single_runs(frames, after):
+    text = DRIVEN if after is None else DRIVEN.replace("start: 0.5", f"start: 0.5, average: {{after: {after}}}")
+    spec = phigen.spec.loads(text)
+    assert spec.sweeps["map"].keep == ("kinetic", "mean(kinetic)", "std(inside)")
+    data = phigen.sweep(spec, frames=frames, workers=1)
+    solver = phigen.compile(spec)
+    for i, a in enumerate([0.1, 0.4, 0.8]):
+        for j, q in enumerate([0.2, 0.9]):
+            trajectory = solver.integrate([q, 0.3], 0.1, 60, t0=0.5, A=a)
+            rows = np.arange(0, 61, frames or 1)
+            rows = rows if after is None else rows[trajectory.t[rows] >= after - 1e-12]
+            kinetic, inside = (trajectory.observables[n] for n in ("kinetic", "inside"))
+            assert data["kinetic"][i, j] == pytest.approx(kinetic[-1], rel=1e-12)
+            assert data["mean(kinetic)"][i, j] == pytest.approx(kinetic[rows].mean(), rel=1e-11)
+            assert data["std(inside)"][i, j] == pytest.approx(inside[rows].std(ddof=1), rel=1e-11)
+
+
+def test_what_is_no_observable_is_told():
+    with pytest.raises(phigen.SpecError, match=r"keep: 'mean\(kinetik\)' is not known"):
+        phigen.spec.loads(DRIVEN.replace("mean(kinetic)", "mean(kinetik)"))
+    with pytest.raises(phigen.SpecError, match=r"keep: 'median\(kinetic\)' is not known"):
+        phigen.spec.loads(DRIVEN.replace("mean(kinetic)", "median(kinetic)"))
+    with pytest.raises(
+        ValueError, match=r"cannot keep 'mean\(q\)'; there are final, .*, kinetic, inside, mean\(kinetic\)"
+    ):
+        phigen.sweep(phigen.spec.loads(DRIVEN), keep=["mean(q)"])
