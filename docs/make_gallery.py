@@ -59,8 +59,9 @@ LATTICES = """
 ## Lattices
 
 Systems of many like sites, of any size ([lattices.md](lattices.md)): one run of each, its fields over space and time,
-or at some times, and what it conserved. Errors of energy are relative to the magnitudes of the energies of all sites,
-those of Casimirs at sites are at the worst site.
+or at some times, and what it conserved. Errors of energy and invariants are relative to the value
+at the start or, where that is nearly 0, to the magnitudes of its terms at all sites; those of Casimirs at sites are
+at the worst site.
 """
 
 

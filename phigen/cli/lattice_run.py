@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from phigen.lattice.states import Start
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.spec.model import Run, Spec
+    from phigen.study.conservation import Unit
     from phigen.study.lyapunov import Spectrum
 
 #: Options of ``phigen run`` that lattices do not have.
@@ -46,7 +47,8 @@ def run_lattice(
     ``lyapunov`` asks for the largest Lyapunov exponent besides, in a second pass with a tangent vector.
     """
     from phigen.api import chosen_target, compilation_of, lattice_solver_of
-    from phigen.lattice.observing import errors_of
+    from phigen.cli.energy_warning import energy_warning
+    from phigen.lattice.observing import BALANCE, ENERGY, errors_of, units_of
     from phigen.lattice.states import start_of
 
     if output and output.suffix != ".npz":
@@ -66,7 +68,7 @@ def run_lattice(
     spectrum = None
     if lyapunov and not failure:
         spectrum = exponents_of(console, spec, run, solver, start, start.arguments | parameters)
-    errors = errors_of(compilation.cell, made)
+    errors, units = errors_of(compilation.cell, made), units_of(compilation.cell, made)
     largest = {name: float(e.max()) for name, e in errors.items()}
     threads = solver.backend.threads(prod(start.sizes))
     if as_json:
@@ -78,10 +80,14 @@ def run_lattice(
     else:
         target = f"target {solver.target}, {counted(threads, 'thread')}"
         told_method = compilation.told(f"{compilation.method}, {target}")
-        _print(spec, run, start, told_method, made, largest)
+        _print(spec, run, start, told_method, made, largest, units)
         if spectrum:
             changed_by = f"the second half changed it by {spectrum.uncertainty:.1g}"
             out(f"\n  largest Lyapunov exponent after t = {spectrum.t:.9g}: {spectrum.largest:.4g}; {changed_by}")
+    energy = largest.get(ENERGY, largest.get(BALANCE, 0.0))
+    warning = energy_warning(spec, energy, units["energy"], made.h, solver.order)
+    if warning and not failure:
+        console.warn(warning)
     if plot:
         _draw(spec, run, made, errors, spectrum, plot)
         console.note(f"wrote {plot}")
@@ -164,18 +170,27 @@ def parameters_of(spec: Spec, start: Start, settings: Iterable[str]) -> dict[str
     return parameters
 
 
-def _print(spec: Spec, run: Run, start: Start, method: str, made: Any, errors: dict[str, float]) -> None:
-    out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
+def _print(
+    spec: Spec,
+    run: Run,
+    start: Start,
+    method: str,
+    made: Any,
+    errors: Mapping[str, float],
+    units: Mapping[str, Unit],
+) -> None:
     from phigen.lattice.observing import BALANCE, CHANGE, ENERGY
+    from phigen.study.conservation import stated
 
+    out(heading(f"{spec.name}, run {run.name}") + (f": {run.description}" if run.description else ""))
     sizes = " × ".join(map(str, start.sizes))
     out(f"  {sizes} sites; {made.steps} steps of {made.h:.9g}, t = {made.t[0]:.9g} … {made.t[-1]:.9g}; {method}\n")
-    kinds = dict.fromkeys((ENERGY, BALANCE, CHANGE), "relative to the energies of the sites") | dict.fromkeys(
-        spec.casimirs, "at the worst site"
-    )
-    rows = [["largest error", "", ""]]
-    rows += [[name, f"{error:.1e}" if error else "0", kinds.get(name, "relative")] for name, error in errors.items()]
+    kinds = dict.fromkeys(spec.casimirs, "at the worst site") | {name: unit.kind for name, unit in units.items()}
+    kinds |= dict.fromkeys((ENERGY, BALANCE, CHANGE), units["energy"].kind)
+    rows = [["largest change" if CHANGE in errors else "largest error", "", ""]]
+    rows += [[name, f"{error:.1e}" if error else "0", kinds[name]] for name, error in errors.items()]
     for line in table(rows, right=[1]):
         out(f"  {line}")
+    out(f"  {stated(units)}")
     if BALANCE in errors:
         out("  The energy balance is H − ∫ dH/dt dt, integrated over all steps by a rule of order 8.")

@@ -110,6 +110,7 @@ def command(
     """
     from phigen.api import compilation_of
     from phigen.cli.endings import ended, timed
+    from phigen.cli.energy_warning import summary_warning
     from phigen.cli.past import extended, past_of, started_from
     from phigen.cli.recording import Files, Recorder, compared, opened_recorder, record
 
@@ -156,10 +157,13 @@ def command(
     for method in experiment.run.compare if comparable else ():
         watch, drawn[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
+    warning = summary_warning(spec, summaries[0], recorder.experiment.h, solver.order)
     if as_json:
         out_json(finite(described_run(compilation, recorder, summaries)))
     else:
         print_summary(compilation, recorder, summaries)
+    if warning and not failure:
+        console.warn(warning)
     if plot:
         _draw(plot, recorder, drawn, compilation.system.casimirs, summaries[0])
         console.note(f"wrote {plot}")

@@ -61,9 +61,9 @@ def told_steps(recorder: Recorder) -> str:
 def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     first = summaries[0]
     driven = first.is_balance
-    rows = [["largest error", *(s.method for s in summaries), ""]]
     noisy = first.energy.unit.moves and not driven
-    energy = "energy balance" if driven else "change of the energy" if noisy else "energy"
+    rows = [["largest change" if noisy else "largest error", *(s.method for s in summaries), ""]]
+    energy = "energy balance" if driven else "energy"
     rows.append([energy, *(_shown(s.energy) for s in summaries), first.energy.unit.kind])
     if driven:
         rows.append(["  the integral, work done", *(f"{s.work:.4g}" for s in summaries), ""])
@@ -73,7 +73,7 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
         rows.append(["  last tenth/first", *growth, "1 is no drift"])
     for kind, noun in (("casimirs", "Casimir"), ("invariants", "invariant")):
         for name, drift in getattr(first, kind).items():
-            label = f"change of the {noun} {name}" if drift.unit.moves else f"{noun} {name}"
+            label = f"change of the {noun} {name}" if drift.unit.moves and not noisy else f"{noun} {name}"
             rows.append([label, *(_shown(getattr(s, kind)[name]) for s in summaries), drift.unit.kind])
     if first.exact:
         rows.append(["against closed form", *(_shown(s.exact) for s in summaries if s.exact), "relative"])

@@ -63,6 +63,7 @@ def command(
 
     A store that is there already is gone on with: what it lacks is made. xarray opens it (xarray.open_zarr).
     """
+    from phigen.cli.energy_warning import sweep_warning
     from phigen.progress import stage
     from phigen.sweeping.sweep import Setting, made
 
@@ -96,6 +97,9 @@ def command(
     else:
         failed = f", of which {outcome.failed} failed (see status)" if outcome.failed else ""
         click.echo(f"{setting.output}: {outcome.size} members ({sizes}), {outcome.members} made now{failed}")
+    energy, h = outcome.energy, float(spec.runs[sweep.run].step)
+    if warning := sweep_warning(energy.count, outcome.size, energy.largest, h, outcome.order):
+        console.warn(warning)
     if plot:
         from phigen.drawing.sweep_map import draw
 

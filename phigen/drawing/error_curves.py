@@ -61,9 +61,8 @@ def draw_errors(
 ) -> None:
     """One panel for the energy and each Casimir, one curve for each method; the first method lies on top.
 
-    Errors are in the ``units``; without them relative to the value at the start, unless that is 0, and what time or
-    forces change is said to be a change. ``balance``
-    says that the energy is its balance.
+    Errors are in the ``units``; without them relative to the value at the start, unless that is 0. A quantity that
+    time, forces or noise change has no error: its values are drawn. ``balance`` says that the energy is its balance.
     """
     first = next(iter(methods.values()))
     panels = [ENERGY, *first.casimirs]
@@ -76,18 +75,30 @@ def draw_errors(
         unit = (units or {}).get(name) or unit_of(float(next(iter(values.values()))[0]), 0.0)
         if units is None:
             unit = replace(unit, moves=name in first.moving)
-        curves = {
-            label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))
-            for label, column in values.items()
-        }
-        _draw_panel(axes, curves)
-        what = ("energy balance" if balance else "energy") if index == 1 else f"Casimir {name}"
-        axes.set_title(f"{unit.adjective} {unit.noun}{' of the' if columns < 3 else ':'} {what}")
+        balanced = balance and index == 1
+        what = "energy balance" if balanced else "energy" if index == 1 else f"Casimir {name}"
+        if unit.moves and not balanced:
+            _draw_values(axes, {label: (methods[label].t, column) for label, column in values.items()})
+            axes.set_title(what)
+        else:
+            curves = {
+                label: windowed_maxima(methods[label].t, unit.errors(column, float(column[0])))
+                for label, column in values.items()
+            }
+            _draw_panel(axes, curves)
+            axes.set_title(f"{unit.adjective} error{' of the' if columns < 3 else ':'} {what}")
         if index > len(panels) - columns:
             axes.set_xlabel("t")
     if len(methods) > 1:
         handles, labels = shared.get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside upper center", ncols=len(methods))
+
+
+def _draw_values(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:
+    axes.grid(True)
+    for place, (label, (t, values)) in enumerate(curves.items()):
+        style: dict[str, Any] = {"color": SERIES[place % len(SERIES)], "zorder": 3 - 0.1 * place}
+        axes.plot(t, values, linestyle=LINES[place % len(LINES)], linewidth=1.0, label=label, **style)
 
 
 def _draw_panel(axes: Any, curves: Mapping[str, tuple[Floats, Floats]]) -> None:

@@ -164,6 +164,6 @@ def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]
         axes.plot(run.t, np.where(error > 0, error, np.nan), color=colour, label=name, linewidth=1.0)
     axes.set_yscale("log")
     axes.set_xlabel("t")
-    axes.set_ylabel("error")
+    axes.set_ylabel("error or change" if any(name.startswith("change") for name in errors) else "error")
     axes.grid(True)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.2, ncols=4)

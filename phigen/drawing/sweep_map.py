@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Set
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,21 +27,28 @@ def draw(store: Path, path: Path, shown: str | None = None) -> None:
     """Draw a variable of a store into a file. Raises `FileError` where there is none of that name."""
     import xarray
 
+    from phigen.sweeping.store import open_job
+
     with xarray.open_zarr(str(store), decode_cf=False) as data:
-        known = [
-            name for name in _FIRST if name in data and not (name == "final" and data[name].dims[-1] != "coordinate")
-        ]
-        chosen = shown or next(iter(known), "")
+        known = [name for name in _FIRST if name in data]
+        if not known:
+            hint = f"keep one of {', '.join(_FIRST)} in the sweep"
+            raise FileError(f"{store} has nothing that can be drawn over the members\n  hint: {hint}")
+        chosen = shown or known[0]
         if chosen not in known:
-            raise FileError(f"there is no {chosen!r} to draw; there are {', '.join(known) or 'none'}")
-        save(_figure(data, chosen), path)
+            raise FileError(f"{store} has no {chosen!r} to draw; it has {', '.join(known)}")
+        logarithmic = {axis.name for axis in open_job(str(store)).plan.axes if axis.scale == "log"}
+        save(_figure(data, chosen, logarithmic), path)
 
 
 @styled
-def _figure(data: Any, name: str) -> Figure:
+def _figure(data: Any, name: str, logarithmic: Set[str]) -> Figure:
     from matplotlib.figure import Figure
 
     values = data[name]
+    sites = values.dims[values.dims.index("coordinate") + 1 :] if "coordinate" in values.dims else ()
+    if sites:  # the fields of lattices: their means over the sites
+        values = values.mean(dim=sites)
     panels = [values]
     if "coordinate" in values.dims:
         panels = [values.isel(coordinate=k) for k in range(min(values.sizes["coordinate"], _PANELS))]
@@ -50,27 +58,42 @@ def _figure(data: Any, name: str) -> Figure:
         if panel.dims == ("member",):
             _scatter(figure, axes, data, panel)
         else:
-            _over_grid(figure, axes, panel)
-        axes.set_title(title if title == name else f"{name}: {title}")
+            _over_grid(figure, axes, panel, logarithmic)
+        if axes.get_xlabel() in logarithmic:
+            axes.set_xscale("log")
+        if axes.get_ylabel() in logarithmic:
+            axes.set_yscale("log")
+        shown = title if title == name else f"{name}: {title}"
+        axes.set_title(f"{shown}, mean over the sites" if sites else shown)
     return figure
 
 
-def _over_grid(figure: Any, axes: Any, panel: Any) -> None:
+def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str]) -> None:
     """Over one dimension a curve, over two a map; over further ones, draws first, the median is taken."""
     dims = [d for d in panel.dims if d != "seed"] or [*panel.dims]
     more = [d for d in panel.dims if d not in dims[:2]]
     panel = panel.median(dim=more, skipna=True) if more else panel
     if len(dims) == 1:
         axes.plot(panel[dims[0]], panel, color=SERIES[0], linewidth=1.2)
-        axes.set(xlabel=dims[0])
+        axes.set(xlabel=dims[0], yscale="log" if _is_wide(_positive(panel)) else "linear")
         axes.grid(True)
         return
     y, x = dims[:2]
-    image = axes.pcolormesh(
-        panel[x], panel[y], panel.transpose(y, x), shading="nearest", rasterized=True, **_colours(panel)
-    )
+    edges = [_edges(np.asarray(panel[d], dtype=float), logarithmic=d in logarithmic) for d in (x, y)]
+    image = axes.pcolormesh(*edges, panel.transpose(y, x), rasterized=True, **_colours(panel))
     axes.set(xlabel=x, ylabel=y)
     figure.colorbar(image, ax=axes)
+
+
+def _edges(values: Any, *, logarithmic: bool) -> Any:
+    """The edges of the cells around values: half-way between them, on a logarithmic axis by their logarithms."""
+    places = np.log(values) if logarithmic else values
+    if len(places) == 1:
+        edges = places[0] + np.array([-0.5, 0.5])
+    else:
+        middles = (places[1:] + places[:-1]) / 2
+        edges = np.concatenate([[2 * places[0] - middles[0]], middles, [2 * places[-1] - middles[-1]]])
+    return np.exp(edges) if logarithmic else edges
 
 
 def _scatter(figure: Any, axes: Any, data: Any, panel: Any) -> None:
@@ -89,7 +112,16 @@ def _colours(panel: Any) -> dict[str, Any]:
     """The scale: logarithmic where values are positive and far apart. What is no number is left out."""
     from matplotlib.colors import LogNorm
 
+    good = _positive(panel)
+    return {"cmap": "viridis"} | ({"norm": LogNorm(good.min(), good.max())} if _is_wide(good) else {})
+
+
+def _positive(panel: Any) -> Any:
+    """The values other than 0, if all are positive; else none."""
     values = np.asarray(panel)
     good = values[np.isfinite(values) & (values != 0)]
-    wide = good.size > 0 and good.min() > 0 and good.max() > _WIDE * good.min()
-    return {"cmap": "viridis"} | ({"norm": LogNorm(good.min(), good.max())} if wide else {})
+    return good if good.size and good.min() > 0 else good[:0]
+
+
+def _is_wide(positive: Any) -> bool:
+    return bool(positive.size and positive.max() > _WIDE * positive.min())

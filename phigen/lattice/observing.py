@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from phigen.lattice.cell import Cell
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeTrajectory
+from phigen.study.conservation import SITES, Unit, unit_of
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
@@ -23,30 +25,38 @@ MOST_BALANCED = 20_000_000
 
 
 def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
-    """How far energy, Casimirs and invariants are from their initial values, by name, each (frames,).
+    """The distances of energy, Casimirs and invariants from their initial values, by name, each (frames,).
 
-    Energy and invariants relative to their size at the start, or to the sum of the magnitudes of their terms where they
-    are small; Casimirs of sites by the site where they changed most. Where H depends on the time, or forces act, the
-    energy is less the work that was done, in runs that are not too long.
+    Energy and invariants are in the units of `units_of`; Casimirs of sites are those of the site where they changed
+    most. Where H depends on the time, or forces act, the energy is less the work that was done, in runs that are not
+    too long.
     """
-    found = _of_energy(cell, run) | run.casimir_changes()
+    errors = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
         times = [{t: time} for time in run.t.tolist() for t in cell.times] or [{}] * len(run)
         sums = np.array([summed(cell, density, x, {**run.parameters, **t}) for x, t in zip(run.x, times, strict=True)])
-        found[name] = _relative(sums[:, 0], float(sums[0, 1]))
-    return found
+        errors[name] = _relative(sums[:, 0], unit_of(float(sums[0, 0]), float(sums[0, 1]), SITES))
+    return errors
+
+
+def units_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Unit]:
+    """The units of the errors of the energy and the invariants, by name."""
+    values = {**run.parameters, **{t: float(run.t[0]) for t in cell.times}}
+    invariants = {name: summed(cell, density, run.x[0], values) for name, density in cell.invariants.items()}
+    units = {name: unit_of(value, terms, SITES) for name, (value, terms) in invariants.items()}
+    return {"energy": replace(run.energy_unit, moves=cell.driven), **units}
 
 
 def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     if not cell.driven:
-        return {ENERGY: _relative(run.energy, run.energy_scale)}
+        return {ENERGY: _relative(run.energy, run.energy_unit)}
     if not cell.noise and run.steps * run.x[0, 0].size <= MOST_BALANCED:
         try:
             work, _ = works(cell, run)
-            return {BALANCE: _relative(run.energy - work, run.energy_scale)}
+            return {BALANCE: _relative(run.energy - work, run.energy_unit)}
         except StepError:
             pass
-    return {CHANGE: _relative(run.energy, run.energy_scale)}
+    return {CHANGE: _relative(run.energy, run.energy_unit)}
 
 
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
@@ -65,8 +75,8 @@ def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
     return made[np.rint((run.t - begin) / run.h).astype(int)], off
 
 
-def _relative(values: Floats, scale: float) -> Floats:
-    return np.asarray(np.abs(values - values[0]) / (scale or 1.0))
+def _relative(values: Floats, unit: Unit) -> Floats:
+    return unit.errors(values, float(values[0]))
 
 
 def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, Any]) -> tuple[float, float]:

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from phigen.spec.model import Spec
+    from phigen.study.conservation import Unit
 
 
 class LatticeSession(Protocol):
@@ -189,14 +190,22 @@ class LatticeTrajectory:
 
         What time, forces or noise did to the energy is in it. Of Casimirs of sites it is the site at the worst.
         """
-        found = {"energy": np.abs(self.energy - self.energy[0]) / (self.energy_scale or 1.0)}
+        found = {"energy": np.abs(self.energy - self.energy[0]) / self.energy_scale}
         return found | self.casimir_changes()
 
     @property
     def energy_scale(self) -> float:
-        """The sum of the magnitudes of the energies of all sites at the start: the unit of errors of energy."""
+        """The unit of errors of energy: |H| at the start or, where that is nearly 0, Σ |energy of a site|."""
+        return self.energy_unit.size
+
+    @property
+    def energy_unit(self) -> Unit:
+        """The unit of errors of energy, with the reason for it."""
+        from phigen.study.conservation import SITES, unit_of
+
         when = float(self.t[0]) if self.solver.interface.time else None
-        return float(np.abs(self.solver.density(self.x[0], when, parameters=self.parameters)).sum())
+        sites = np.abs(self.solver.density(self.x[0], when, parameters=self.parameters)).sum()
+        return unit_of(float(self.energy[0]), float(sites), SITES)
 
     @property
     def casimirs(self) -> dict[str, Floats]:

@@ -1,9 +1,9 @@
-"""What errors of energy, Casimirs and invariants are counted in: the same wherever they are measured, printed, drawn.
+"""Units of errors of energy, Casimirs and invariants: the same wherever errors are measured, printed or drawn.
 
 Errors are relative to the value at the start. Where that is much less than the terms it is the sum of, it says where
-the zero of energies lies and not how large energies are; errors are then relative to Σ |x_i ∂_i H| at the start: what
-a relative change of the coordinates changes H by, whatever constant is added to it. Where that is 0 too they are
-absolute.
+the zero of energies lies and not how large energies are; errors are then relative to these terms. For a system they are
+Σ |x_i ∂_i H| at the start: what a relative change of the coordinates changes H by, whatever constant is added to it.
+For a lattice they are the magnitudes of the energies of the sites. Where they are 0 too, errors are absolute.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ from phigen.symbolic.expression import Expression, gradient
 
 #: A value below this part of its terms counts as zero.
 SMALL = 1e-3
+
+#: Energy error, in its unit, above which users are warned: a tenth of the energy is no small perturbation of it.
+LARGE_ENERGY_ERROR = 0.1
 
 RELATIVE, TERMS, SITES, ABSOLUTE = "relative", "of its terms", "of its sites", "absolute"
 
@@ -45,11 +48,6 @@ class Unit:
     kind: str = ABSOLUTE
     terms: float = 1.0
     moves: bool = False
-
-    @property
-    def noun(self) -> str:
-        """``error`` or ``change``."""
-        return "change" if self.moves else "error"
 
     @property
     def adjective(self) -> str:
@@ -82,11 +80,11 @@ def moving(system: System) -> list[str]:
     return [ENERGY, *system.pushed] if system.driven else []
 
 
-def unit_of(value: float, terms: float) -> Unit:
-    """The unit of a quantity with that value at the start and that sum of terms."""
+def unit_of(value: float, terms: float, kind: str = TERMS) -> Unit:
+    """The unit of a quantity with that value at the start and that sum of terms, which are of the ``kind``."""
     if abs(value) > SMALL * terms and math.isfinite(value):
         return Unit(abs(value), RELATIVE, max(1.0, terms / abs(value)))
-    return Unit(terms, TERMS) if 0 < terms < math.inf else Unit()
+    return Unit(terms, kind) if 0 < terms < math.inf else Unit()
 
 
 def value_and_terms(
@@ -105,16 +103,18 @@ def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapp
 
 
 def stated(found: Mapping[str, Unit]) -> str:
-    """What errors are relative to, in a sentence; ``found`` are units by the names of quantities."""
-    if found and all(unit.kind == SITES for unit in found.values()):
-        return "Errors are relative to the sum of the magnitudes of the energies of the sites at the start."
-    said = ["relative to the value at the start"]
+    """The sentence that says what errors are relative to; ``found`` are units by the names of quantities."""
+    errors = "Errors and changes" if any(unit.moves for unit in found.values()) else "Errors"
+    relative = any(unit.kind == RELATIVE for unit in found.values())
+    said = [f"{errors} are relative to the value at the start"] if relative else []
     for kind, how in (
-        (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| there, since {0} is nearly 0"),
-        (ABSOLUTE, "absolute, since {0} is 0 there"),
+        (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| at the start, since {0} is nearly 0 there"),
+        (SITES, "relative to Σ |{0} of a site| at the start, since {0} is nearly 0 there"),
+        (ABSOLUTE, "absolute, since {0} is 0 at the start"),
     ):
-        said += [f"of {name} {how.format(_letter(name))}" for name, unit in found.items() if unit.kind == kind]
-    return f"Errors are {'; '.join(said)}."
+        for name in (name for name, unit in found.items() if unit.kind == kind):
+            said.append(f"{'those' if said else errors} of {name} are {how.format(_letter(name))}")
+    return f"{'; '.join(said)}."
 
 
 def _letter(name: str) -> str:

@@ -21,13 +21,13 @@ from phigen.geometry.checks import COMMUTING
 from phigen.lattice.acting import noise_statements
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.expansion import Expansion, expand, ring
-from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MOST_BALANCED, errors_of, works
+from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MOST_BALANCED, errors_of, units_of, works
 from phigen.lattice.series import SeriesPlan
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.scheme.steps import Sweeps
 from phigen.study import lattice_noise, single_precision
-from phigen.study.conservation import rounding
+from phigen.study.conservation import rounding, stated
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification
 from phigen.symbolic.arrays import Floats, evaluate
 
@@ -41,11 +41,8 @@ IDENTITY, DIFFERENCES = 1e-12, 1e-9
 SOME = (32, 6, 4)
 #: Paths of single sites that are followed, with ``quick`` and without.
 FEW_PATHS, MANY_PATHS = 32, 96
-#: What errors are relative to.
-SAID = (
-    "Errors of energy are relative to the sum of the magnitudes of the energies of the sites, those of sums to that of "
-    "their terms; Casimirs of sites are looked at where they changed most."
-)
+#: The part of the sentence about the units of errors that concerns Casimirs of sites.
+WORST_SITE = "Casimirs of sites are those of the site where they changed most."
 
 
 @dataclass(frozen=True)
@@ -115,7 +112,8 @@ def verify_lattice(
             checks += _noise(compilation.cell, subject, quick=quick)
         checks += _single(compilation.cell, subject, single, made) if single else []
     label = compilation.told(compilation.method)
-    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, SAID)
+    said = f"{stated(units_of(compilation.cell, made))} {WORST_SITE}"
+    return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said)
 
 
 def _without_noise(subject: _Subject) -> _Subject:
@@ -181,7 +179,7 @@ def _energy(cell: Cell, made: LatticeTrajectory, errors: Mapping[str, Floats], l
         yield Check("energy: largest change", float(energy.max()))
         return
     yield Check(f"{what}: largest error", float(energy.max()))
-    least = max(least, works(cell, made)[1] / (made.energy_scale or 1.0)) if what == BALANCE else least
+    least = max(least, works(cell, made)[1] / made.energy_scale) if what == BALANCE else least
     quarter = max(1, 3 * len(energy) // 4)
     before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
     grown = after / before if before > 10 * least else math.nan

@@ -22,8 +22,10 @@ from phigen.runtime.members import Members
 from phigen.runtime.memory import expect_room
 from phigen.spec.model import Run, Spec, Sweep
 from phigen.spec.names import KEPT
+from phigen.study.conservation import LARGE_ENERGY_ERROR
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
+from phigen.sweeping.quality import EnergyErrors, energy_errors
 
 #: Seconds that a chunk should take: long beside what scheduling and storing cost, short beside a coffee.
 _SECONDS = 4.0
@@ -50,12 +52,14 @@ class Setting:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was made: members and how many of them failed in this call, and how many there are in all."""
+    """Number of members made and failed in this call, the number of all, and the quality of their energies."""
 
     members: int
     failed: int
     size: int
     dims: Mapping[str, int]
+    order: int
+    energy: EnergyErrors
 
 
 def made(
@@ -97,7 +101,9 @@ def made(
             place = str(setting.output.resolve()), store.digest_of(job.plan, beside)
             cluster.make_all(client, slots, *place, chunks, count)
         store.imported("zarr").consolidate_metadata(str(setting.output))
-    return Outcome(int(counts[0]), int(counts[1]), plan.size, dict(zip(plan.dims, plan.shape, strict=True)))
+    dims = dict(zip(plan.dims, plan.shape, strict=True))
+    energy = EnergyErrors() if spec.lattice else energy_errors(job, compilation.system, LARGE_ENERGY_ERROR)
+    return Outcome(int(counts[0]), int(counts[1]), plan.size, dims, compilation.order.order, energy)
 
 
 def _expect_names(varied: Iterable[str], spec: Spec, sweep: Sweep) -> None:

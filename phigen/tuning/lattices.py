@@ -17,7 +17,7 @@ from phigen.runtime.lattice import LatticeBackend, LatticeSession
 from phigen.spec.model import Run, Spec
 from phigen.spec.names import BIREALISATIONS
 from phigen.study import classical, race
-from phigen.study.conservation import SITES, Unit
+from phigen.study.conservation import SITES, Unit, unit_of
 from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem
 from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, direct
@@ -72,7 +72,7 @@ class FlatLattice:
         """H of states (rows, DIM)."""
         return np.array([self._at(x, parameters).hamiltonian() for x in states])
 
-    def unit(self, x: Floats, parameters: Mapping[str, Any]) -> float:
+    def terms(self, x: Floats, parameters: Mapping[str, Any]) -> float:
         """The sum of the magnitudes of the energies of the sites."""
         return float(np.abs(self._at(x, parameters).density()).sum())
 
@@ -103,7 +103,8 @@ class LatticeProblem(Problem):
     @property
     def unit(self) -> Unit:
         """What errors of the energy are counted in."""
-        return Unit(self.seer.unit(self.start, self.parameters) or 1.0, SITES)
+        energy = float(self.seer.energies(self.start[None], self.parameters)[0])
+        return unit_of(energy, self.seer.terms(self.start, self.parameters), SITES)
 
     @property
     def most_rows(self) -> int:

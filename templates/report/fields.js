@@ -66,14 +66,15 @@ function makeView(panel) {
       params[name] = valuesOf(values, name, sizes, values.at === "bonds" ? data.bonds.length / 2 : count);
     }
     const solver = new Solver({ x0: startOf(data, sizes, count), t0: data.t0, sizes, params, bonds: data.bonds });
-    const groups = data.quantities.map(({ name, casimirs }) => ({ name, error: casimirs ? offCasimirs(solver, casimirs) : offEnergy(solver) }));
+    const groups = data.quantities.map(({ name, casimirs }) => ({ name, error: casimirs ? offCasimirs(solver, casimirs) : energyError(solver) }));
     const field = (x, t) => ({ x: solver.vectorField(x, t), t: 1 }), chosen = data.groups[given.group];
     return new Race(solver, { h: given.h, field, groups, remember: (runner) => remember(runner, solver, chosen, sizes) });
   }
 
-  // Off the energy, in magnitudes of the energies of all sites.
-  function offEnergy(solver) {
-    const energy = solver.hamiltonian(), unit = solver.density().reduce((sum, v) => sum + Math.abs(v), 0) || 1;
+  // The energy error, relative to |H| at the start or, where that is nearly 0, to the magnitudes of the energies of all sites.
+  function energyError(solver) {
+    const energy = solver.hamiltonian(), sites = solver.density().reduce((sum, v) => sum + Math.abs(v), 0);
+    const unit = (Math.abs(energy) > 1e-3 * sites ? Math.abs(energy) : sites) || 1;
     return (x) => Math.abs(solver.hamiltonian(x) - energy) / unit;
   }
 

@@ -368,7 +368,7 @@ sweeps:
 """
 
 
-def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path):
+def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path, monkeypatch):
     """A draw moves the seeds of the run: of the state and of the parameter at sites."""
     from phigen.lattice.states import start_of
 
@@ -389,6 +389,8 @@ def test_members_are_lattices_with_disorder_of_their_own(cluster, tmp_path):
     assert data.W.values.tolist() == [0.0, 2.0]
     assert np.isfinite(data.lyapunov).all()
     assert np.ptp(data.final.values, axis=1).min() > 0
+    titles = [axes.get_title() for axes in drawn(tmp_path / "s.zarr", monkeypatch, "final")]
+    assert titles == [f"final: {c}, mean over the sites" for c in spec.coordinates]
 
 
 def test_lattices_that_fail_cost_themselves_and_maps_are_drawn(cluster, tmp_path):
@@ -433,3 +435,48 @@ def test_exponents_of_lattices_are_the_growth_of_a_vector(noise):
     for _, carried in solver.tangents(x, 0.05, 130, vector, parameters=given, **({"seed": 3} if noise else {})):
         grown = np.log(np.linalg.norm(carried) / start) / (130 * 0.05)
     assert found == pytest.approx(grown, rel=1e-12)
+
+
+PENDULUM = """\
+phigen: 1
+name: swinging
+coordinates: [q, p]
+parameters: {k: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - k*cos(q)
+order: 2
+runs: {swing: {initial: [1.2, 0], step: 0.9, steps: 40}}
+sweeps:
+  map: {over: {k: {from: 0.01, to: 3, count: 5, scale: log}, q: [0.5, 1.2, 2.0]}, keep: [energy_error], frames: 1}
+"""
+
+
+def drawn(store, monkeypatch, shown=None):
+    """The axes of the figure of a store."""
+    from phigen.drawing import sweep_map
+
+    figures = []
+    monkeypatch.setattr(sweep_map, "save", lambda figure, path: figures.append(figure))
+    sweep_map.draw(store, store.with_suffix(".svg"), shown)
+    return figures[0].get_axes()
+
+
+def test_logarithmic_axes_and_large_energy_errors_are_seen(cluster, tmp_path, monkeypatch):
+    from phigen.cli import group
+
+    (tmp_path / "s.yaml").write_text(PENDULUM)
+    arguments = ["sweep", str(tmp_path / "s.yaml"), "-o", str(tmp_path / "s.zarr"), "-t", "numpy"]
+    done = CliRunner().invoke(group, [*arguments, "--scheduler", cluster.scheduler_address])
+    assert done.exit_code == 0, done.output
+    data = xarray.open_zarr(tmp_path / "s.zarr").load()
+    scale = np.abs(data.k * np.cos(data.q))
+    assert (scale > 1e-3 * data.k * data.q * np.sin(data.q)).all()
+    large = int((data.energy_error / scale > 0.1).sum())
+    assert large > 0
+    assert f"warning: {large} of 15 members have an energy error above 10% of their energy" in done.stderr
+    axes = drawn(tmp_path / "s.zarr", monkeypatch)[0]
+    assert (axes.get_xlabel(), axes.get_xscale()) == ("q", "linear")
+    assert (axes.get_ylabel(), axes.get_yscale()) == ("k", "log")
+    low, high = axes.get_ylim()
+    assert 0.001 < low < 0.01
+    assert 3 < high < 30

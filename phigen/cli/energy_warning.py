@@ -1,0 +1,56 @@
+"""The warning about a run whose energy error is too large for its states to mean anything."""
+
+from __future__ import annotations
+
+from phigen.spec.model import Spec
+from phigen.study.conservation import LARGE_ENERGY_ERROR, RELATIVE, SITES, TERMS, Unit
+from phigen.study.summary import Summary
+from phigen.tuning.search import rounded_down
+
+#: Energy error that the proposed step aims at: small enough that orbits keep their shape.
+AIM = 1e-3
+
+_SCALES = {RELATIVE: "the energy at the start", TERMS: "the terms of H at the start", SITES: "Σ |energy of a site|"}
+
+
+def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
+    """The warning about a run of an ordinary system; empty if there is none.
+
+    Where forces act or H depends on the time it is about the balance of energy, unless the integral in the balance is
+    the less certain of the two.
+    """
+    energy = summary.energy
+    uncertain = summary.is_balance and not summary.off < energy.error / 2
+    changes = energy.unit.moves and not summary.is_balance
+    return "" if uncertain or changes else energy_warning(spec, energy.error, energy.unit, h, order)
+
+
+def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:
+    """The warning about an energy error, with a smaller step to try; empty if the error is not large."""
+    if unit.kind not in _SCALES or not error > LARGE_ENERGY_ERROR:
+        return ""
+    said = f"the energy error reaches {_multiple(error)} {_SCALES[unit.kind]}: do not trust these states"
+    tune = "" if spec.time else f"; phigen tune {spec.file} measures which step is needed"
+    return f"{said}\n  hint: try --step {advised_step(error, h, order):g}{tune}"
+
+
+def sweep_warning(count: int, members: int, largest: float, h: float, order: int) -> str:
+    """The warning about ``count`` members of a sweep whose energy error is large; empty if there are none."""
+    if not count:
+        return ""
+    said = f"{count} of {members} members have an energy error above {LARGE_ENERGY_ERROR:.0%} of their energy"
+    hint = f"a smaller step for them; {advised_step(largest, h, order):g} would do for the worst, by an estimate"
+    return f"{said}, the largest {_multiple(largest)} it: do not trust their numbers\n  hint: {hint}"
+
+
+def _multiple(error: float) -> str:
+    return f"{error:.0%} of" if error < 10 else f"{error:.1e} times"
+
+
+def advised_step(error: float, h: float, order: int) -> float:
+    """An estimate of the step whose energy error is `AIM`, since errors are proportional to h^order.
+
+    An error beyond 1 says only that the step is too large: it counts as 1.
+    """
+    step = abs(h) * (AIM / min(error, 1.0)) ** (1 / order)
+    return rounded_down(step, 1) * (1 if h > 0 else -1)
