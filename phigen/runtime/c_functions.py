@@ -24,7 +24,6 @@ _SIGNATURES = {
 # Where there is a time, in place of those of the same name.
 _TIMED = {
     "init_at": (_INT, (_POINTER, _POINTER, _POINTER, _DOUBLE)),
-    "ensemble_at": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _DOUBLE, _SIZE, _POINTER)),
     "hamiltonian": (_DOUBLE, (_POINTER, _DOUBLE, _POINTER)),
     "vector_field": (None, (_POINTER, _DOUBLE, _POINTER, _POINTER)),
 }
@@ -39,6 +38,7 @@ _NOISY = {
 # What is there only if it was asked for, or not left out.
 _EXTRAS = {
     "ensemble": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _SIZE, _POINTER)),
+    "ensemble_at": (_INT, (_POINTER, _POINTER, _SIZE, _DOUBLE, _DOUBLE, _SIZE, _POINTER)),
     "ensemble_each": (_INT, (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE, _SIZE, _POINTER, _POINTER)),
     "step_tangent": (_INT, (_POINTER, _DOUBLE, _POINTER)),
     "pullback": (_INT, (_POINTER, _DOUBLE, _SIZE, _SIZE, _POINTER, _POINTER, _POINTER, _POINTER, _POINTER)),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import RawC, compiled, files, setting, small, solver
+from support import RawC, compile_text, compiled, files, setting, small, solver
 
 from phigen import resources, spec
 from phigen.compiler import compile_spec
@@ -98,6 +98,15 @@ def test_a_part_can_be_left_out_of_fast_code(part):
     if part == "kicks":
         with pytest.raises(TypeError, match="compiled without kicks"):
             solver(compilation, "c").session(at.x).kick(at.x)
+
+
+def test_timed_code_without_ensembles_can_be_loaded():
+    text = "coordinates: [q, p]\ntime: t\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + q**2*cos(t)\n"
+    compilation = compile_text(text + "without: [ensemble]\n")
+    ends = [solver(compilation, t).integrate([1, 0.5], 0.1, 20).x[-1] for t in ("c", "numpy")]
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=2e-14)
+    with pytest.raises(TypeError, match="compiled without ensembles"):
+        solver(compilation, "c").ensemble([[1, 0.5]], 0.1, 1)
 
 
 def test_small_code_has_no_part_that_serves_speed_and_carries_nothing_for_one():
