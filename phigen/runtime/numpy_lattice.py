@@ -55,7 +55,7 @@ class NumpyLatticeSession:
 
     def advance(self, h: float, steps: int) -> None:
         """Make so many steps."""
-        self._set_step(h)
+        self.prepare(h)
         past: dict[Any, Any] = {}
         with np.errstate(all="ignore"):
             for _ in range(steps):
@@ -72,7 +72,7 @@ class NumpyLatticeSession:
         """Make so many steps, which carry vectors along."""
         if not hasattr(self._module, "step_tangent"):
             raise MissingExtraError("step_tangent")
-        self._set_step(h)
+        self.prepare(h)
         carried, past = list(vectors), dict[Any, Any]()
         with np.errstate(all="ignore"):
             for _ in range(steps):
@@ -96,9 +96,13 @@ class NumpyLatticeSession:
         finally:
             self._sites.given = None
 
-    def _set_step(self, h: float) -> None:
+    def prepare(self, h: float) -> None:
+        """Compute what depends on the step size; raises `BackendError` if that is not finite."""
         if h != self._h:
-            self._h, self._rows = h, self._module._coefficients(self._sites, h)
+            try:
+                self._h, self._rows = h, self._module._coefficients(self._sites, h)
+            except ValueError:  # as of the other targets, a step from which no state is finite
+                raise BackendError("NOT_FINITE", self.steps, self._x[None].copy()) from None
             self._clock.set_step(h, self.steps)
 
     def _tell_time(self) -> None:
@@ -112,7 +116,7 @@ class NumpyLatticeSession:
 
     def resume(self, h: float, steps: int, kept: Mapping[str, Any]) -> None:
         """Go on from what was saved."""
-        self._set_step(h)
+        self.prepare(h)
         self.steps = steps
         self._tell_time()
 
@@ -195,5 +199,6 @@ class NumpyLattice:
         except self._module.StepError as error:
             raise BackendError(error.status, error.step, error.states) from None
         except ValueError:
+            self.start(x0, parameters, t0).prepare(h)  # raises where the step, and not the start, is refused
             raise BackendError("BAD_ARGUMENT", 0, x0[None]) from None
         return found
