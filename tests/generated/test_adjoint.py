@@ -7,7 +7,7 @@ import mpmath
 import numpy as np
 import pytest
 from precise_path import PrecisePathStep
-from support import RATTLEBACK, TARGETS, PreciseStep, RawC, files, precisely, solver
+from support import RATTLEBACK, TARGETS, PreciseStep, RawC, compile_text, files, precisely, solver
 
 from phigen import SpecError, StepError, compile, spec
 from phigen.compiler import compile_spec, emit
@@ -128,6 +128,15 @@ def test_pullback_is_the_gradient_of_the_run(kind):
     assert again.x1 == pytest.approx(rows, abs=1e-14)
     assert again.x0_bar == pytest.approx(x0_bar, rel=1e-13)
     assert [again.parameters_bar[name] for name in found] == pytest.approx(list(found.values()), rel=1e-12)
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_splitting_whose_brackets_are_all_zero_pulls_back_what_it_is_given(target):
+    text = (
+        "coordinates: [x, y]\nparameters: {a: 2}\npoisson: {brackets: {x: {}}}\nhamiltonian: a*x\nscheme: splitting\n"
+    )
+    back = solver(compile_text(text + "adjoint: true\n"), target).pullback([1, 2], H, STEPS, [3, 4])
+    assert [*back.x0_bar, back.parameters_bar["a"]] == [3, 4, 0]
 
 
 @pytest.mark.parametrize("target", TARGETS)

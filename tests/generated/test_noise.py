@@ -182,6 +182,17 @@ def test_targets_agree_to_roundoff(kind):
     assert x == pytest.approx(c.x[-1], abs=1e-13)
 
 
+@pytest.mark.parametrize("target", ["c", "numpy"])
+@pytest.mark.parametrize("scheme", ["series", "splitting"])
+def test_noise_along_a_casimir_moves_nothing(scheme, target):
+    text = "coordinates: [q, p, z]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + z*q**2\norder: 2\n"
+    ends = [
+        solver(compile_text(f"{text}scheme: {scheme}\n{noise}"), target).integrate([1, 0.5, 1], 0.1, 20).x[-1]
+        for noise in ("", "noise: {w: {hamiltonian: z}}\n")
+    ]
+    assert ends[0] == pytest.approx(ends[1], abs=1e-14)
+
+
 @pytest.mark.parametrize("kind", ["thermal", "dated", "split", "path"])
 def test_casimirs_are_kept_at_any_temperature(kind):
     found = solver(made(kind), "c").integrate(SYSTEMS[kind][1], 0.1, 50_000, 100)

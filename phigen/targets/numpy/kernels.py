@@ -66,7 +66,7 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
 def _state(kernel: Kernel) -> str:
     """The argument that holds states (..., DIM), which arrays are shaped by; empty where there is none."""
     others = [a for a in kernel.inputs if a not in (TABLE, "params", "gauge", *SCALARS)]
-    return next((a for a in others if not isinstance(kernel.inputs[a][0], Symbol)), "")
+    return next((a for a in others if kernel.inputs[a] and not isinstance(kernel.inputs[a][0], Symbol)), "")
 
 
 def _list(items: Sequence[str]) -> str:
