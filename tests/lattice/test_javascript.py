@@ -63,6 +63,12 @@ VARIANTS: dict[str, Callable[[], Spec]] = {
     "stiff": lambda: specs.loads(STIFF),
     "stiff graph": lambda: specs.loads(STIFF_GRAPH),
     "names": lambda: specs.loads(NAMES),
+    # Pairs of which H has no energy: there is nothing to add up at a site.
+    "apart": lambda: specs.loads(
+        "phigen: 1\nname: apart\nlattice: {pairs: all}\ncoordinates: [q, p]\n"
+        "poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: {sites: p**2/2 + q**4/4}\n"
+        "runs: {r: {sizes: [4], initial: {random: normal, seed: 3}, step: 0.1, steps: 8}}\n"
+    ),
     "spins by the series": lambda: replace(specs.loads(LATTICES["spins_2"]), scheme="series"),
     "a graph by the series": lambda: replace(specs.loads(LATTICES["spin_graph"]), scheme="series"),
     "kicks": lambda: replace(specs.loads(LATTICES["fput_open"]), composition="force-gradient"),
@@ -78,8 +84,8 @@ CASES = [*CORPUS, *VARIANTS, *DRIVEN]
 STEPS, T0 = 8, 0.7
 #: Those of the corpus, and of each further kind one.
 pytestmark = pytest.mark.few(
-    *CORPUS, "stiff", "stiff graph", "names", "kicks", "colours", "spins by the series", "a graph by the series",
-    "melting, in time", "coloured, in time", "damped, forced", "friction, forced", of=CASES,
+    *CORPUS, "stiff", "stiff graph", "names", "kicks", "apart", "colours", "spins by the series",
+    "a graph by the series", "melting, in time", "coloured, in time", "damped, forced", "friction, forced", of=CASES,
 )  # fmt: skip
 
 

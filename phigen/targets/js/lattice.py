@@ -69,6 +69,7 @@ def _tables(program: Program, step: Sweeps) -> dict[str, object]:
         "bounds": json.dumps([bounds(w.key) for w in loops.weights]),
         "wanted": json.dumps([[s.key[0], list(s.key[1:])] for s in loops.seams]),
         "sums": step.sums,
+        "gathers": lattice.switches(step)["GATHER"],
         "unit": "stages" if step.equation else "flows",
         "schedule": f"[{', '.join(f'[{part},{_FIXED}{row}]' for part, row in step.schedule.flows)}]",
         "flows": f"[{', '.join(map(_listed, step.parts))}]",
