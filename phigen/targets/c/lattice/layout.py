@@ -143,7 +143,7 @@ def switches(program: Program, step: Sweeps, layout: Layout) -> dict[str, bool]:
         "STARTS": starts_are_read(step),
         "UNDONE": can_be_undone(program, step),
         "APART": (program.profile == "small" or step.sites.colours > 1) and shares(step),
-        "GIVERS": step.adjoint is not None and givers(step),
+        "GIVERS": givers(step) and (takes(program, step) or any(handed_apart(program, step))),
         "SITE_PARAMETERS": bool(step.sites.parameters),
         "SERIES": step.equation is not None,
         "BANDED": banded,
