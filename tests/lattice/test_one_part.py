@@ -12,7 +12,6 @@ import phigen
 import phigen.spec
 from phigen.compiler import compile_spec, emit
 from phigen.lattice import undoing
-from phigen.spec.model import Extras
 
 H, STEPS, STRIDE, SITES = 0.1, 5, 2, 6
 KINDS = ("axes", "graph", "pairs")
@@ -79,7 +78,7 @@ def test_gradients_of_one_part_are_differences_where_fields_are_stored(kind, mon
 
 def expect_gradients(spec, given, seed, profile):
     """Compare pullbacks in C with differences, and with NumPy; the C is returned."""
-    program = compile_spec(spec, extras=Extras(adjoint=True), profile=profile).program
+    program = compile_spec(spec, adjoint=True, profile=profile).program
     assert len(program.step.parts) == 1
     assert len(program.step.schedule.flows) == 1 or spec.time
     in_c, numpy = (phigen.compile(spec, target=t, adjoint=True, profile=profile) for t in ("c", "numpy"))
