@@ -42,6 +42,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @scheme_option
 @profile_option
 @sizes_option
+@click.option("--adjoint", is_flag=True, help="Measure gradients, whether the spec asks for them or not.")
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
@@ -56,6 +57,7 @@ def command(
     scheme: str | None,
     profile: str | None,
     sizes: str | None,
+    adjoint: bool,
     quick: bool,
     plot: Path | None,
     as_json: bool,
@@ -81,7 +83,9 @@ def command(
             spec = resized(given, name, sizes)
             if plot:
                 expect_system(spec)
-            compilation = compile_proved(spec.for_running(order=order, scheme=scheme, profile=profile, tangent=True))
+            compilation = compile_proved(
+                spec.for_running(order=order, scheme=scheme, profile=profile, adjoint=adjoint, tangent=True)
+            )
             judged = verified_lattice if spec.lattice else verified
             verification = judged(compilation, name, quick, console)
             found.append(verification)

@@ -26,7 +26,7 @@ from phigen.lattice.series import SeriesPlan
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.scheme.steps import Sweeps
-from phigen.study import lattice_noise, single_precision
+from phigen.study import gradients, lattice_noise, single_precision
 from phigen.study.conservation import rounding, stated
 from phigen.study.verification import ONE_STEP, ORDER_SLACK, STRONG_SLACK, Check, Verification
 from phigen.symbolic.arrays import Floats, evaluate
@@ -37,6 +37,8 @@ MOST_UPDATES, FEW_UPDATES, FRAMES = 200_000_000, 20_000_000, 100
 GROWTH = 4.0
 #: The Poisson identity on a small lattice, with exact tangent maps; and these against differences of order 6.
 IDENTITY, DIFFERENCES = 1e-12, 1e-9
+#: Sites of runs up to which gradients are measured on all of them.
+MOST_GRADED = 16384
 #: Sites along each axis where paths of a noise are followed, with one, two and three axes.
 SOME = (32, 6, 4)
 #: Paths of single sites that are followed, with ``quick`` and without.
@@ -107,10 +109,13 @@ def verify_lattice(
     with progress.stage(f"{name}: single steps"):
         checks += [_reversal(subject, made), *_agreement(subject, made)]
         checks += _identity(compilation.cell, subject, made)
+    if compilation.program.extras.adjoint:
+        with progress.stage(f"{name}: gradients"):
+            checks += _gradients(compilation.cell, subject, made)
     if seed is not None:
         with progress.stage(f"{name}: paths of the noise"):
             checks += _noise(compilation.cell, subject, quick=quick)
-        checks += _single(compilation.cell, subject, single, made) if single else []
+    checks += _single(compilation.cell, subject, single, made) if single else []
     label = compilation.told(compilation.method)
     said = f"{stated(units_of(compilation.cell, made))} {WORST_SITE}"
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said)
@@ -256,12 +261,7 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
 
     The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, in what is usual of each field.
     """
-    about = subject.solver.interface
-    sizes = [
-        -(-max(least, 3 if len(about.axes) < 3 else 2) // p) * p
-        for least, p in zip(about.least, about.periods, strict=True)
-    ]
-    sizes = _with_seams(subject, sizes)
+    about, sizes = subject.solver.interface, _few_sizes(subject)
     whole, wanted = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
     x, parameters = _on_few(cell, subject.start, sizes, whole.bonds)
     few = _Few(whole, subject, parameters, x)
@@ -280,6 +280,33 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
     slip = min(max(few.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in tried)
     name, limit = f"tangent map against differences {where}", f"≤ {DIFFERENCES:.0e}"
     yield Check(name, slip, limit, slip <= DIFFERENCES, f"is no derivative of the step, {slip:.1e} off")
+
+
+def _gradients(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
+    """Gradients of all targets on a few sites, along every parameter; of the first on those of the run, if not many."""
+    sizes, start, about = _few_sizes(subject), subject.start, (subject.h, subject.t0)
+    x, parameters = _on_few(cell, start, sizes, ring(sizes[0]) if subject.solver.interface.graph else ())
+    usual = _units(np.abs(made.x).max(axis=tuple(i for i in range(made.x.ndim) if i != 1)))
+    few = [
+        gradients.of_lattice(s, x, usual.repeat(x[0].size), about[0], parameters, about[1])
+        for s in subject.solvers.values()
+    ]
+    groups = [(few, f" on {'×'.join(map(str, sizes))} sites")]
+    if start.state[0].size <= MOST_GRADED:
+        units = usual.repeat(start.state[0].size)
+        whole = gradients.of_lattice(subject.solver, start.state, units, about[0], start.arguments, about[1])
+        groups.append(([whole], " on all sites"))
+    for runs, where in groups:
+        for name, value, most, reason in gradients.measured(runs, runs, where):
+            yield Check(name, value, f"≤ {most:.0e}", value <= most, reason)
+
+
+def _few_sizes(subject: _Subject) -> list[int]:
+    """The sizes of a lattice of a few sites that the method takes, with the seams of the run."""
+    about = subject.solver.interface
+    least = 3 if len(about.axes) < 3 else 2
+    sizes = [-(-max(size, least) // p) * p for size, p in zip(about.least, about.periods, strict=True)]
+    return _with_seams(subject, sizes)
 
 
 def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:

@@ -104,6 +104,22 @@ MEANINGS = (
         "the derivative is that of another map, so the rows and exponents that rest on it mean nothing",
     ),
     Meaning(
+        "gradient against tangent maps",
+        "⟨bar, DΦ v⟩ against ⟨DΦᵀ bar, v⟩ over eleven steps with cotangents at every fourth, relative to its terms, "
+        "where the code has gradients",
+        "the reverse pass is not the transpose of the steps that are made",
+    ),
+    Meaning(
+        "gradient against differences",
+        "derivatives of such a run along the start and each parameter, against differences of order six",
+        "gradients are those of another run, so fits and optimisations that rest on them go astray",
+    ),
+    Meaning(
+        "gradients of members",
+        "gradients of runs that are made side by side against those of the same runs one by one",
+        "ensembles have other gradients than their members",
+    ),
+    Meaning(
         "reversibility",
         "how far a step of h and one of −h lead from the start. Judged for symmetric methods",
         "the method is not symmetric, or the equation of a step was not solved to the last bit",

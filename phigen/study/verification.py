@@ -19,7 +19,7 @@ from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.geometry.checks import commuting
 from phigen.runtime.solver import Solver
-from phigen.study import backward, measures, single_precision
+from phigen.study import backward, gradients, measures, single_precision
 from phigen.study.conservation import Unit, largest_terms, rounding, units_of
 from phigen.study.methods import Method, field_of, of_classical, of_solver, without_noise
 from phigen.study.monitored import field_in_tau, with_time
@@ -96,7 +96,7 @@ class Subject:
     """What is examined: the methods of all targets, those to compare with, and the numbers of the run."""
 
     compilation: Compilation
-    solver: Solver
+    solvers: Mapping[str, Solver]
     own: Mapping[str, Method]
     others: Mapping[str, Method]
     parameters: Mapping[str, float]
@@ -105,6 +105,11 @@ class Subject:
     steps: int
     t0: float
     field: Callable[[Floats], Floats]  # the motion in the variable that steps are equal in
+
+    @property
+    def solver(self) -> Solver:
+        """The solver of that target."""
+        return next(iter(self.solvers.values()))
 
     @property
     def main(self) -> Method:
@@ -146,7 +151,7 @@ def verify(
     noisy = bool(compilation.system.noise)
     others = {name: of_classical(name, solver, parameters, t0, field) for name in (() if noisy else compare)}
     made = min(steps, FEW_STEPS if quick else MOST_STEPS)
-    subject = Subject(compilation, solver, own, others, parameters, x, h, made, t0, field)
+    subject = Subject(compilation, solvers, own, others, parameters, x, h, made, t0, field)
     rows = subject.main.rows(x, h, made, 1)
     # With noise, trajectories may well start where single steps have no scale: at rest, at the origin.
     first = made // STATES if noisy else 0
@@ -168,6 +173,7 @@ def verify(
                 "noise": lambda: noise_checks(subject, states),
                 "conservation": lambda: conservation_checks(subject, rows),
                 "single steps": lambda: one_step_checks(subject, states),
+                "gradients": lambda: gradient_checks(subject, gauge, states),
                 "agreement": lambda: [agreement_check(subject, states)],
                 "largest step": lambda: [step_check(subject, states)],
                 "modified Hamiltonian": lambda: modified_checks(subject, gauge),
@@ -382,6 +388,31 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
         f"a step back misses by {back:.1e}",
         {name: worst(measures.reversal, m) for name, m in subject.others.items()},
     )
+
+
+def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Floats]) -> Iterator[Check]:
+    """Gradients of short runs against tangent maps and differences, and those of members against those of single runs.
+
+    The multiples of a gauge are held fixed, as gradients take them to be. With a monitor, e = −H(x₀) follows the start,
+    but for tangent maps, which hold it.
+    """
+    program = subject.compilation.program
+    if not program.extras.adjoint:
+        return
+    size = np.max(np.abs(states), axis=0)
+    units = np.maximum(size, 0.1 * (float(np.max(size)) or 1.0))
+    about = units, subject.h, subject.parameters, subject.t0
+    solvers = list(subject.solvers.values())
+    fixed = [s if gauge is None else Solver(s.backend.with_gauge(gauge), s.interface) for s in solvers]
+    held, free = (
+        [gradients.of_solver(s, x, *about) for s in each for x in (states[0], states[-1])]
+        for each in (fixed, solvers if program.monitor else fixed)
+    )
+    apart = max(gradients.members_error(s, np.array(states), *about) for s in fixed)
+    reason = f"gradients of members differ from those of single runs by {apart:.1e}"
+    members = "gradients of members against single runs", apart, gradients.TRANSPOSED, reason
+    for name, value, most, why in (*gradients.measured(held, free), members):
+        yield Check(name, value, f"at most {most:g}", value <= most, why)
 
 
 def _approximate(

@@ -1,0 +1,208 @@
+"""Gradients of runs as verification measures them: against tangent maps, and against differences of the runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from phigen.errors import StepError
+from phigen.runtime.interface import row_steps
+from phigen.runtime.lattice import LatticeSolver
+from phigen.runtime.solver import Solver
+from phigen.symbolic.arrays import Floats
+
+#: The runs: they have rows within a block of eight steps, at its end, and after a last stride that is shorter.
+STEPS, STRIDE = 11, 4
+#: A gradient and the transposed tangent maps are both exact to rounding, relative to their terms.
+TRANSPOSED = 1e-12
+#: Differences of order 6, whose own error this bounds, are taken at two distances, in units of what is moved.
+DIFFERENCES = 1e-7
+_DISTANCES = (2e-3, 2e-3 / 256)
+_WEIGHTS = ((1, 3 / 4), (2, -3 / 20), (3, 1 / 60))
+#: Derivatives below this part of the function itself are compared with that: differences cannot resolve them.
+_LEAST = 1e-3
+#: Random directions along which a start is moved, and the most numbers that each have a tangent vector.
+_DIRECTIONS, _MOST_COLUMNS = 3, 64
+
+#: Name, value, the largest value allowed, and what is wrong where it is larger.
+Measured = tuple[str, float, float, str]
+
+
+@dataclass(frozen=True)
+class GradedRun:
+    """A short run of one target from ``x`` (numbers,), whose rows can be derived.
+
+    ``rows(x, parameters)`` are the states (rows, numbers), ``pullback(bars)`` the cotangents of x and of the parameters
+    by name, ``carried(vectors)`` where tangent vectors (count, numbers) are at each row after the first. Numbers have
+    the ``units`` of what is usual of them.
+    """
+
+    x: Floats
+    units: Floats
+    parameters: Mapping[str, Any]
+    rows: Callable[[Floats, Mapping[str, Any]], Floats]
+    pullback: Callable[[Floats], tuple[Floats, Mapping[str, Any]]]
+    carried: Callable[[Floats], Floats]
+    bars: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Draw the cotangents of all rows, the same for all targets."""
+        drawn = np.random.default_rng(1).normal(size=(len(row_steps(STEPS, STRIDE)), len(self.x)))
+        object.__setattr__(self, "bars", drawn / self.units)
+
+
+def of_solver(
+    solver: Solver, x: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
+) -> GradedRun:
+    """Return a run of an ordinary solver."""
+    begin = t0 if solver.interface.time else None
+
+    def carried(vectors: Floats) -> Floats:
+        found, product = [], vectors.T
+        for step, (_, tangent) in enumerate(solver.tangents(x, h, STEPS, t0=begin, parameters=parameters), 1):
+            product = tangent @ product
+            if step % STRIDE == 0 or step == STEPS:
+                found.append(product.T)
+        return np.array(found)
+
+    def pullback(bars: Floats) -> tuple[Floats, Mapping[str, Any]]:
+        found = solver.pullback(x, h, STEPS, bars, STRIDE, t0=begin, parameters=parameters)
+        return found.x0_bar, found.parameters_bar
+
+    def rows(start: Floats, values: Mapping[str, Any]) -> Floats:
+        return solver.integrate(start, h, STEPS, STRIDE, t0=begin, parameters=values).x
+
+    return GradedRun(x, units, parameters, rows, pullback, carried)
+
+
+def of_lattice(
+    solver: LatticeSolver, x: Floats, units: Floats, h: float, parameters: Mapping[str, Any], t0: float | None
+) -> GradedRun:
+    """Return a run of a lattice from ``x`` (coordinates, *sizes); ``units`` are those of its numbers in this order."""
+    about: dict[str, Any] = {"t0": t0}
+
+    def carried(vectors: Floats) -> Floats:
+        shaped = vectors.reshape(len(vectors), *x.shape)
+        each = solver.tangents(x, h, STEPS, shaped, STRIDE, parameters=parameters, **about)
+        return np.array([vectors.reshape(len(vectors), -1) for _, vectors in each])
+
+    def pullback(bars: Floats) -> tuple[Floats, Mapping[str, Any]]:
+        shaped = bars.reshape(-1, *x.shape)
+        found = solver.pullback(x, h, STEPS, shaped, STRIDE, parameters=parameters, **about)
+        return found.x0_bar.reshape(-1), found.parameters_bar
+
+    def rows(start: Floats, values: Mapping[str, Any]) -> Floats:
+        made = solver.integrate(start.reshape(x.shape), h, STEPS, STRIDE, parameters=values, **about)
+        return np.asarray(made.x).reshape(len(made.x), -1)
+
+    return GradedRun(x.reshape(-1), units, parameters, rows, pullback, carried)
+
+
+def measured(held: Sequence[GradedRun], free: Sequence[GradedRun], where: str = "") -> Iterator[Measured]:
+    """Yield how far the gradients of runs, one or more of each target, are from their tangent maps and differences.
+
+    ``held`` are runs that hold what tangent maps hold; ``free`` those whose gradient is that of the whole run.
+    """
+    apart = _largest(held, transposition_error)
+    reason = f"the gradient is not the transpose of the tangent maps, {apart:.1e} off"
+    yield f"gradient against tangent maps{where}", apart, TRANSPOSED, reason
+    slip = _largest(free, difference_error)
+    yield f"gradient against differences{where}", slip, DIFFERENCES, f"the gradient is {slip:.1e} off"
+
+
+def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> float:
+    """Return the largest error of all runs; infinite where one fails, or is not finite."""
+    found = 0.0
+    for run in runs:
+        try:
+            value = error(run)
+        except StepError:
+            return math.inf
+        found = max(found, value if math.isfinite(value) else math.inf)
+    return found
+
+
+def transposition_error(run: GradedRun) -> float:
+    """Return how far ⟨bar, DΦ v⟩ is from ⟨DΦᵀ bar, v⟩, relative to the terms of the first.
+
+    The v are unit vectors, of many numbers some random ones.
+    """
+    count = len(run.x)
+    vectors = run.units * (np.eye(count) if count <= _MOST_COLUMNS else _directions(count, _DIRECTIONS))
+    carried = run.carried(vectors)
+    terms = run.bars[1:, None, :] * carried
+    forward = terms.sum(axis=(0, 2)) + vectors @ run.bars[0]
+    size = np.abs(terms).sum(axis=(0, 2)) + np.abs(vectors) @ np.abs(run.bars[0])
+    size = np.maximum(size, _LEAST * np.max(size))
+    back = vectors @ run.pullback(run.bars)[0]
+    return float(np.max(np.abs(forward - back) / size))
+
+
+def difference_error(run: GradedRun) -> float:
+    """Return how far the gradient is from differences of the run, along random directions and each parameter.
+
+    Each derivative is taken relative to itself, or to a part of what is derived where it is small beside that.
+    """
+    x_bar, parameters_bar = run.pullback(run.bars)
+    least = _LEAST * float(np.sum(np.abs(run.bars * run.rows(run.x, run.parameters))))
+    worst = 0.0
+    for exact, moved in _derivatives(run, x_bar, parameters_bar):
+        apart = [abs(exact - d) / max(abs(exact), abs(d), least) for d in _differences(run, moved)]
+        worst = max(worst, min(apart, default=math.inf))
+    return worst
+
+
+#: The start and the parameters, moved by so much.
+_Moved = Callable[[float], tuple[Floats, Mapping[str, Any]]]
+
+
+def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any]) -> Iterator[tuple[float, _Moved]]:
+    """Yield the derivatives that the gradient states, each with the motion that it is taken along."""
+    for v in _directions(len(run.x), _DIRECTIONS) * run.units:
+        yield float(x_bar @ v), lambda e, v=v: (run.x + e * v, run.parameters)  # type: ignore[misc]
+    for name, bar in parameters_bar.items():
+        value = np.asarray(run.parameters[name], dtype=np.float64)
+        unit = float(np.max(np.abs(value), initial=0.0)) or 1.0
+        v = unit * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
+        yield (
+            float(np.sum(bar * v)),
+            lambda e, name=name, value=value, v=v: (run.x, {**run.parameters, name: _plain(value + e * v)}),  # type: ignore[misc]
+        )
+
+
+def _differences(run: GradedRun, moved: _Moved) -> Iterator[float]:
+    """Yield the derivative along a motion by differences, at each distance where all runs can be made."""
+    for apart in _DISTANCES:
+        try:
+            ends = [(w, run.rows(*moved(k * apart)) - run.rows(*moved(-k * apart))) for k, w in _WEIGHTS]
+        except (StepError, ValueError):  # past a singularity, or a positive parameter past 0
+            continue
+        yield float(sum(w * np.sum(run.bars * change) for w, change in ends)) / apart
+
+
+def members_error(
+    solver: Solver, states: Floats, units: Floats, h: float, parameters: Mapping[str, float], t0: float
+) -> float:
+    """Return how far gradients of members side by side are from those of runs one by one, relative to the largest."""
+    about: dict[str, Any] = {"t0": t0 if solver.interface.time else None, "parameters": parameters}
+    bars = _directions(states.shape[1], len(states)) / units
+    try:
+        together = solver.pullback(states, h, STEPS, bars, **about).x0_bar * units
+        alone = [solver.pullback(x, h, STEPS, bar, **about).x0_bar * units for x, bar in zip(states, bars, strict=True)]
+    except StepError:
+        return math.inf
+    return float(np.max(np.abs(together - alone)) / (np.max(np.abs(together)) or 1.0))
+
+
+def _directions(size: int, count: int) -> Floats:
+    """Return random directions, the same at every call."""
+    return np.random.default_rng(2).normal(size=(count, size))
+
+
+def _plain(value: Floats) -> Any:
+    """Return a number as a number, an array as it is."""
+    return value if value.ndim else float(value)

@@ -1,0 +1,156 @@
+"""Gradients as `phigen verify` measures them: wrong ones are found, whichever part of them is wrong."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from phigen import resources, spec
+from phigen.api import lattice_solver_of, solver_of
+from phigen.cli import group
+from phigen.compiler import compile_spec
+from phigen.lattice.states import start_of
+from phigen.study import gradients, lattices, verification
+from phigen.study.meanings import meaning_of
+
+SWING = """phigen: 1
+name: t
+coordinates: [q, p]
+parameters: {g: 1.5, m: 0.7}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/(2*m) - g*cos(q)
+order: 2
+runs: {swing: {initial: [0.4, 0.3], step: 0.1, steps: 40}}
+"""
+SPINS = """phigen: 1
+name: spins
+coordinates: [x, y, z]
+parameters: {J: 0.6, B: {value: 0.8, at: sites}}
+poisson: {lie_algebra: {name: so(3)}}
+lattice: {axes: [i], boundary: periodic}
+hamiltonian: B*z**2/2 + J*z*z[i+1]
+order: 2
+runs: {turn: {sizes: [16], initial: {x: cos(i), y: sin(i), z: cos(2*i)/2}, step: 0.1, steps: 40}}
+"""
+TANGENTS, DIFFERENCES = "gradient against tangent maps", "gradient against differences"
+MEMBERS = "gradients of members against single runs"
+
+
+@cache
+def compiled(text, **options):
+    return compile_spec(spec.loads(text), tangent=True, **options)
+
+
+def checked(text, change=None, target="numpy", **options):
+    """The checks of gradients by name: whether they are passed. A ``change`` is made to what the back end gives."""
+    compilation = compiled(text, adjoint=True, **options)
+    run = next(iter(compilation.spec.runs.values()))
+    solver = (lattice_solver_of if compilation.cell else solver_of)(compilation, target)
+    if change:
+        pullback = solver.backend.pullback
+        solver.backend.pullback = lambda *given: change(given, *pullback(*given))
+    return {check.name: check.passed for check in checks(compilation, solver, run)}
+
+
+def checks(compilation, solver, run):
+    """The checks of gradients of one solver on a run."""
+    h = float(run.step)
+    if compilation.cell:
+        subject = lattices._Subject(compilation, {solver.target: solver}, start_of(compilation.spec, run), h)
+        made = solver.integrate(subject.start.state, h, 4, parameters=subject.start.arguments)
+        return list(lattices._gradients(compilation.cell, subject, made))
+    values, x = compilation.spec.parameters_of(run), np.array([float(v) for v in run.initial])
+    subject = verification.Subject(compilation, {solver.target: solver}, {}, {}, values, x, h, 40, 0.0, None)
+    states = solver.integrate(x, h, 40, 10, parameters=values).x
+    return list(verification.gradient_checks(subject, verification.gauge_at(compilation, x, values), list(states)))
+
+
+@pytest.mark.parametrize("more", ["", "monitor: 1/(1 + g*q**2)\n", "scheme: splitting\n"])
+@pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
+def test_right_gradients_pass(target, more):
+    assert checked(SWING + more, target=target) == {TANGENTS: True, DIFFERENCES: True, MEMBERS: True}
+
+
+def slightly(given, rows, x_bar, found):
+    return rows, x_bar * (1 + 1e-9), found
+
+
+def of_a_parameter(given, rows, x_bar, found):
+    return rows, x_bar, found * np.array([[1.0], [1.00001]])
+
+
+def of_several(given, rows, x_bar, found):
+    return rows, x_bar * (1 + 1e-9 * (len(x_bar) > 1)), found
+
+
+@pytest.mark.parametrize(
+    ("change", "failed"),
+    [(slightly, {TANGENTS}), (of_a_parameter, {DIFFERENCES}), (of_several, {MEMBERS})],
+)
+def test_wrong_gradients_are_found(change, failed):
+    assert {name for name, passed in checked(SWING, change).items() if not passed} == failed
+
+
+def test_the_energy_of_a_monitor_must_be_followed():
+    """What the start and the parameters change of e = −H(x₀) is left out: the tangent maps, at one e, do not see it."""
+    text = SWING + "monitor: 1/(1 + g*q**2)\n"
+    compilation = compiled(text, adjoint=True)
+    solver = solver_of(compilation, "numpy")
+    gauge = solver.backend.module.gauge(np.array([0.4, 0.3]), g=1.5, m=0.7)
+    held = solver.backend.with_gauge(gauge)
+
+    def at_one_level(given, rows, x_bar, found):
+        return held.pullback(*given)
+
+    assert {name for name, passed in checked(text, at_one_level).items() if not passed} >= {DIFFERENCES}
+
+
+def of_sites(given, rows, x_bar, found):
+    return rows, x_bar, found | {"B": np.roll(found["B"], 1)}
+
+
+@pytest.mark.parametrize(("change", "failed"), [(None, set()), (slightly, {TANGENTS}), (of_sites, {DIFFERENCES})])
+def test_gradients_of_lattices_are_checked_on_few_sites_and_on_those_of_the_run(change, failed):
+    found = checked(SPINS, change)
+    assert set(found) == {f"{name} on {where} sites" for name in (TANGENTS, DIFFERENCES) for where in ("3", "all")}
+    assert {name for name, passed in found.items() if not passed} == {
+        f"{name} on {where} sites" for name in failed for where in ("3", "all")
+    }
+
+
+def test_what_the_spec_does_not_ask_for_is_not_measured():
+    compilation = compiled(SWING)
+    assert checks(compilation, solver_of(compilation, "numpy"), compilation.spec.runs["swing"]) == []
+
+
+@pytest.mark.parametrize("name", [TANGENTS, DIFFERENCES, MEMBERS])
+def test_rows_have_meanings_which_the_documentation_gives(name):
+    page = (resources.bundled_specs().parent / "docs" / "commands.md").read_text(encoding="utf-8")
+    meaning = meaning_of(name)
+    assert f"| {meaning.row} | {meaning.measures} | {meaning.failure} |" in page
+
+
+@pytest.fixture
+def only_gradients(monkeypatch):
+    """Measure no more than is told here, which takes a tenth of the time."""
+    monkeypatch.setattr(verification, "_measured", lambda name, groups: tuple(groups["gradients"]()))
+
+
+def test_a_wrong_gradient_is_the_exit_code_of_verify_and_forbids_a_certificate(tmp_path, monkeypatch, only_gradients):
+    file, out = tmp_path / "t.yaml", tmp_path / "out"
+    file.write_text(SWING + "targets: [numpy]\n")
+    right = CliRunner().invoke(group, ["verify", "--quick", "--adjoint", "--json", str(file)])
+    assert right.exit_code == 0, right.output
+    (data,) = json.loads(right.stdout)
+    assert [c["name"] for c in data["checks"]] == [TANGENTS, DIFFERENCES, MEMBERS]
+    built = ["build", "-o", str(out), "--adjoint", "--certify", str(file)]
+    assert CliRunner().invoke(group, built).exit_code == 0
+    assert TANGENTS in (out / "t" / "t.certificate.json").read_text()
+    monkeypatch.setattr(gradients, "TRANSPOSED", 0.0)
+    wrong = CliRunner().invoke(group, ["verify", "--quick", "--adjoint", str(file)])
+    assert wrong.exit_code == 5
+    assert "not the transpose of the tangent maps" in wrong.stderr
+    assert CliRunner().invoke(group, built).exit_code == 5
+    assert not (out / "t" / "t.certificate.json").exists()
