@@ -181,6 +181,7 @@ DENSITIES = Record(
         Field("bonds", FORMULA, "of each bond of a graph, from a to b"),
         Field("pairs", FORMULA, "of each pair, a and b"),
     ),
+    some=True,
 )
 CASIMIR = Record(
     "a Casimir",

@@ -307,14 +307,15 @@ class Record(Kind):
     """A mapping with fixed keys; reads as key → value, keys in error absent.
 
     ``one`` lists keys of which at most (``exactly``: exactly) one may be given; a key of ``instead`` does where one is
-    needed, and may stand beside it. ``example`` is shown to who writes something else than a mapping; ``elsewhere``
-    says of keys that are none here where they belong.
+    needed, and may stand beside it. ``some`` refuses an empty mapping. ``example`` is shown to who writes something
+    else than a mapping; ``elsewhere`` says of keys that are none here where they belong.
     """
 
     what: str
     fields: tuple[Field, ...]
     one: tuple[str, ...] = ()
     exactly: bool = False
+    some: bool = False
     instead: tuple[str, ...] = ()
     example: str = ""
     elsewhere: Mapping[str, str] = field(default_factory=dict)
@@ -382,6 +383,8 @@ class Record(Kind):
             reader.error(node.entries[name][0], message, "give one of them")
         if self.exactly and not forms and not strange and not any(name in node.entries for name in self.instead):
             reader.error(node, f"{self.what}: one of {', '.join(self.one)} is needed")
+        if self.some and not node.entries:
+            reader.error(node, f"{self.what}: one of {', '.join(known)} is needed")
 
     def schema(self) -> Schema:
         properties = {}
@@ -392,6 +395,8 @@ class Record(Kind):
         schema: Schema = {"type": "object", "properties": properties, "additionalProperties": False}
         if required := [f.key for f in self.fields if f.required]:
             schema["required"] = required
+        if self.some:
+            schema["minProperties"] = 1
         if self.exactly:
             exclusive: Schema = {"oneOf": [{"required": [key]} for key in self.one]}
             others = [{"required": [key]} for key in self.instead]

@@ -58,6 +58,8 @@ CELLS = 8_000_000
 PROOF_PRODUCTS = 20_000_000
 #: Seeds of noise have 64 bits, members of an ensemble 32.
 SEED, MEMBERS = 2**64 - 1, 2**32
+#: Seed of a sweep: a word of the counter-based generator, with its sign bit left free.
+SWEEP_SEED = 2**63 - 1
 #: Sources of noise.
 SOURCES = 64
 #: Members of a sweep.

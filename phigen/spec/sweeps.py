@@ -8,14 +8,19 @@ from typing import Any
 
 from phigen.spec import limits
 from phigen.spec.declarations import Declarations
+from phigen.spec.kinds import Integer, Kind, Text
 from phigen.spec.model import Axis, Run, Statistic, Sweep
 from phigen.spec.names import KEPT, SWEEP_NAMES
 from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
 
-#: What ``over`` may hold besides ranges, each a word or a number.
-_WORDS = ("random", "seed", "file")
+#: What ``over`` may hold besides ranges.
+_WORDS: Mapping[str, Kind] = {
+    "random": Integer(1, limits.SWEPT, limit=True),
+    "seed": Integer(0, limits.SWEEP_SEED, limit=True),
+    "file": Text(),
+}
 
 
 def sweep(
@@ -33,25 +38,25 @@ def sweep(
     if run not in runs:
         hint = did_you_mean(run, runs) or "runs: holds the experiments of a spec"
         _fail((*place, "run"), f"there is no run {shown(run)}" if run else "the spec has no runs", declared, hint)
-    words: dict[str, str] = {}
+    words: dict[str, Any] = {}
     axes: list[Axis] = []
     for key, (node, value) in (raw.get("over") or {}).items():
         if isinstance(value, Scalar) and key in _WORDS and key not in declared.parameters:
-            words[key] = value.text
+            words[key] = _WORDS[key].read(value, (key,), declared.reader)
         elif value is not None:
             axes += _axis(node, value, declared)
     found = Sweep(
         name=name,
         run=run,
         over=tuple(axes),
-        random=_integer((*place, "over", "random"), words, limits.SWEPT, declared),
-        seed=_integer((*place, "over", "seed"), words, 2**63 - 1, declared),
-        file=words.get("file", ""),
+        random=words.get("random") or 0,
+        seed=words.get("seed") or 0,
+        file=words.get("file") or "",
         keep=_kept(raw.get("keep"), place, declared, observables),
         frames=raw.get("frames", 0),
         description=raw.get("description", ""),
     )
-    incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or (found.random == 0 and "random" in words)
+    incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or None in words.values()
     _expect_sense(found, runs.get(run), place, declared, incomplete=incomplete)
     if run in runs and (end := end_of_its_own(found, runs[run], monitored=monitored)):
         _fail((*place, "run") if raw.get("run") else place, end, declared, "give it steps: in place of that")
@@ -94,19 +99,6 @@ def _fail(place: tuple[Any, ...], message: str, declared: Declarations, hint: st
     declared.reader.problems.add(message, locations[place], hint, limit=limit)
 
 
-def _integer(place: tuple[Any, ...], words: Mapping[str, str], most: int, declared: Declarations) -> int:
-    text = words.get(place[-1])
-    if text is None:
-        return 0
-    if not text.isdecimal():
-        _fail(place, f"{place[-1]}: expected an integer, found {shown(text)}", declared)
-        return 0
-    value = int(text[:40])
-    if value > most:
-        _fail(place, f"{place[-1]}: {shown(text)} is more than the limit of {most}", declared, limit=True)
-    return min(value, most)
-
-
 def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     """The values of one name: a list, or a range; none where there are errors."""
     name, numbers = key.text, declared.numbers()
@@ -122,12 +114,16 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
             value, f"over: {name} has one value", "give a range, {from: 1, to: 3, count: 100}, or a list"
         )
         return []
+    if name == "seed" and name not in (*declared.parameters, *declared.coordinates):
+        return _draws(key, value, declared)
     if isinstance(value, list):
         values = [declared.number(node, numbers) for node in value]
+        if None in values:
+            return []
         found = Axis(name, tuple(float(v) for v in values if v is not None))
     else:
         ends = [declared.number(value.get(end), numbers) for end in ("from", "to")]
-        if name != "seed" and None in ends:
+        if None in ends:
             declared.reader.error(key, f"over: {name} needs from and to", "{from: 1, to: 3, count: 100}")
             return []
         first, last = (float(end or 0) for end in ends)
@@ -141,6 +137,18 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
     return [found]
 
 
+def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
+    """The numbers of draws, along a dimension of the sweep."""
+    if isinstance(value, list):
+        read = [Integer(0, limits.SWEEP_SEED).read(node, ("seed",), declared.reader) for node in value if node]
+        numbers = tuple(float(n) for n in read if n is not None)
+        return [Axis("seed", numbers)] if len(numbers) == len(value) else []
+    if "count" not in value or len(value) > 1:
+        declared.reader.error(key, "over: seed numbers draws: it has a count, and nothing else", "seed: {count: 10}")
+        return []
+    return [Axis("seed", count=value["count"])]
+
+
 def _expect_sense(
     found: Sweep, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
 ) -> None:
@@ -151,7 +159,7 @@ def _expect_sense(
         _fail(over, "over: a file has all values; it stands alone", declared)
     if found.random and grid:
         _fail(over, f"over: {grid[0].name} has a count, but random members are drawn", declared, "leave out the count")
-    if drawn and not (found.random or any(axis.name == "seed" for axis in grid)):
+    if drawn and not (found.random or incomplete or any(axis.name == "seed" for axis in grid)):
         hint = "add a count, or seed: {count: 10} for so many draws"
         _fail((*over, drawn[0].name), f"over: {drawn[0].name} has no count", declared, hint)
     if not (found.over or found.file or incomplete):

@@ -9,8 +9,9 @@ from collections.abc import Mapping
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
+from phigen.spec.kinds import Choice, Formula, Integer, Kind
 from phigen.spec.model import Values
-from phigen.spec.problems import did_you_mean, one_of, shown
+from phigen.spec.problems import did_you_mean, shown
 from phigen.spec.yaml_source import Scalar
 
 if TYPE_CHECKING:
@@ -18,7 +19,14 @@ if TYPE_CHECKING:
 
 DISTRIBUTIONS = ("normal", "uniform", "sphere")
 FILES = (".npy", ".csv")
-RANDOM_KEYS = ("random", "seed", "scale", "mean")
+_RANDOM: Mapping[str, Kind] = {
+    "random": Choice(DISTRIBUTIONS),
+    "seed": Integer(0, 10**9 - 1),
+    "scale": Formula(constant=True),
+    "mean": Formula(),
+}
+RANDOM_KEYS = tuple(_RANDOM)
+_WHOLE_SPHERE = "initial: {random: sphere}"
 
 
 def values(given: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
@@ -40,24 +48,34 @@ def values(given: Any, declared: Declarations, *, whole: bool = False) -> Values
 
 
 def _random(given: Mapping[str, Any], declared: Declarations, whole: bool) -> Values | None:
-    reader, read = declared.reader, {key: node for key, (_, node) in given.items()}
+    """Random values: every key of their mapping is honoured, or reported."""
+    reader, before = declared.reader, len(declared.reader.problems.found)
     for key, (node, _) in given.items():
         if key not in RANDOM_KEYS:
             hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
             reader.error(node, f"random values have no key {shown(key)}", hint)
-    kind, seed, scale, mean = map(read.get, RANDOM_KEYS)
-    if not isinstance(kind, Scalar):
-        first = next(iter(given.values()))[0] if given else None
-        return first and reader.error(first, "values are a number, a formula, a list, or {random: …, seed: …}")
-    if kind.text not in DISTRIBUTIONS:
-        return reader.error(kind, f"random: {kind.text!r} is not known", one_of(DISTRIBUTIONS))
-    if kind.text == "sphere" and not whole:
-        return reader.error(kind, "random: sphere is for all fields of a site together", "initial: {random: sphere}")
-    if seed is not None and not (isinstance(seed, Scalar) and seed.text.isdigit() and len(seed.text) < 10):
-        return reader.error(seed, "seed: expected a whole number below 10⁹")
-    if mean is not None and kind.text == "sphere":
-        return reader.error(mean, "mean: a sphere is that around 0")
-    factor = declared.number(scale, declared.numbers()) if isinstance(scale, Scalar) else Fraction(1)
-    around = declared.formula(mean, declared.site_numbers()) if isinstance(mean, Scalar) else None
-    number = int(seed.text) if seed else 0
-    return Values(random=kind.text, seed=number, scale=factor or Fraction(1), formula=around)
+    if "random" not in given:
+        first = next(iter(given.values()))[0]
+        return reader.error(first, "values are a number, a formula, a list, or {random: …, seed: …}")
+    kind, seed, scale, mean = (_option(given, key, declared) for key in RANDOM_KEYS)
+    if kind == "sphere" and not whole:
+        reader.error(given["random"][1], "random: sphere is for all fields of a site together", _WHOLE_SPHERE)
+    if mean is not None and kind == "sphere":
+        reader.error(mean, "mean: a sphere is that around 0")
+        mean = None
+    factor = Fraction(1) if scale is None else declared.number(scale, declared.numbers())
+    around = declared.formula(mean, declared.site_numbers())
+    if kind is None or factor is None or len(reader.problems.found) > before:
+        return None
+    return Values(random=kind, seed=seed or 0, scale=factor, formula=around)
+
+
+def _option(given: Mapping[str, tuple[Scalar, Any]], key: str, declared: Declarations) -> Any:
+    """The value of a key of random values, ``None`` where there is none or where it is wrong, which is reported."""
+    node, value = given.get(key, (None, None))
+    if node is None or value is None:
+        return None
+    if isinstance(value, Scalar):
+        return _RANDOM[key].read(value, (key,), declared.reader)
+    kind = "a list" if isinstance(value, list) else "a mapping"
+    return declared.reader.error(node, f"{key}: expected {_RANDOM[key].expected}, found {kind}")

@@ -192,7 +192,7 @@ def _words(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
         raise TypeError(f"over must map names to ranges or lists, not {over!r}")
     parameters = {p.name for p in spec.parameters}
     found: dict[str, Any] = {}
-    for key, least, most in (("random", 1, limits.SWEPT), ("seed", 0, 2**63 - 1)):
+    for key, least, most in (("random", 1, limits.SWEPT), ("seed", 0, limits.SWEEP_SEED)):
         if key in over and key not in parameters and not (key == "seed" and isinstance(over[key], Mapping)):
             found[key] = arguments.count(over[key], f"over: {key}", least, most)
     if "file" in over and "file" not in parameters:
@@ -206,18 +206,25 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
         raise ValueError(f"over: {name!r} is not a parameter or a coordinate; there are {', '.join(known)}")
     if name == "start" and name not in known[: -len(SWEEP_NAMES)] and not spec.time:
         raise ValueError("over: start: this system has no time")
+    numbers_draws = name == "seed" and name not in known[: -len(SWEEP_NAMES)]
     if isinstance(value, Mapping):
-        return _range(name, value)
+        return _draws(value) if numbers_draws else _range(name, value)
     values = _numbers(value, f"over: {name}") if np.ndim(value) else []
     if not values:
         raise ValueError(f"over: {name} must be a range, or a list of finite numbers")
     return Axis(name, tuple(values))
 
 
+def _draws(value: Mapping[str, Any]) -> Axis:
+    """The numbers of draws, along a dimension of the sweep."""
+    if set(value) != {"count"}:
+        raise ValueError(f"over: seed numbers draws: it has a count, and nothing else, not {dict(value)!r}")
+    return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))
+
+
 def _range(name: str, value: Mapping[str, Any]) -> Axis:
     """The axis of a range in words."""
-    needed = () if name == "seed" else ("from", "to")
-    for word in (*value, *needed):
+    for word in (*value, "from", "to"):
         if word not in ("from", "to", "count", "scale") or word not in value:
             raise ValueError(f"over: {name} needs from and to, and may have count and scale, not {dict(value)!r}")
     first, last = (arguments.number(value.get(end, 0), f"over: {name}: {end}") for end in ("from", "to"))

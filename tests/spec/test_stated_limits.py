@@ -36,6 +36,7 @@ ROWS = {
     "SERIES_TERMS": "terms of one S_i",
     "CELLS": "exponents of all monomials of one S_h, and of its derivatives",
     "PROOF_PRODUCTS": "products of terms in the proof of a bi-realisation",
+    "SWEEP_SEED": "seed of a sweep",
     "SEED": "seed of noise",
     "MEMBERS": "members of a run",
     "SOURCES": "sources of noise",
