@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 215ef30b763f78aa42774602c18200929a90dcacd15b85b6bee4c55e825d845a
+ * body-sha256: 9973c63c32d512d0a8b4d35f1fb463dfe846a7a54898cdae6324089b79a12a81
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -368,13 +368,13 @@ class Sites {
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
     for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...given })) {
-      let length = AT_SITES.includes(name) ? this.count : 0;
-      const values = typeof value === "object" && length ? finite(value, length, name) : [value];
+      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: one number
+      const listed = typeof value === "object" && length !== undefined;
+      const values = listed ? finite(value, length, name) : [value];
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
         throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
       }
-      const whole = () => (values.length === length ? values : new Float64Array(length).fill(value));
-      params[name] = length ? whole() : value;
+      params[name] = listed ? values : length === undefined ? value : new Float64Array(length).fill(value);
     }
     return Object.freeze(params);
   }

@@ -451,8 +451,9 @@ class Sweeps(_Scheduled):
     @property
     def tangents(self) -> tuple[tuple[Sweep, ...], ...]:
         """The derivatives of the sweeps of each part; nothing where they were not asked for."""
-        found = tuple(tuple(sweep.tangent for sweep in part if sweep.tangent) for part in self.parts)
-        return found if any(found) else ()
+        if any(sweep.tangent is None for part in self.parts for sweep in part):
+            return ()
+        return tuple(tuple(sweep.tangent for sweep in part if sweep.tangent) for part in self.parts)
 
     @property
     def others(self) -> Partners:

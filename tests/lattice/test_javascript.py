@@ -57,6 +57,26 @@ poisson: {canonical: {q: [near_0], p: [count]}}
 hamiltonian: delete*count**2/2 + sites*cos(near_0[i+1] - near_0[j-1]) + sweep1*near_0**4 + coef*near_0
 runs: {r: {sizes: [3, 3], initial: {random: normal, seed: 3}, step: 0.1, steps: 8}}
 """
+#: Springs between sites, none of which is there; and a ring without brackets.
+NO_BONDS = """\
+phigen: 1
+name: apart
+lattice: {graph: bonds}
+coordinates: [q, p]
+parameters: {k: {value: 1, at: bonds}, l: {value: 2, at: bonds}, m: {value: [1, 2, 3], at: sites}}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: {sites: p**2/(2*m) + q**4, bonds: "k*(q[a] - q[b] - l)**2/2"}
+runs: {r: {sizes: [3], bonds: [], initial: {q: [1, 0, 2], p: 1}, step: 0.1, steps: 4}}
+"""
+NO_BRACKETS = """\
+phigen: 1
+name: nothing
+lattice: {axes: [i]}
+coordinates: [a]
+poisson: {brackets: {a: {}}}
+hamiltonian: a**2/2 + a*a[i+1]
+runs: {r: {sizes: [3], initial: {a: 1 + i}, step: 0.1, steps: 4}}
+"""
 #: What the corpus does not have: open ends, other schemes and orders, kicks with a modified potential, stiff steps.
 VARIANTS: dict[str, Callable[[], Spec]] = {
     **{name: lambda text=text: specs.loads(text) for name, text in LATTICES.items()},  # type: ignore[misc]
@@ -69,6 +89,8 @@ VARIANTS: dict[str, Callable[[], Spec]] = {
         "poisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: {sites: p**2/2 + q**4/4}\n"
         "runs: {r: {sizes: [4], initial: {random: normal, seed: 3}, step: 0.1, steps: 8}}\n"
     ),
+    "no bonds": lambda: specs.loads(NO_BONDS),
+    "no brackets": lambda: specs.loads(NO_BRACKETS),
     "spins by the series": lambda: replace(specs.loads(LATTICES["spins_2"]), scheme="series"),
     "a graph by the series": lambda: replace(specs.loads(LATTICES["spin_graph"]), scheme="series"),
     "kicks": lambda: replace(specs.loads(LATTICES["fput_open"]), composition="force-gradient"),
@@ -84,8 +106,9 @@ CASES = [*CORPUS, *VARIANTS, *DRIVEN]
 STEPS, T0 = 8, 0.7
 #: Those of the corpus, and of each further kind one.
 pytestmark = pytest.mark.few(
-    *CORPUS, "stiff", "stiff graph", "names", "kicks", "apart", "colours", "spins by the series",
-    "a graph by the series", "melting, in time", "coloured, in time", "damped, forced", "friction, forced", of=CASES,
+    *CORPUS, "stiff", "stiff graph", "names", "apart", "no bonds", "no brackets",
+    "kicks", "colours", "spins by the series", "a graph by the series",
+    "melting, in time", "coloured, in time", "damped, forced", "friction, forced", of=CASES,
 )  # fmt: skip
 
 
@@ -188,6 +211,12 @@ def test_a_step_that_cannot_be_made_leaves_the_state(case: str, answers: dict[st
     assert failure["status"] in ("NOT_FINITE", "NO_CONVERGENCE")
     assert failure["steps"] == STEPS
     assert answers[case]["kept"]
+
+
+def test_one_number_is_the_value_at_all_bonds_of_none(tmp_path: Path, answers: dict[str, dict[str, Any]]) -> None:
+    given = job(tmp_path, "no bonds")
+    given["options"]["params"] = {"k": 1.0, "l": [], "m": [1, 2, 3]}
+    assert node([given])[0]["x"] == answers["no bonds"]["x"]
 
 
 #: Tangent vectors: open ends, colours, a graph of colours, pairs, noise, the series with sweeps and Newton's method.

@@ -13,6 +13,7 @@ import pytest
 from lattice.lattices import with_threads
 from systems import compile_text
 
+import phigen
 from phigen import spec as specs
 from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
@@ -449,6 +450,57 @@ def test_a_run_goes_on_from_its_checkpoint(tmp_path: Any) -> None:
     resumed = found.integrate(x, 0.1, 12, 3, checkpoints=tmp_path / "state")
     assert np.array_equal(resumed.x, whole.x)
     assert not (tmp_path / "state").exists()
+
+
+def test_files_of_interrupted_and_complete_runs_are_respected(tmp_path: Any) -> None:
+    x, found = start("fput"), solver("fput")
+    files = {"output": tmp_path / "frames.npy", "checkpoints": tmp_path / "state"}
+
+    def stop(done: int) -> None:
+        if done == 6:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        found.integrate(x, 0.1, 12, 3, progress=stop, **files)
+    left = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    with pytest.raises(ValueError, match="of an interrupted run: go on with resume=True, or remove it"):
+        found.integrate(x, 0.1, 12, 3, resume=False, **files)
+    with pytest.raises(ValueError, match="the frames of an interrupted run: go on with its checkpoints="):
+        found.integrate(x, 0.1, 12, 3, output=files["output"])
+    assert left == {path: path.read_bytes() for path in tmp_path.iterdir()}
+    whole = found.integrate(x, 0.1, 12, 3, **files)
+    with pytest.raises(ValueError, match="its run is complete, and there is nothing to go on with"):
+        found.integrate(x, 0.1, 12, 3, **files)
+    assert np.array_equal(found.integrate(x, 0.1, 12, 3, resume=False, **files).x, whole.x)
+    assert list(tmp_path.iterdir()) == [files["output"]]
+
+
+def test_a_run_that_fails_leaves_nothing_to_go_on_with(tmp_path: Any) -> None:
+    found = solver("fput")
+    with pytest.raises(StepError):
+        found.integrate(start("fput"), 1e200, 12, 3, output=tmp_path / "frames.npy", checkpoints=tmp_path / "state")
+    assert not list(tmp_path.iterdir())
+
+
+NOTHING_MOVES = {
+    "grid": "lattice: {axes: [i]}\ncoordinates: [a]\npoisson: {brackets: {a: {}}}\nhamiltonian: a**2/2 + a*a[i+1]\n",
+    "graph": "lattice: {graph: g}\ncoordinates: [a]\npoisson: {bonds: {}}\nhamiltonian: {sites: a**2/2}\n",
+    "pairs": "lattice: {pairs: all}\ncoordinates: [a]\npoisson: {brackets: {}}\nhamiltonian: {pairs: 'a[a]*a[b]'}\n",
+    "flat": "lattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: 3\n",
+}
+
+
+@pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", NOTHING_MOVES)
+def test_without_brackets_or_forces_nothing_moves(kind: str, target: str) -> None:
+    spec = specs.loads(f"phigen: 1\nname: nothing\n{NOTHING_MOVES[kind]}")
+    found = phigen.compile(spec, target, tangent=True, adjoint=True)
+    x = np.random.default_rng(1).normal(size=(len(spec.coordinates), 4))
+    more = {"bonds": [[0, 1], [1, 2]]} if kind == "graph" else {}
+    assert np.array_equal(found.integrate(x, 0.1, 3, **more).x, [x] * 4)
+    vectors = np.random.default_rng(2).normal(size=(2, *x.shape))
+    assert np.array_equal(found.step_tangent(x, 0.1, vectors, **more)[1], vectors)
+    assert np.array_equal(found.pullback(x, 0.1, 3, vectors[0], **more).x0_bar, vectors[0])
 
 
 def test_colours_of_a_graph_part_the_ends_of_all_bonds() -> None:

@@ -39,7 +39,8 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     values["equation"] = step.equation is not None
     values["adjoint"] = step.adjoint is not None
     flows = "(part, _), _ in sites.schedule" if step.by_colour else "part, _ in SCHEDULE"
-    values["kept"] = "2 * len(SCHEDULE)" if step.equation else f"sum(len(PARTS[part]) for {flows})"
+    swept = f"sum(len(PARTS[part]) for {flows})" if any(step.parts) else "1"  # where nothing moves, still no 0
+    values["kept"] = "2 * len(SCHEDULE)" if step.equation else swept
     values["pairs"] = step.partners is not None and not graph
     values["sites"] = "_Coloured" if step.by_colour else "_Graph" if graph else "_Sites"
     values["flow"] = "(part, sites.colour), row" if step.by_colour else "part, row"
@@ -58,8 +59,9 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
 
 
-def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]]) -> str:
-    listed = ["    (" + ", ".join(f"_{sweep.kernel.name}" for sweep in part) + ",)," for part in parts]
+def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]], suffix: str = "") -> str:
+    rows = [[f"_{sweep.kernel.name}{suffix}, " for sweep in part] for part in parts]
+    listed = ["    (" + "".join(row).rstrip() + ")," for row in rows]  # () for a part in which nothing moves
     return "\n".join([f"# {comment}", f"{name} = (", *listed, ")\n"])
 
 
@@ -115,5 +117,4 @@ def _transposes(loops: LatticeLoops, lowering: WholeArrays, kernels: Mapping[str
         stages = (step.equation.relax, step.equation.advance)
         yield from (function(staged(kernels[kernel.name + BACK])) for kernel in stages)
     else:
-        listed = ["    (" + ", ".join(f"_{sweep.kernel.name}{BACK}" for sweep in part) + ",)," for part in step.parts]
-        yield "\n".join(["# Their transposes.", "PARTS_BACK = (", *listed, ")\n"])
+        yield _table("PARTS_BACK", "Their transposes.", step.parts, BACK)

@@ -105,16 +105,16 @@ export class Sites {
     if (unknown.length) throw new StepError("BAD_ARGUMENT", 0, `there is no parameter ${unknown[0]}`);
     const params = Object.create(null);
     for (const [name, value] of Object.entries({ ...DEFAULT_PARAMETERS, ...given })) {
-      let length = AT_SITES.includes(name) ? this.count : 0;
+      let length = AT_SITES.includes(name) ? this.count : undefined; // undefined: one number
       // #if GRAPH
       if (AT_BONDS.includes(name)) length = this.bondCount;
       // #endif
-      const values = typeof value === "object" && length ? finite(value, length, name) : [value];
+      const listed = typeof value === "object" && length !== undefined;
+      const values = listed ? finite(value, length, name) : [value];
       if (!values.every((v) => Number.isFinite(v) && (v > 0 || !POSITIVE.includes(name)))) {
         throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
       }
-      const whole = () => (values.length === length ? values : new Float64Array(length).fill(value));
-      params[name] = length ? whole() : value;
+      params[name] = listed ? values : length === undefined ? value : new Float64Array(length).fill(value);
     }
     return Object.freeze(params);
   }
@@ -186,7 +186,7 @@ export class Sites {
       const taken = new Set(others.map((other) => this.colours[other]));
       while (taken.has(this.colours[site])) this.colours[site]++;
     });
-    this.colourCount = Math.max(2, 1 + Math.max(...this.colours));
+    this.colourCount = this.colours.reduce((most, colour) => Math.max(most, 1 + colour), 2);
     // #endif
   }
 
