@@ -12,6 +12,7 @@ import click
 import numpy as np
 
 from phigen.cli.experiment import Experiment
+from phigen.reading import opened, opened_text
 from phigen.runtime.interface import BackendError, Draws, Floats, Interface
 from phigen.runtime.session import Session
 from phigen.runtime.solver import Solver
@@ -60,13 +61,13 @@ def past_of(path: Path, names: Interface, option: str) -> Past:
 
 
 def _of_csv(path: Path) -> Past:
-    with path.open(encoding="utf-8") as file:
+    with opened_text(path) as file:
         header = tuple(file.readline().strip().split(","))
         return Past(header, np.loadtxt(file, delimiter=",", ndmin=2))
 
 
 def _of_npz(path: Path, names: Interface) -> Past:
-    with np.load(path, allow_pickle=False) as stored:
+    with opened(path) as file, np.load(file, allow_pickle=False) as stored:
         found = [(column, stored[column.key]) for column in columns_of(names) if column.key in stored]
     header = tuple(name for column, _ in found for name in column.names)
     return Past(header, np.column_stack([values for _, values in found]))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen.errors import SpecError
+from phigen.lattice.files import bonds_in, values_in
 from phigen.runtime.memory import expect_room
 from phigen.spec.model import LatticeRun, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate
@@ -115,7 +115,10 @@ class _Reader:
 
     def _array(self, values: Values, shape: tuple[int, ...], name: str) -> Floats:
         if values.file:
-            found = self._loaded(values.file, name)
+            try:
+                return values_in(self.folder / values.file, name, shape)
+            except (OSError, ValueError) as error:
+                raise self._refused(name, f"cannot read {values.file!r}: {_reason(error)}") from None
         elif values.listed:
             found = np.array([float(v) for v in values.listed])
             if found.size == np.prod(shape):
@@ -128,45 +131,30 @@ class _Reader:
             found = np.zeros(shape)
         if values.formula is not None:
             found += evaluate([values.formula], self.indices)[0]
-        where = "parameters" if name in {p.name for p in self.spec.parameters} else "initial"
         if found.shape != shape:
             wanted, has = "×".join(map(str, shape)), "×".join(map(str, found.shape))
-            raise self._error(where, f"{name} has {has} values, not {wanted}")
+            raise self._refused(name, f"{has} values, not {wanted}")
         if not np.all(np.isfinite(found)):
-            raise self._error(where, f"{name}: not all values are finite")
+            raise self._refused(name, "not all values are finite")
         return found
 
-    def _loaded(self, file: str, name: str) -> Floats:
-        path = self.folder / file
-        try:
-            loaded = np.load(path, allow_pickle=False) if file.endswith(".npy") else _table(path)[0]
-            return np.asarray(loaded, dtype=np.float64)
-        except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as error:
-            raise self._error("initial", f"{name}: cannot read {file!r}: {_reason(error)}") from None
+    def _refused(self, name: str, message: str) -> SpecError:
+        """The error of the values of a field, of a parameter, or of the whole state, at the place of these."""
+        here = ("runs", self.run.name)
+        paths = [(*here, "parameters", name), ("parameters", name, "value"), (*here, "initial", name)]
+        path = next((p for p in paths if p in self.spec.locations), (*here, "initial"))
+        return SpecError([self.spec.diagnostic(path, f"{name}: {message}")])
 
     def _bonds(self, given: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
         if not isinstance(given.bonds, str):
             return np.array(given.bonds, dtype=np.int64).reshape(-1, 2), {}
         if not given.bonds:
             return np.zeros((0, 2), dtype=np.int64), {}
+        at_bonds = [p.name for p in self.spec.parameters if p.at == "bonds"]
         try:
-            table, names = _table(self.folder / given.bonds)
+            return bonds_in(self.folder / given.bonds, at_bonds)
         except (OSError, ValueError) as error:
             raise self._error("bonds", f"bonds: cannot read {given.bonds!r}: {_reason(error)}") from None
-        ends = table[:, :2]
-        if table.shape[1] < 2 or np.any(ends != np.round(ends)) or np.any(ends < 0) or np.any(ends[:, 0] == ends[:, 1]):
-            raise self._error("bonds", f"bonds: {given.bonds!r} is no list of pairs of different sites, counted from 0")
-        return ends.astype(np.int64), {n: table[:, k].copy() for k, n in enumerate(names) if k > 1}
-
-
-def _table(path: Path) -> tuple[Floats, list[str]]:
-    """The numbers of a CSV file, and the names of its columns where the first line has some."""
-    with path.open(encoding="utf-8") as stream:
-        first = stream.readline()
-        names = [n.strip() for n in first.split(",")] if any(c.isalpha() for c in first.replace("e", "")) else []
-        if not names:
-            stream.seek(0)
-        return np.loadtxt(stream, delimiter=",", ndmin=2), names
 
 
 def _reason(error: Exception) -> str:

@@ -22,15 +22,14 @@ def load(path: str | PathLike[str]) -> Spec:
 
     Raises `SpecError` with all errors found, in the order of the file, or `LimitError` if a limit is exceeded.
     """
-    from pathlib import Path
-
     from phigen.errors import Diagnostic, SpecError
+    from phigen.reading import opened
     from phigen.spec import limits
     from phigen.spec.validate import validate
 
     file = fspath(path)
     try:
-        with Path(file).open("rb") as stream:
+        with opened(file) as stream:
             data = stream.read(limits.FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         if "\n" in file:

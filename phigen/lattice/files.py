@@ -1,0 +1,152 @@
+"""Arrays and bonds of lattices in files: ``.npy`` arrays, and ``.csv`` tables with or without a line of names.
+
+Everything in a file is used or refused: raises `ValueError`, with the line where there is one, and `OSError`.
+"""
+
+from __future__ import annotations
+
+import tokenize
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.reading import opened, opened_text
+from phigen.spec import limits
+from phigen.spec.problems import counted, did_you_mean, one_of, shown
+
+Floats = NDArray[np.float64]
+
+#: Names of the columns of bonds that hold their ends.
+ENDS = ("a", "b")
+
+
+@dataclass(frozen=True)
+class Table:
+    """The numbers of a ``.csv`` file, and the names in its first line, if that has names."""
+
+    path: Path
+    names: tuple[str, ...]
+    rows: Floats
+
+    def line(self, row: int) -> str:
+        """The place of a row in messages."""
+        with opened_text(self.path) as stream:
+            filled = [number for number, text in enumerate(stream, 1) if text.split("#")[0].strip()]
+        return f"line {filled[row + bool(self.names)]}"
+
+
+def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
+    """The array of that shape in a ``.npy`` or ``.csv`` file; a column with a name belongs to the field of it."""
+    if path.suffix == ".npy":
+        return _array(path, shape)
+    table = _table(path)
+    if table.names not in ((), (name,)):
+        raise ValueError(f"its columns are {', '.join(table.names)}; it may have one of the name {name}, or no names")
+    rows = table.rows.reshape(-1) if len(shape) == 1 and 1 in table.rows.shape else table.rows
+    _expect_shape(rows.shape, shape)
+    if not np.isfinite(rows).all():
+        raise ValueError(f"{table.line(int(np.argwhere(~np.isfinite(table.rows))[0][0]))}: not a finite number")
+    return rows
+
+
+def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
+    """The ends of bonds (bonds, 2) in a ``.csv`` file, and the columns of ``parameters``, by name.
+
+    Without names the ends are all there is.
+    """
+    table = _table(path)
+    names = table.names or ENDS
+    _expect_columns(table, names, parameters)
+    ends = table.rows[:, [names.index(end) for end in ENDS]]
+    for wrong, what in (
+        (~np.isfinite(table.rows).all(axis=1), "not all its numbers are finite"),
+        ((ends != np.round(ends)).any(axis=1) | (ends < 0).any(axis=1), "sites are whole numbers, counted from 0"),
+        ((ends >= limits.SITES).any(axis=1), f"a site beyond the limit of {limits.SITES} sites"),
+        (ends[:, 0] == ends[:, 1], "a bond has two different ends"),
+    ):
+        if wrong.any():
+            raise ValueError(f"{table.line(int(np.argmax(wrong)))}: {what}")
+    columns = {name: table.rows[:, k].copy() for k, name in enumerate(names) if name not in ENDS}
+    return ends.astype(np.int64), columns
+
+
+def _expect_columns(table: Table, names: Sequence[str], parameters: Collection[str]) -> None:
+    if not table.names and table.rows.shape[1] != len(ENDS):
+        found = counted(table.rows.shape[1], "column")
+        raise ValueError(f"{found} without names; a first line a,b,… names the ends of bonds and their parameters")
+    repeated = [name for k, name in enumerate(names) if name in names[:k]]
+    if repeated:
+        raise ValueError(f"two columns have the name {shown(repeated[0])}")
+    missing = [end for end in ENDS if end not in names]
+    if missing:
+        raise ValueError(f"there is no column {missing[0]!r}; a and b are the ends of bonds")
+    strange = [name for name in names if name not in (*ENDS, *parameters)]
+    if strange:
+        hint = did_you_mean(strange[0], parameters) or (one_of(parameters) if parameters else "")
+        raise ValueError(f"the column {shown(strange[0])} is no parameter at bonds{hint and '; '}{hint}")
+
+
+def _table(path: Path) -> Table:
+    with opened_text(path) as stream:
+        lines: Iterator[str] = (line for line in stream if line.split("#")[0].strip())
+        first = next(lines, None)
+        if first is None:
+            raise ValueError("it is empty")
+        names = tuple(name.strip().strip('"') for name in first.split(","))
+        if all(map(_is_number, names)):
+            names, lines = (), chain([first], lines)
+        begin = next(lines, None)
+        if begin is None:
+            return Table(path, names, np.zeros((0, len(names))))
+        return Table(path, names, np.loadtxt(chain([begin], lines), delimiter=",", ndmin=2))
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def _array(path: Path, shape: tuple[int, ...]) -> Floats:
+    """The array of a ``.npy`` file; its header is looked at before there is memory for it."""
+    with opened(path) as file:
+        try:
+            found, dtype = _header(file)
+            _expect_shape(found, shape)
+            if dtype.kind not in "buif":
+                what = "complex numbers" if dtype.kind == "c" else f"elements of the kind {dtype}"
+                raise ValueError(f"{what}, not real numbers")
+            file.seek(0)
+            array = np.lib.format.read_array(file, allow_pickle=False)
+            if file.read(1):
+                raise ValueError("there is more in it than one array")
+        except (tokenize.TokenError, SyntaxError, EOFError) as error:
+            raise ValueError(str(error)) from None
+    array = np.asarray(array, dtype=np.float64)
+    if not np.isfinite(array).all():
+        place = tuple(int(k) for k in np.argwhere(~np.isfinite(array))[0])
+        raise ValueError(f"not all values are finite, the first at {list(place)}")
+    return array
+
+
+def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
+    """The shape and the kind of elements."""
+    version = np.lib.format.read_magic(file)
+    readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    if version not in readers:
+        raise ValueError(f"version {version[0]}.{version[1]} of the format .npy is not known")
+    shape, _, dtype = readers[version](file)
+    return shape, dtype
+
+
+def _expect_shape(found: tuple[int, ...], wanted: tuple[int, ...]) -> None:
+    if found != wanted:
+        told, needed = ("×".join(map(str, shape)) or "1" for shape in (found, wanted))
+        raise ValueError(f"{told} values, not {needed}")

@@ -1,0 +1,31 @@
+"""Opening files for reading: regular ones only.
+
+A pipe or a terminal would keep the reader waiting for ever, and devices such as /dev/zero have no end.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from io import TextIOWrapper
+from pathlib import Path
+from typing import BinaryIO
+
+
+def opened(path: str | Path) -> BinaryIO:
+    """Open a regular file. Raises `OSError` naming it for anything else, and `ValueError` for names with zeros."""
+    # Opened without waiting for a writer, and asked what it is afterwards: nothing can be put in its place between.
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise OSError(errno.EINVAL, "it is no regular file", str(path))
+
+
+def opened_text(path: str | Path) -> TextIOWrapper:
+    """Open a regular file of UTF-8 text, with or without a byte order mark. Raises as `opened`."""
+    return TextIOWrapper(opened(path), encoding="utf-8-sig")
