@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
+import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
@@ -96,8 +98,26 @@ def made_by(interface: Interface, files: Mapping[str, str], functions: str, spec
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
 
 
-def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
-    """A new store without members. Raises `OSError`."""
+def create(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> bool:
+    """Make a new store without members; false if somebody else has made one there meanwhile. Raises `OSError`.
+
+    It is made beside its place and moved there: whoever finds a store finds all of it.
+    """
+    temporary = path.with_name(f".phigen-{uuid.uuid4().hex}.zarr")
+    try:
+        _fill(temporary, plan, beside, listed)
+        temporary.rename(path)
+    except OSError:
+        if path.is_dir():
+            return False
+        raise
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return True
+
+
+def _fill(path: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats]) -> None:
+    """The arrays of a store, and what workers need."""
     zarr = imported("zarr")
     root = zarr.open_group(str(path), mode="w-", zarr_format=2)
 

@@ -17,11 +17,13 @@ from phigen.api import chosen_target, compilation_of, interface_of
 from phigen.compilation import Compilation
 from phigen.compiler import emit
 from phigen.errors import Diagnostic, FileError, SpecError
+from phigen.reading import opened_text
 from phigen.runtime.interface import BackendError, Draws, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.memory import expect_room
 from phigen.spec.model import Run, Spec, Sweep
 from phigen.spec.names import KEPT
+from phigen.spec.problems import did_you_mean
 from phigen.study.conservation import LARGE_ENERGY_ERROR
 from phigen.sweeping import cluster, lattices, store
 from phigen.sweeping.plan import Plan, chunk_of
@@ -175,15 +177,16 @@ def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.
 def _created(
     output: Path, plan: Plan, beside: Mapping[str, Any], listed: Mapping[str, Floats], slots: int
 ) -> store.Job:
-    """A new store, in chunks that keep all workers busy."""
+    """A new store, in chunks that keep all workers busy, or the one that somebody has made here meanwhile."""
     job = store.Job(
         None, plan, store.interface_of(beside["interface"]), beside["files"], beside["functions"], beside["spec"]
     )
     seconds = _seconds_of_a_member(job)
     least = 1 if plan.sizes else _LEAST
     members = int(min(max(_SECONDS / seconds, least), _MOST, max(least, plan.size // (4 * slots))))
-    store.create(output, replace(plan, chunk=chunk_of(plan, members)), beside, listed)
-    return store.open_job(str(output))
+    if store.create(output, replace(plan, chunk=chunk_of(plan, members)), beside, listed):
+        return store.open_job(str(output))
+    return _gone_on_with(output, plan, beside)
 
 
 def _seconds_of_a_member(job: store.Job) -> float:
@@ -207,19 +210,29 @@ def _seconds_of_a_member(job: store.Job) -> float:
 
 
 def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:
-    """The columns of a file of members, by their names. Raises `FileError`."""
+    """The columns of a file of members, by their names. Raises `SpecError`, at the place of the file in the spec."""
     path = Path(spec.file).parent / sweep.file
+
+    def refused(why: str, hint: str = "") -> SpecError:
+        place = ("sweeps", sweep.name, "over", "file")
+        return SpecError([spec.diagnostic(place, f"file: cannot read {str(path)!r}: {why}", hint)])
+
     try:
-        with path.open(newline="", encoding="utf-8") as file:
-            names, *rows = [row for row in csv.reader(file) if row]
+        with opened_text(path) as file:
+            names, *rows = [row for row in csv.reader(file) if row] or [[]]
         values = np.array(rows, dtype=np.float64).reshape(len(rows), len(names))
-    except (OSError, ValueError) as error:
-        raise FileError(f"{path}: expected a line of names, and lines of numbers: {error}") from None
+    except OSError as error:
+        raise refused(error.strerror or str(error)) from None
+    except (ValueError, csv.Error) as error:
+        raise refused(f"expected a line of names, and lines of numbers: {error}") from None
     names = [name.strip() for name in names]
     known = {*(spec.coordinates if not spec.lattice else ()), *(p.name for p in spec.parameters), "step"}
     known |= {"start"} if spec.time else set()
     strange = [name for name in names if name not in known]
-    if strange or len(set(names)) < len(names) or not len(rows):
-        why = f"{strange[0]!r} is not a parameter or a coordinate" if strange else "no members, or a name twice"
-        raise FileError(f"{path}: {why}")
+    if strange:
+        raise refused(f"{strange[0]!r} is not a parameter or a coordinate", did_you_mean(strange[0], known))
+    if len(set(names)) < len(names):
+        raise refused("two columns have one name")
+    if not rows:
+        raise refused("it has no members")
     return {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names)}

@@ -19,7 +19,7 @@ from phigen.errors import FileError, SpecError
 from phigen.spec.model import Axis, Sweep
 from phigen.spec.sweeps import end_of_its_own
 from phigen.study.lyapunov import spectrum
-from phigen.sweeping import api
+from phigen.sweeping import api, store
 from phigen.sweeping.plan import Plan, chunk_of, values_of
 
 xarray = pytest.importorskip("xarray")
@@ -336,8 +336,63 @@ def test_a_system_without_a_time_has_no_start_to_vary(spec, tmp_path):
         phigen.sweep(spec, over={"start": [0, 1]})
     (tmp_path / "members.csv").write_text("x1, start\n0.1, 3\n")
     (tmp_path / "s.yaml").write_text(BODY + "sweeps: {listed: {over: {file: members.csv}}}\n")
-    with pytest.raises(FileError, match="'start' is not a parameter"):
+    with pytest.raises(SpecError, match="'start' is not a parameter"):
         phigen.sweep(tmp_path / "s.yaml", output=tmp_path / "s.zarr")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (None, "No such file"),
+        ("", "it has no members"),
+        ("I2\n", "it has no members"),
+        ("I2, I2\n1, 2\n", "two columns have one name"),
+        ("I2, I4\n1, 2\n", "'I4' is not a parameter or a coordinate"),
+        ("I2\n1\nx\n", "expected a line of names, and lines of numbers"),
+        ("I2, I3\n1\n", "expected a line of names, and lines of numbers"),
+    ],
+)
+def test_a_file_of_members_that_cannot_be_read_is_refused_at_its_place(tmp_path, text, why):
+    if text is not None:
+        (tmp_path / "members.csv").write_text(text)
+    (tmp_path / "s.yaml").write_text(BODY + "sweeps: {listed: {over: {file: members.csv}}}\n")
+    with pytest.raises(SpecError, match=why) as error:
+        phigen.sweep(tmp_path / "s.yaml", output=tmp_path / "s.zarr")
+    assert error.value.diagnostics[0].location.column == 32
+
+
+def test_two_sweeps_into_one_new_store_share_it(cluster, tmp_path, monkeypatch):
+    setting = {"over": {"I2": [2.0, 2.5]}, "output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    (tmp_path / "s.yaml").write_text(BODY)
+    create, others = store.create, []
+
+    def another_first(*arguments):
+        if not others:
+            others.append(0)
+            others[0] = phigen.sweep(tmp_path / "s.yaml", **setting).load()
+        return create(*arguments)
+
+    monkeypatch.setattr(store, "create", another_first)
+    data = phigen.sweep(tmp_path / "s.yaml", **setting)
+    assert (data.status == 0).all()
+    assert data.equals(others[0])
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_another_sweep_into_a_store_that_is_being_made_is_refused(cluster, tmp_path, monkeypatch):
+    setting = {"output": tmp_path / "s.zarr", "scheduler": cluster.scheduler_address}
+    (tmp_path / "s.yaml").write_text(BODY)
+    create, others = store.create, []
+
+    def another_first(*arguments):
+        if not others:
+            others.append(0)
+            phigen.sweep(tmp_path / "s.yaml", over={"I2": [1.0, 2.5]}, **setting)
+        return create(*arguments)
+
+    monkeypatch.setattr(store, "create", another_first)
+    with pytest.raises(FileError, match="holds another sweep"):
+        phigen.sweep(tmp_path / "s.yaml", over={"I2": [2.0, 2.5]}, **setting)
 
 
 def test_members_of_a_file_are_made_in_its_order(cluster, tmp_path):
