@@ -25,9 +25,11 @@ from typing import Any
 import numpy as np
 
 from phigen.errors import MissingPackageError, StepError
+from phigen.reading import opened
 from phigen.runtime import arguments
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.c_lattice import CLattice, CLatticeSession, Stage
+from phigen.runtime.checkpoint import objection, objection_to_frames
 from phigen.runtime.interface import Draws, Floats, row_steps
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.memory import filled
@@ -93,6 +95,7 @@ class DistributedLattice:
         sizes: Sequence[int] | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
+        resume: bool = True,
         progress: Callable[[int], Any] | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
@@ -102,10 +105,15 @@ class DistributedLattice:
         ``x0`` is an array (coordinates, *sizes), or a function that gives its planes, x0(from, to) of shape
         (coordinates, to - from, …), and then needs ``sizes``; parameters at sites likewise. Frames go to ``output``, a
         ``.npy`` file that all processes write to. With ``checkpoints``, a path, the state is kept at every frame; the
-        same call goes on from it, on any number of processes. Raises `StepError` on all processes.
+        same call goes on from it, on any number of processes; ``resume=False`` begins anew, where no interrupted run
+        is. Raises on all processes: `StepError`, and `ValueError` where files are of an interrupted run, or of a
+        complete one that was to go on.
         """
         if checkpoints and not output:
             raise ValueError("checkpoints= needs output=, where the frames are of a run that was interrupted")
+        paths = Path(output) if output else None, Path(checkpoints) if checkpoints else None
+        if refused := self.comm.bcast(_objection(*paths, resume=resume) if self.comm.rank == 0 else ""):
+            raise ValueError(refused)
         whole = tuple(sizes) if sizes is not None else np.shape(x0)[1:]
         h, steps, stride = (
             arguments.step_size(h),
@@ -129,8 +137,16 @@ class DistributedLattice:
                     kept.save(energy)
                 if progress:
                     progress(int(marks[k]))
-        finally:
+        except StepError:  # on all processes; the run cannot be gone on with
             frames.close()
+            frames.discard()
+            if kept:
+                kept.remove()
+            raise
+        except BaseException:
+            frames.close()
+            raise
+        frames.close()
         frames.finish()
         if kept:
             kept.remove()
@@ -358,6 +374,18 @@ class _Domain:
         return np.array([values[self.own[0] : self.own[1]] for values in self.saved])
 
 
+def _part(path: Path) -> Path:
+    """Where frames are until all of them are there."""
+    return path.with_name(path.name + ".part")
+
+
+def _objection(output: Path | None, checkpoints: Path | None, *, resume: bool) -> str:
+    """Why a run may not begin, or go on, with these files; "" where it may."""
+    if checkpoints:
+        return objection(checkpoints, output, resume=resume, how="resume=True")
+    return objection_to_frames(_part(output)) if output else ""
+
+
 class _Shared:
     """A ``.npy`` file of arrays (…, coordinates, *sizes) that all processes write and read their planes of."""
 
@@ -367,10 +395,13 @@ class _Shared:
             with path.open("wb") as file:
                 np.lib.format.write_array_header_2_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
         domain.comm.barrier()
-        with path.open("rb") as file:
+        with opened(path) as file:
             np.lib.format.read_magic(file)
-            np.lib.format.read_array_header_2_0(file)
+            stored, _, _ = np.lib.format.read_array_header_2_0(file)
             self.start = file.tell()
+        if stored != shape:
+            raise ValueError(f"{path} does not hold arrays of this run")
+        self.path = path
         mpi = _mpi()
         self.file = mpi.File.Open(domain.comm, str(path), mpi.MODE_RDWR)
 
@@ -386,6 +417,8 @@ class _Shared:
 
     def read(self) -> Floats:
         """The own planes of the first array."""
+        if self.file.Get_size() < self.start + 8 * self.domain.fields * math.prod(self.domain.sizes):
+            raise ValueError(f"{self.path} is shorter than a state of this run")
         first, end = self.domain.planes
         x = np.empty((self.domain.fields, end - first, *self.domain.sizes[1:]))
         for field in range(len(x)):
@@ -407,7 +440,7 @@ class _Frames:
             return
         if path.suffix != ".npy":
             raise ValueError(f"frames of processes go to files that end in .npy, not {str(path)!r}")
-        self.part = path.with_name(path.name + ".part")
+        self.part = _part(path)
         self.file = _Shared(domain, self.part, shape, new=new)
 
     def put(self, k: int) -> None:
@@ -420,6 +453,13 @@ class _Frames:
     def close(self) -> None:
         if self.path:
             self.file.close()
+
+    def discard(self) -> None:
+        """Remove the file."""
+        self.domain.comm.barrier()
+        if self.path and self.domain.comm.rank == 0:
+            self.part.unlink(missing_ok=True)
+        self.domain.comm.barrier()
 
     def finish(self) -> None:
         """Give the file its name."""
@@ -469,7 +509,10 @@ class _Kept:
         return energy
 
     def _text(self) -> str:
-        return self.path.read_text(encoding="utf-8") if self.path.exists() else ""
+        if not self.path.exists():
+            return ""
+        with opened(self.path) as file:
+            return file.read().decode()
 
     def remove(self) -> None:
         """At the end of the run."""

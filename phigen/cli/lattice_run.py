@@ -107,16 +107,22 @@ def _integrated(
     resume: bool,
 ) -> tuple[LatticeTrajectory, StepError | None]:
     """The frames of a run, and why it did not come to its end if it did not."""
+    from phigen.runtime.checkpoint import MismatchError, objection
+
     kept = output.with_name(output.name + ".checkpoint") if output else None
-    if kept and not resume:
-        kept.unlink(missing_ok=True)
+    if kept is None and resume:
+        raise click.UsageError("--resume goes on with files: give those of the interrupted run by --output")
+    if kept and (refused := objection(kept, output, resume=resume, how="--resume")):
+        raise click.UsageError(refused)
     with console.progress(f"{spec.name} {run.name}", run.steps) as progress:
         try:
             return solver.integrate(
                 start.state, float(run.step), run.steps, run.stride,
                 t0=float(run.start) if spec.time else None, seed=run.seed if spec.noise else None,
-                output=output, checkpoints=kept, progress=progress, parameters=parameters,
+                output=output, checkpoints=kept, resume=resume, progress=progress, parameters=parameters,
             ), None  # fmt: skip
+        except MismatchError as error:
+            raise click.UsageError(str(error)) from None
         except StepError as error:
             return error.trajectory, error
 

@@ -21,7 +21,7 @@ from phigen.cli.past import begun, columns_of
 from phigen.compilation import Compilation
 from phigen.errors import FileError, StepError
 from phigen.runtime import checkpoint
-from phigen.runtime.checkpoint import Checkpoint, MismatchError
+from phigen.runtime.checkpoint import Checkpoint, MismatchError, objection
 from phigen.runtime.crossings import CrossingFinder, section_columns
 from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.march import Piece, march, march_at, standing
@@ -35,6 +35,8 @@ from phigen.study.sections import function_of
 from phigen.study.sketch import POINTS, Sketch, Thinned
 from phigen.study.summary import Watch
 from phigen.symbolic.readable import readable
+
+_NO_FILES = "--resume goes on with files: give those of the interrupted run by --output or --section"
 
 #: Seconds between two checkpoints.
 CHECKPOINT_SECONDS = 2.0
@@ -301,13 +303,11 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
     path, output = recorder.files.checkpoint, recorder.files.output or recorder.files.section
     if path is None or output is None:
         if resume:
-            raise click.UsageError(
-                "--resume goes on with files: give those of the interrupted run by --output or --section"
-            )
+            raise click.UsageError(_NO_FILES)
         recorder.start()
         return recorder
-    if not resume and path.exists():
-        raise click.UsageError(f"{path} is there, of an interrupted run: go on with --resume, or remove it")
+    if refused := objection(path, output, resume=resume, how="--resume"):
+        raise click.UsageError(refused)
     if resume and path.exists():
         try:
             recorder.resume(path)
@@ -315,10 +315,6 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
             raise click.UsageError(str(error)) from None
         console.note(f"going on after {recorder.steps} of {recorder.experiment.run.steps} steps")
         return recorder
-    if resume and output.exists():
-        raise click.UsageError(
-            f"{output} is there, but not {path}: its run is complete, and there is nothing to go on with"
-        )
     try:
         recorder.start()
         recorder.save()

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from phigen.reading import opened
 from phigen.writing import replacing
 
 _IDENTITY = "identity"
@@ -37,10 +38,29 @@ class Checkpoint:
             np.savez(file, allow_pickle=False, **stored)
 
 
+def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) -> str:
+    """Why a run may not begin, or go on, with these files; "" where it may. ``how`` names the way to go on.
+
+    What an interrupted run left is not overwritten, and a run that is complete is not made again by going on with it.
+    """
+    if not resume and checkpoint.exists():
+        return f"{checkpoint} is there, of an interrupted run: go on with {how}, or remove it"
+    if resume and output is not None and output.exists() and not checkpoint.exists():
+        return f"{output} is there, but not {checkpoint}: its run is complete, and there is nothing to go on with"
+    return ""
+
+
+def objection_to_frames(part: Path) -> str:
+    """Why a run without checkpoints may not put its frames into that file; "" where it may."""
+    if not part.exists():
+        return ""
+    return f"{part} is there, the frames of an interrupted run: go on with its checkpoints=, or remove it"
+
+
 def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:
     """The arrays of a checkpoint of that run; raises `MismatchError`, also for a file that is no checkpoint."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        with opened(path) as file, np.load(file, allow_pickle=False) as stored:
             arrays = {name: stored[name] for name in stored.files}
         found = json.loads(arrays.pop(_IDENTITY).tobytes())
     except (ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:

@@ -289,6 +289,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         step0: int | None = None,
         output: str | Path | None = None,
         checkpoints: str | Path | None = None,
+        resume: bool = True,
         progress: Progress | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
@@ -299,8 +300,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         site are a function of ``seed``, ``member``, the number of the step, which begins with ``step0``, and the site.
         With ``output``, a path that ends in .npy or .npz, frames go to that file one by one. With ``checkpoints``, a
         path, the state is kept there at every frame; a call with the same arguments goes on from it, and removes it at
-        the end. ``progress`` is called after each frame with the number of steps done. Raises `StepError`, whose
-        ``trajectory`` ends with the state before the failing step.
+        the end. ``resume=False`` begins anew, where no interrupted run is. ``progress`` is called after each frame with
+        the number of steps done. Raises `StepError`, whose ``trajectory`` ends with the state before the failing step,
+        and `ValueError` where files are of an interrupted run, or of a complete one that was to go on.
         """
         drawn = {"seed": seed, "member": member, "step0": step0}
         at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
@@ -308,10 +310,11 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         marks = row_steps(steps, stride)
         frames = Frames(stream_path(output) if output else None, (len(marks), *at.x.shape))
         run = LatticeRun(self, at, marks, frames, Path(checkpoints) if checkpoints else None)
+        run.expect_place(resume=resume)
         try:
             count = run.made(progress)
         except BackendError as error:
-            frames.discard()
+            run.discard()
             run.energy.append(run.session.hamiltonian())
             kept = np.array([*frames.kept(run.count), error.states[-1]])
             t = np.array([at.t0 + at.h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
@@ -320,6 +323,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         t = np.asarray(at.t0 + at.h * marks[:count], dtype=np.float64)
         found = self._trajectory(t, frames.array, np.array(run.energy), steps, at)
         frames.finish(found)
+        run.forget()
         return found
 
     def run(

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from phigen.reading import opened
 from phigen.runtime import checkpoint
-from phigen.runtime.checkpoint import Checkpoint
+from phigen.runtime.checkpoint import Checkpoint, MismatchError
 from phigen.runtime.interface import FIRST_DRAWS, Floats, Progress
 from phigen.runtime.memory import filled
 
@@ -53,9 +54,26 @@ class LatticeRun:
             self._save(mark)
             if progress:
                 progress(mark)
+        return self.count
+
+    def expect_place(self, *, resume: bool) -> None:
+        """Refuse to overwrite what an interrupted run left, and to go on with a complete one. Raises `ValueError`."""
+        if self.checkpoints:
+            refused = checkpoint.objection(self.checkpoints, self.frames.path, resume=resume, how="resume=True")
+        else:
+            refused = self.frames.objection()
+        if refused:
+            raise ValueError(refused)
+
+    def discard(self) -> None:
+        """Leave no files of a run that failed, or that cannot be gone on with."""
+        self.frames.discard()
+        self.forget()
+
+    def forget(self) -> None:
+        """Remove the checkpoint."""
         if self.checkpoints:
             self.checkpoints.unlink(missing_ok=True)
-        return self.count
 
     def _store(self, state: Floats) -> None:
         self.frames.put(self.count, state)
@@ -89,6 +107,8 @@ class LatticeRun:
         arrays = checkpoint.load(self.checkpoints, self._identity())
         self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
         self.frames.restore(arrays.get("frames"), self.count)
+        if not np.array_equal(self.frames.array[self.count - 1], arrays["state"], equal_nan=True):
+            raise MismatchError(f"the frames beside {self.checkpoints} are not those of its run")
         self.saved = arrays
         return np.asarray(arrays["state"])
 
@@ -129,10 +149,20 @@ class Frames:
         """Go on after the first frames."""
         if frames is not None:
             self.array[:count] = frames
-        elif self._part is not None and self._part.exists():
-            self._array = np.lib.format.open_memmap(self._part, "r+")
-            if self._array.shape != self._shape:
-                raise ValueError(f"{self._part} does not hold the frames of this run")
+        elif self._part is not None:
+            try:
+                with opened(self._part):  # a pipe would be waited for
+                    self._array = np.lib.format.open_memmap(self._part, "r+")
+            except (OSError, ValueError) as error:
+                raise MismatchError(
+                    f"{self._part}, the frames of the interrupted run, cannot be read: {error}"
+                ) from None
+            if self._array.shape != self._shape or self._array.dtype != np.float64:
+                raise MismatchError(f"{self._part} does not hold the frames of this run")
+
+    def objection(self) -> str:
+        """Why a run without checkpoints may not put its frames here; "" where it may."""
+        return "" if self._part is None else checkpoint.objection_to_frames(self._part)
 
     def discard(self) -> None:
         """Remove the file of a run that failed; what was mapped from it stays readable."""

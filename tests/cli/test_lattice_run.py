@@ -218,7 +218,75 @@ def test_a_run_of_other_sizes_is_not_gone_on_with(phigen, chain, tmp_path):
     with pytest.raises(KeyboardInterrupt):
         compile(chain, target="numpy").integrate(np.zeros((2, 12)), 0.05, 40, 10, checkpoints=kept, progress=stop)
     asked = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume", "--sizes", "14")
-    assert "belongs to another run" in phigen(*asked).stderr
+    done = phigen(*asked)
+    assert done.exit_code == 2
+    assert "belongs to another run" in done.stderr
+
+
+@pytest.fixture
+def killed(phigen, chain, tmp_path, monkeypatch):
+    """A run that was killed after its second checkpoint: its command, and the files that it left."""
+    from phigen.runtime.checkpoint import Checkpoint
+
+    save, saved = Checkpoint.save, []
+
+    def last(checkpoint, path):
+        save(checkpoint, path)
+        saved.append(path)
+        if len(saved) == 2:
+            raise KeyboardInterrupt
+
+    command = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz")
+    with monkeypatch.context() as patched:
+        patched.setattr(Checkpoint, "save", last)
+        assert phigen(*command).exit_code == 130
+    return command, files_beside(chain)
+
+
+def files_beside(chain):
+    """The contents of the files in the folder of a spec."""
+    return {path.name: path.read_bytes() for path in chain.parent.iterdir() if path != chain}
+
+
+def test_what_a_killed_run_left_is_not_overwritten(phigen, chain, killed):
+    command, left = killed
+    assert sorted(left) == ["wave.npz.checkpoint", "wave.npz.part.npy"]
+    done = phigen(*command)
+    assert done.exit_code == 2
+    assert "is there, of an interrupted run: go on with --resume, or remove it" in " ".join(done.stderr.split())
+    assert files_beside(chain) == left
+
+
+def test_a_killed_run_goes_on_to_the_same_frames(phigen, chain, killed, tmp_path):
+    command, _ = killed
+    assert phigen(*command, "--resume").exit_code == 0
+    resumed = files_beside(chain)
+    assert list(resumed) == ["wave.npz"]
+    with np.load(tmp_path / "wave.npz") as stored:
+        frames = stored["x"]
+    assert phigen(*command).exit_code == 0  # a run that is complete can be made anew
+    with np.load(tmp_path / "wave.npz") as stored:
+        assert stored["x"].tobytes() == frames.tobytes()
+
+
+def test_a_complete_run_is_not_gone_on_with(phigen, chain, tmp_path):
+    command = ("run", chain, "-t", "numpy", "-o", tmp_path / "wave.npz", "--resume")
+    assert phigen(*command).exit_code == 0  # nothing there yet: from the start
+    before = files_beside(chain)
+    done = phigen(*command)
+    assert done.exit_code == 2
+    assert "its run is complete, and there is nothing to go on with" in " ".join(done.stderr.split())
+    assert files_beside(chain) == before
+    assert "give those of the interrupted run by --output" in phigen("run", chain, "--resume").stderr
+
+
+@pytest.mark.parametrize("harm", [lambda path: path.unlink(), lambda path: np.save(path, np.zeros((5, 2, 12)))])
+def test_frames_of_another_run_are_not_gone_on_with(phigen, chain, killed, tmp_path, harm):
+    harm(tmp_path / "wave.npz.part.npy")
+    done = phigen(*killed[0], "--resume")
+    assert done.exit_code == 2
+    assert "frames" in done.stderr
+    assert (tmp_path / "wave.npz.checkpoint").exists()
 
 
 def test_another_seed_is_that_of_a_spec_with_it(phigen, chain, tmp_path):

@@ -5,10 +5,13 @@ import json
 import pickle
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import pytest
 from mpi4py import MPI
 
+from phigen.errors import StepError
 from phigen.mpi import DistributedLattice
 from phigen.runtime import toolchain
 
@@ -16,6 +19,24 @@ from phigen.runtime import toolchain
 def interrupt(done: int) -> None:
     if done == 20:
         raise KeyboardInterrupt
+
+
+def expect_refused(why: str, **asked: Any) -> None:
+    """A run that would overwrite another, or make it again, is refused by all processes, and changes no file."""
+    before = {path: path.read_bytes() for path in sorted(folder.iterdir())}
+    MPI.COMM_WORLD.barrier()
+    with pytest.raises(ValueError, match=why):
+        lattice.integrate(x0, 0.2, 50, 20, **asked)
+    MPI.COMM_WORLD.barrier()
+    assert before == {path: path.read_bytes() for path in sorted(folder.iterdir())}
+
+
+def expect_failing_run_leaves_nothing() -> None:
+    """A run with a step that cannot be made leaves neither frames nor a checkpoint, as it cannot be gone on with."""
+    files = folder / f"failing_{count}.npy", folder / f"failing_{count}.state"
+    with pytest.raises(StepError):
+        lattice.integrate(x0, 1e300, 50, 1, output=files[0], checkpoints=files[1], parameters=values)
+    assert not list(folder.glob(f"failing_{count}*"))
 
 
 folder, count = Path(sys.argv[1]), MPI.COMM_WORLD.size
@@ -36,6 +57,12 @@ for name in sys.argv[2:]:
     if name == "volterra":
         with contextlib.suppress(KeyboardInterrupt):
             lattice.integrate(x0, 0.2, 50, 20, progress=interrupt, **asked)
+        expect_refused("of an interrupted run: go on with resume=True, or remove it", resume=False, **asked)
+        expect_refused("the frames of an interrupted run", output=output, parameters=values)
     run = lattice.integrate(x0, 0.2, 50, 20, **asked)
+    if name == "volterra":
+        expect_refused("its run is complete, and there is nothing to go on with", **asked)
+        lattice.integrate(x0, 0.2, 50, 20, resume=False, **asked)
+        expect_failing_run_leaves_nothing()
     if MPI.COMM_WORLD.rank == 0:
         np.save(folder / f"{name}_{count}_energy.npy", run.energy)
