@@ -6,10 +6,10 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from phigen.symbolic.expression import Expression, fold, raw, symbol, topological
+from phigen.symbolic.expression import ZERO, Expression, fold, raw, substitute, symbol, symbols_of, topological
 from phigen.symbolic.readable import LONGEST, Formula, expanded
 from phigen.symbolic.readable import readable as as_text
-from phigen.symbolic.symbols import PART, Symbol, plain
+from phigen.symbolic.symbols import MOMENTUM, PART, Symbol, kind_of, plain
 
 #: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
 SMALL, WORTH = 3, 4
@@ -71,10 +71,21 @@ def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, 
     if max(map(len, plainly), default=0) > LONGEST:
         shared, roots = with_names(expressions)
         names = [*named, *(plain(name) for name, _ in shared)]
-        found = _met([*zip(names, as_text([*roots, *(e for _, e in shared)], most), strict=True)], len(named))
+        shown = as_text([*roots, *(e for _, e in shared)], most, vanishing(shared))
+        found = _met([*zip(names, shown, strict=True)], len(named))
         if sum(len(text) for _, text in found) < WORTH_NAMES * sum(map(len, plainly)):
             return found
     return list(zip(named, plainly, strict=True))
+
+
+def vanishing(shared: Sequence[tuple[str, Expression]]) -> list[str]:
+    """The names of those shared parts that are 0 where all covectors are."""
+    zeros: dict[str, Expression] = {}
+    for name, part in shared:
+        zeros |= {s: ZERO for s in symbols_of(part) if kind_of(s) == MOMENTUM}
+        if substitute([part], zeros)[0].is_zero:
+            zeros[name] = ZERO
+    return [name for name, _ in shared if name in zeros]
 
 
 def _met(listed: Sequence[tuple[str, str]], own: int) -> list[tuple[str, str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import lcm
@@ -19,7 +19,7 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.special import SPECIAL
-from phigen.symbolic.symbols import Symbol, plain
+from phigen.symbolic.symbols import MOMENTUM, Symbol, kind_of, plain
 from phigen.symbolic.tower import Poly, Tower, rational
 
 #: Terms of a formula that are shown unless all are asked for.
@@ -83,22 +83,32 @@ def _term(coefficient: Fraction, monomial: str) -> str:
     return monomial if coefficient == 1 else f"{coefficient}*{monomial}"
 
 
-def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN) -> Formula:
-    """The formula of an element of a tower; ``most`` bounds the terms shown, None shows all."""
+def of_polynomial(tower: Tower, element: Poly, most: int | None = SHOWN, small: Collection[str] = ()) -> Formula:
+    """The formula of an element of a tower; ``most`` bounds the terms shown, None shows all.
+
+    If terms are left out, those of the lowest degree in the ``small`` symbols come first, so that they are shown.
+    """
     terms = [(rational(c), tuple(int(e) for e in m)) for m, c in element.to_dict().items()]
     divisor = lcm(*(c.denominator for c, _ in terms)) if terms else 1
     if len(terms) == 1 and terms[0][0].denominator == 1:
         divisor = 1
-    shown = terms if most is None or len(terms) <= most + 1 else terms[:most]
+    shown = terms
+    if most is not None and len(terms) > most + 1:
+        places = [i for i, name in enumerate(tower.symbols) if name in small]
+        shown = sorted(terms, key=lambda term: sum(term[1][i] for i in places))[:most]
     variables = with_plain_names([*(symbol(n) for n in tower.symbols), *(g.expression for g in tower.generators)])
     listed = tuple((c * divisor, _factors(variables, exponents)) for c, exponents in shown)
     return Formula(divisor, listed, len(terms) - len(shown))
 
 
-def readable(expressions: Sequence[Expression], most: int | None = SHOWN) -> list[str]:
-    """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``."""
+def readable(expressions: Sequence[Expression], most: int | None = SHOWN, small: Collection[str] = ()) -> list[str]:
+    """The expressions as text, expanded where that is shorter; covectors are written ``p_NAME``.
+
+    Covectors, and the symbols in ``small``, count as small where terms are left out: see `of_polynomial`.
+    """
+    covectors = (name for name in symbols_of(*expressions) if kind_of(name) == MOMENTUM)
     shown = with_plain_names(expressions)
-    forms = expanded(shown, most)
+    forms = expanded(shown, most, {plain(name) for name in (*covectors, *small)})
     texts = [_written(e) for e in shown]
     return [min((str(f), t), key=len) if f else t for f, t in zip(forms, texts, strict=True)]
 
@@ -166,8 +176,10 @@ def cut(text: str) -> str:
     return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"
 
 
-def expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Formula | None]:
-    """The expressions multiplied out, common factors cancelled, with ``most`` terms shown.
+def expanded(
+    expressions: Sequence[Expression], most: int | None, small: Collection[str] = ()
+) -> Iterator[Formula | None]:
+    """The expressions multiplied out, common factors cancelled, with ``most`` terms shown; ``small`` as above.
 
     None for those that are too large to try.
     """
@@ -176,7 +188,7 @@ def expanded(expressions: Sequence[Expression], most: int | None) -> Iterator[Fo
             yield None
             continue
         tower = Tower(symbols_of(e), [e])
-        yield of_polynomial(tower, tower.reduced(tower.convert(e)), most)
+        yield of_polynomial(tower, tower.reduced(tower.convert(e)), most, small)
 
 
 def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:

@@ -10,7 +10,7 @@ import pytest
 from phigen import resources
 from phigen.compiler import compile_spec
 from phigen.notation import flows, parts
-from phigen.spec import load
+from phigen.spec import load, loads
 from phigen.symbolic.expression import call, symbol, total
 from phigen.symbolic.numeric import evaluate
 from phigen.symbolic.symbols import STEP
@@ -60,3 +60,32 @@ def test_parts_that_only_hidden_terms_mention_are_left_out():
     mentioned = {name for _, text in some for name in re.findall(r"σ_\d+", text)}
     assert 2 < len(some) < len(everything)
     assert [name for name, _ in some[2:]] == [f"σ_{k}" for k in range(1, len(mentioned) + 1)]
+
+
+PENCIL = """phigen: 1
+name: pencil
+coordinates: [a1, a2, b1, b2, b3]
+parameters: {mu: 0.7}
+poisson:
+  brackets:
+    a1: {a2: -a1*a2/2, b1: a1*b1 + mu*a1, b2: -a1*b2 - mu*a1}
+    a2: {b2: a2*b2 + mu*a2, b3: -a2*b3 - mu*a2}
+    b1: {b2: -2*a1**2}
+    b2: {b3: -2*a2**2}
+hamiltonian: b1**2/2 + b2**2/2 + b3**2/2 + a1**2 + a2**2
+order: 2
+"""
+
+
+@pytest.mark.parametrize("most", [2, 3, 8])
+def test_terms_that_are_left_out_are_not_the_leading_ones(most):
+    """What is shown of α(x, p) is x at p = 0."""
+    compilation = compile_spec(loads(PENCIL))
+    names = compilation.system.coordinates
+    maps = {f"α_{c}": e for c, e in zip(names, compilation.chart.alpha, strict=True)}
+    listed = parts.texts(maps, most)
+    assert any("…" in text for _, text in listed)
+    known = {name: 0.3 + k for k, name in enumerate((*names, "mu"))} | {f"p_{c}": 0.0 for c in names}
+    for name, text in reversed(listed):
+        known[name] = eval(re.sub(r" \+ … \(\d+ terms\)", "", text), {}, known)
+    assert [known[f"α_{c}"] for c in names] == pytest.approx([known[c] for c in names])
