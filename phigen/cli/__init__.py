@@ -28,6 +28,7 @@ COMMANDS = {
     "sweep": ("phigen.cli.sweep", "Make a run for many parameters and initial values."),
     "vendor": ("phigen.cli.vendor", "Copy solvers into another project, and check them there."),
     "tune": ("phigen.cli.tune", "Find the cheapest setting and step for an accuracy."),
+    "compare": ("phigen.cli.compare", "Set bi-realisations, schemes and classical methods side by side."),
     "verify": ("phigen.cli.verify", "Build every target and measure what the solvers promise."),
     "report": ("phigen.cli.report", "Write one HTML page: formulas, proofs, measurements, figures."),
     "show": ("phigen.cli.show", "Show the formulas: π, Casimirs, α, β, S_1 … S_k."),

@@ -84,14 +84,9 @@ def command(
         place = ("damping",) if ("damping",) in spec.locations else ("forces",)
         message = "forces change the energy, whose error is none of the method"
         raise SpecError([spec.diagnostic(place, message, "--measure orbit compares with a reference solution")])
-    run = run_of(spec, name)
-    experiment = None if spec.lattice else prepared(spec, name, settings=settings)
     compilation = compile_proved(spec.for_running(profile=profile))
     chosen_target("auto", console.note)
-    if experiment:
-        run, problem = experiment.run, problem_of(compilation, experiment, horizon, console)
-    else:
-        problem = _of_lattice(console, compilation, run, settings, horizon, measure)
+    run, problem = initial_value_problem(console, compilation, name, settings, horizon, measure)
     found = tune(compilation, problem, measure, accuracy, budget, console.note)
     if as_json:
         out_json(described(found, spec, run))
@@ -111,6 +106,23 @@ def command(
 def _expect_positive(value: float | None, option: str) -> None:
     if value is not None and not (value > 0 and math.isfinite(value)):
         raise click.BadParameter(f"{value!r} is not a positive number", param_hint=option)
+
+
+def initial_value_problem(
+    console: Console,
+    compilation: Compilation,
+    name: str | None,
+    settings: tuple[str, ...],
+    horizon: float | None,
+    measure: str,
+) -> tuple[Run, Problem]:
+    """Return the run of that name, the first by default, and its initial value problem; of a lattice on fewer sites."""
+    spec = compilation.spec
+    if spec.lattice:
+        run = run_of(spec, name)
+        return run, _of_lattice(console, compilation, run, settings, horizon, measure)
+    experiment = prepared(spec, name, settings=settings)
+    return experiment.run, problem_of(compilation, experiment, horizon, console)
 
 
 def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:

@@ -29,6 +29,8 @@ from phigen.spec.model import Spec
 from phigen.targets.header import split
 from phigen.tuning.settings import Setting
 
+#: The reason for candidates that were not built before the deadline.
+LATE = "there was no time to build it"
 #: Processes at a time, at most.
 WORKERS = 4
 #: Seconds that a process has to end after it was told to.
@@ -121,7 +123,7 @@ def build_all(
                 running[ours] = (setting, process, time.perf_counter())
             if time.perf_counter() >= deadline:
                 late = [*waiting, *(setting for setting, _, _ in running.values())]
-                yield from ((setting, Refusal("there was no time to build it")) for setting in late)
+                yield from ((setting, Refusal(LATE)) for setting in late)
                 return
             for ready in wait(list(running), max(0.0, deadline - time.perf_counter())):
                 assert isinstance(ready, Connection)

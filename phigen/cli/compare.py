@@ -1,0 +1,134 @@
+"""``phigen compare``: bi-realisations, schemes and classical methods side by side on a run."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from phigen.cli.arguments import FIGURES, file_ending, one_spec, run_option, settings_option
+from phigen.cli.console import Console, heading, out, out_json, pass_console, table, verbosity
+from phigen.cli.sources import load_one
+from phigen.cli.tune import initial_value_problem
+from phigen.errors import SpecError
+
+if TYPE_CHECKING:
+    from phigen.spec.model import Run, Spec
+    from phigen.tuning.comparison import Comparison, Entry
+
+
+@click.command("compare")
+@one_spec
+@run_option
+@click.option("--orders", metavar="N,…", default="2,4", show_default=True, help="Orders of the methods.")
+@click.option(
+    "--equal", type=click.Choice(["step", "work"]), default="step", show_default=True,
+    help="All take the step of the run, or the step that costs what that step costs with the setting of the spec.",
+)  # fmt: skip
+@click.option("--horizon", type=float, metavar="T", help="How long the run is.  [default: as in the spec]")
+@settings_option
+@click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to build.")
+@click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
+              help="Draw errors against cost: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
+@click.option("--json", "as_json", is_flag=True, help="For machines: everything that was measured.")
+@verbosity
+@pass_console
+def command(
+    console: Console,
+    spec_file: str,
+    name: str | None,
+    orders: str,
+    equal: str,
+    horizon: float | None,
+    settings: tuple[str, ...],
+    budget: float,
+    plot: Path | None,
+    as_json: bool,
+) -> None:
+    """Set bi-realisations, schemes and classical methods side by side on a run of a spec.
+
+    For each: steps, CPU time, the errors of energy and Casimirs, the distance from the solution, and the Poisson
+    defect, the largest entry of DΦ π DΦᵀ − π∘Φ with the exact derivative DΦ of a step. Methods that do not apply to
+    the system are left out.
+    """
+    from phigen.compiler import compile_proved
+    from phigen.tuning.comparison import compare
+
+    for value, option in ((horizon, "--horizon"), (budget, "--budget")):
+        if value is not None and not (value > 0 and math.isfinite(value)):
+            raise click.BadParameter(f"{value!r} is not a positive number", param_hint=option)
+    wanted = _orders(orders)
+    if plot:
+        from phigen.drawing.palette import require_matplotlib
+
+        require_matplotlib()
+    spec = load_one(spec_file)
+    _expect_comparable(spec)
+    compilation = compile_proved(spec.for_running(tangent=spec.lattice is None))
+    run, problem = initial_value_problem(console, compilation, name, settings, horizon, "energy")
+    found = compare(compilation, problem, wanted, equal=equal, budget=budget, note=console.note)
+    if as_json:
+        out_json(_described(found, spec, run))
+    else:
+        _print(found, spec, run)
+    if plot:
+        from phigen.drawing import comparison, figures
+
+        figures.save(comparison.figure(found, f"{spec.name}, run {run.name}"), plot)
+        console.note(f"wrote {plot}")
+
+
+def _orders(text: str) -> tuple[int, ...]:
+    words = [word.strip() for word in text.split(",")]
+    if not all(word.isdecimal() and 1 <= int(word) <= 16 for word in words):
+        raise click.BadParameter(f"{text!r} is not a list of orders from 1 to 16, such as 2,4,8", param_hint="--orders")
+    return tuple(dict.fromkeys(int(word) for word in words))
+
+
+def _expect_comparable(spec: Spec) -> None:
+    """Refuse systems that have no conserved energy to compare by."""
+    for key, there in (("noise", spec.noise), ("time", spec.time), ("forces", spec.forces)):
+        if there:
+            place = ("damping",) if key == "forces" and ("damping",) in spec.locations else (key,)
+            message = f"phigen compare is for systems whose energy is conserved, and {place[0]} changes it"
+            raise SpecError([spec.diagnostic(place, message, "phigen verify and phigen run measure one setting")])
+
+
+def _print(found: Comparison, spec: Spec, run: Run) -> None:
+    from phigen.tuning.building import LATE
+
+    said = "the same step" if found.equal == "step" else "the same CPU time"
+    out(heading(f"{spec.name}, run {run.name}") + f": {said}, up to {found.clock} = {found.horizon:.9g}\n")
+    rows = [["", "steps", "ns/step", "run, ms", "energy error", "Casimir error", "orbit error", "Poisson defect"]]
+    rows += [_row(entry) for entry in found.entries if not entry.refusal]
+    for line in table(rows, right=range(1, 8)):
+        out(f"  {line}")
+    out(f"\n  * the setting of the spec. Energy errors are {found.unit}; the orbit error is relative to the largest")
+    out(
+        "  coordinate, where DOP853 with small steps knows the orbit. The Poisson defect is relative to |DΦ| |π| |DΦ|ᵀ."
+    )
+    refused = [entry for entry in found.entries if entry.refusal]
+    for reason in dict.fromkeys(entry.refusal for entry in refused):
+        titles = "; ".join(entry.title for entry in refused if entry.refusal == reason)
+        more = "; a larger --budget builds them" * (reason == LATE)
+        out(f"  Not measured, since {reason}{more}: {titles}.")
+
+
+def _row(entry: Entry) -> list[str]:
+    errors = (entry.error, entry.casimirs, entry.orbit, entry.defect)
+    numbers = ["–" if e is None else f"{e:.1e}" if e else "0" for e in errors]
+    title = f"{entry.title} *" if entry.own else entry.title
+    return [title, str(entry.steps), f"{entry.nanoseconds:.3g}", f"{1e3 * entry.seconds:.3g}", *numbers]
+
+
+def _described(found: Comparison, spec: Spec, run: Run) -> dict[str, object]:
+    from dataclasses import asdict
+
+    from phigen.cli.run_summary import finite
+
+    entries = [{**asdict(entry), "seconds": entry.seconds} for entry in found.entries]
+    about = {"name": spec.name, "run": run.name, "equal": found.equal, "horizon": found.horizon, "unit": found.unit}
+    described: dict[str, object] = finite({**about, "methods": entries})
+    return described

@@ -1,0 +1,41 @@
+"""Figure of a comparison: errors of energy and orbit against the CPU time of the run, a point for each method."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from phigen.drawing.palette import PALETTE, SERIES, styled
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from phigen.tuning.comparison import Comparison
+
+_MARKERS = "osD^vXP*"
+
+
+@styled
+def figure(found: Comparison, title: str) -> Figure:
+    """Return the figure: energy errors on the left, orbit errors on the right where they are known.
+
+    Filled points are Poisson maps by construction.
+    """
+    from matplotlib.figure import Figure
+
+    entries = [entry for entry in found.entries if not entry.refusal]
+    panels = [("energy error", [entry.error for entry in entries])]
+    if any(entry.orbit for entry in entries):
+        panels.append(("orbit error", [entry.orbit or float("nan") for entry in entries]))
+    drawn = Figure(figsize=(4.6 * len(panels) + 2.2, 3.8), layout="constrained")
+    for axes, (label, errors) in zip(drawn.subplots(1, len(panels), squeeze=False)[0], panels, strict=True):
+        for place, (entry, error) in enumerate(zip(entries, errors, strict=True)):
+            colour = SERIES[place % len(SERIES)] if entry.poisson else PALETTE["ink"]
+            axes.plot(
+                1e3 * entry.seconds, error, _MARKERS[place % len(_MARKERS)], color=colour,
+                markerfacecolor=colour if entry.poisson else "none", label=entry.title,
+            )  # fmt: skip
+        axes.set(xscale="log", yscale="log", xlabel="CPU time of the run, ms", ylabel=label)
+        axes.grid(True)
+    drawn.suptitle(title)
+    drawn.legend(*axes.get_legend_handles_labels(), loc="outside right upper", fontsize="small")
+    return drawn

@@ -1,0 +1,217 @@
+"""Realisations, schemes and classical methods side by side on one run: cost, errors, and the Poisson defect.
+
+`tune` looks for the cheapest setting; a comparison shows what each of them does at one step, or for one cost.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from phigen.compilation import Compilation
+from phigen.errors import PhigenError, StepError
+from phigen.runtime.solver import Solver
+from phigen.study import measures
+from phigen.study.methods import Method as Step
+from phigen.study.methods import of_classical, of_solver
+from phigen.symbolic.arrays import Floats, evaluate
+from phigen.tuning.building import Built, Outcome, build_all, built
+from phigen.tuning.problem import Classical, Method, Problem, steps_in
+from phigen.tuning.references import orbit_error
+from phigen.tuning.settings import Setting, own_setting
+from phigen.tuning.timing import nanoseconds_per_step
+from phigen.tuning.trials import MARKS, marks
+
+#: States at which the Poisson defect is measured; the largest counts.
+STATES = 5
+#: Rows at which errors are looked at, at most.
+ROWS = 2000
+#: Classical methods that stand beside, by their names in tables.
+PEERS = {"rk4": "RK4", "dop853": "DOP853"}
+#: Shares of the budget of time: for building, and for the reference of one orbit.
+BUILDING, REFERRING = 0.6, 0.05
+
+Notify = Callable[[str], object]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One method of a comparison; ``refusal`` says why there are no numbers, "" if there are.
+
+    ``error`` of the energy and ``casimirs`` are the largest on the way, ``orbit`` is the distance from the solution at
+    the end, ``defect`` that of DΦ π DΦᵀ = π∘Φ; None where a number is not known. ``nanoseconds`` are those of a step.
+    ``poisson`` tells whether a step is a Poisson map by its construction.
+    """
+
+    title: str
+    order: int
+    step: float = math.nan
+    steps: int = 0
+    nanoseconds: float = math.nan
+    error: float = math.nan
+    casimirs: float | None = None
+    orbit: float | None = None
+    defect: float | None = None
+    poisson: bool = False
+    own: bool = False
+    refusal: str = ""
+
+    @property
+    def seconds(self) -> float:
+        """CPU seconds of the run."""
+        return 1e-9 * self.nanoseconds * self.steps
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """All methods on one run; ``equal`` is ``step`` or ``work``, ``unit`` the kind of unit of energy errors."""
+
+    entries: tuple[Entry, ...]
+    horizon: float
+    equal: str
+    unit: str
+    clock: str
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    """A method before it is measured: as it runs, and as a one-step map where its derivative can be had."""
+
+    title: str
+    order: int
+    method: Method
+    step: Step | None = None
+    poisson: bool = False
+    own: bool = False
+
+
+def compare(
+    compilation: Compilation,
+    problem: Problem,
+    orders: Sequence[int],
+    *,
+    equal: str = "step",
+    budget: float = 60.0,
+    note: Notify = lambda text: None,
+) -> Comparison:
+    """Measure the setting of the spec and all others of these orders, RK4 and DOP853 on one run.
+
+    ``compilation`` and the candidates have tangent maps. With ``equal`` ``work``, each takes the step that costs what
+    the step of the run costs with the setting of the spec. Raises `StepError` if that setting cannot make the run.
+    """
+    start = time.perf_counter()
+    own = own_setting(compilation)
+    made = built(compilation, own, start)
+    candidates = [_of_build(made, problem, own=True)]
+    settings = [s for s in dict.fromkeys(_settings(problem, own, orders)) if s != own]
+    note(f"building {len(settings)} more")
+    refused: list[Entry] = []
+    fingerprints = {made.fingerprint}
+    outcomes: dict[Setting, Outcome] = dict(
+        build_all(compilation.spec, compilation.system, settings, start + BUILDING * budget)
+    )
+    for setting in settings:
+        outcome = outcomes[setting]
+        if not isinstance(outcome, Built):
+            refused += (
+                [] if outcome.inapplicable else [Entry(setting.described(), setting.order, refusal=outcome.reason)]
+            )
+        elif outcome.fingerprint not in fingerprints:
+            fingerprints.add(outcome.fingerprint)
+            candidates.append(_of_build(outcome, problem))
+    state = problem.start.copy()
+    race = problem.classical(compilation, list(PEERS), state)
+    peers = {name: Classical(race.runners[name], state, problem) for name in PEERS if name in race.runners}
+    solver = candidates[0].step and Solver(made.solver(), made.interface)
+    for name, method in peers.items():
+        step = of_classical(name, solver, problem.parameters) if solver and problem.clock == "t" else None
+        candidates.append(_Candidate(PEERS[name], {"rk4": 4, "dop853": 8}[name], method, step))
+    seconds = REFERRING * budget
+    first = _measured(candidates[0], problem, problem.step, peers.get("dop853"), seconds)
+    if first.refusal:
+        raise StepError(f"{problem.system.name}: {first.refusal}", step=0, status="NOT_FINITE")
+    work = first.nanoseconds / first.step if equal == "work" else math.nan
+    entries = [first]
+    for candidate in candidates[1:]:
+        note(candidate.title)
+        h = problem.step
+        if equal == "work":
+            h = nanoseconds_per_step(candidate.method, h, steps_in(problem.horizon, h)) / work
+        entries.append(_measured(candidate, problem, h, peers.get("dop853"), seconds))
+    return Comparison((*entries, *refused), problem.horizon, equal, problem.unit.kind, problem.clock)
+
+
+def _settings(problem: Problem, own: Setting, orders: Sequence[int]) -> list[Setting]:
+    """Return the settings to compare: each bi-realisation and the splitting, at each of the orders it has."""
+    families = dict.fromkeys([own.family, *(guess.family for guess in problem.guesses(own))])
+    return [replace(family, order=order) for family in families for order in orders if order in family.orders]
+
+
+def _of_build(made: Built, problem: Problem, *, own: bool = False) -> _Candidate:
+    backend = made.solver()
+    step = None if problem.sizes else of_solver(Solver(backend, made.interface), problem.parameters)
+    title = made.setting.described(made.kind)
+    return _Candidate(title, made.order, problem.method(backend), step, made.exact, own)
+
+
+def _measured(candidate: _Candidate, problem: Problem, h: float, exact: Method | None, seconds: float) -> Entry:
+    """Measure a method at a step over the whole run."""
+    unmeasured = Entry(candidate.title, candidate.order, poisson=candidate.poisson, own=candidate.own)
+    if not math.isfinite(h):
+        return replace(unmeasured, refusal="a step cannot be made")
+    steps = steps_in(problem.horizon, h)
+    h = problem.horizon / steps
+    states = candidate.method.rows(h, steps, max(1, steps // ROWS))
+    if states is None:
+        return replace(unmeasured, step=h, steps=steps, refusal=f"the run cannot be made with h = {h:.4g}")
+    energies = problem.energies(states)
+    stride, count = marks(problem.horizon, h)
+    listed = candidate.method.rows(h, stride * count, stride) if exact is not None else None
+    orbit = None
+    if listed is not None and exact is not None and len(listed) > MARKS // 8:
+        orbit = orbit_error(listed, stride * h, exact, problem.step, seconds)
+    return replace(
+        unmeasured,
+        step=h,
+        steps=steps,
+        nanoseconds=nanoseconds_per_step(candidate.method, h, steps),
+        error=float(np.max(problem.unit.errors(energies, float(energies[0])))),
+        casimirs=_casimir_error(problem, states),
+        orbit=orbit,
+        defect=_defect(candidate.step, problem, states, h),
+    )
+
+
+def _casimir_error(problem: Problem, states: Floats) -> float | None:
+    """Return the largest error of any Casimir, relative to what its value is the sum of; None without Casimirs."""
+    if problem.sizes or not problem.system.casimirs:
+        return None
+    from phigen.study.conservation import units
+
+    system, casimirs = problem.system, problem.system.casimirs
+    columns: Mapping[str, object] = {c: states[:, i] for i, c in enumerate(system.coordinates)}
+    values = evaluate([*casimirs.values()], {**problem.parameters, **columns})
+    sizes = units(casimirs.values(), system.coordinates, problem.parameters, problem.start)
+    errors = [
+        np.max(u.errors(np.broadcast_to(v, len(states)), float(np.ravel(v)[0])))
+        for u, v in zip(sizes, values, strict=True)
+    ]
+    return float(max(errors))
+
+
+def _defect(step: Step | None, problem: Problem, states: Floats, h: float) -> float | None:
+    """Return the largest Poisson defect at some states of the run; None where the derivative is not to be had."""
+    if step is None:
+        return None
+    chosen = states[np.linspace(0, len(states) - 1, STATES, dtype=int)]
+    try:
+        defects = [
+            measures.poisson_defect(problem.system, problem.parameters, step, x, problem.direction * h) for x in chosen
+        ]
+    except PhigenError:
+        return None
+    return max(defects)
