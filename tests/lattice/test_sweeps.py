@@ -24,7 +24,7 @@ from phigen.lattice.expansion import Expansion, expand
 from phigen.proofs import lattices, statements
 from phigen.runtime.lattice import LatticeSolver
 from phigen.runtime.modules import load_module
-from phigen.spec.model import BirealisationChoice, Extras
+from phigen.spec.model import BirealisationChoice
 from phigen.symbolic.arrays import evaluate
 from phigen.symbolic.verdict import PROVED, REFUTED
 
@@ -555,7 +555,7 @@ def test_a_failing_step_leaves_the_state_before_it() -> None:
 @pytest.mark.parametrize("target", ["c", "numpy"])
 def test_a_step_whose_coefficients_are_not_finite_fails_as_one_whose_state_is_not(target: str) -> None:
     text = f"phigen: 1\nname: pushed\n{TEXTS['fput']}\nforces: {{vector: {{p: -p}}}}\norder: 4\n"
-    compilation = compile_spec(specs.loads(text), extras=Extras(adjoint=True))
+    compilation = compile_spec(specs.loads(text), adjoint=True)
     made, x = lattice_solver_of(compilation, target), np.ones((2, 4))
     for act in (made.integrate, lambda *run: made.pullback(*run, x), lambda *run: made.ensemble(x[None], *run[1:])):
         with pytest.raises(StepError) as failure:
