@@ -14,7 +14,7 @@ from functools import cached_property
 from phigen.ir import nodes as ir
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
-from phigen.scheme.steps import STARTED, VARIED, Ends, Gather, Sweep, Sweeps
+from phigen.scheme.steps import Ends, Gather, Sweep, Sweeps
 from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
@@ -45,10 +45,10 @@ class LatticeLoops:
 
     def stage(self, kernel: Kernel) -> ir.Function:
         """Return the function of a kernel of the equation of a stage, whose fields are those of y."""
-        gather = self.step.others.varied if kernel.name in VARIED else self.step.others.field
+        gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
-        starts, varied = kernel.name in STARTED, kernel.name in VARIED
-        parameters = ("coef", *["start"] * starts, "state", *["varied"] * varied, "sites", "out")
+        starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
+        parameters = ("coef", *starts, "state", *varied, "sites", "out")
         return self._over_sites(kernel, ir.Role.STAGE, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
 
     def observable(self, kernel: Kernel) -> ir.Function:

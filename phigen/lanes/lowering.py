@@ -25,7 +25,7 @@ from phigen.lanes.undoing import undoing
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
-from phigen.scheme.steps import VARIED, Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
+from phigen.scheme.steps import Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import SPECIAL
 
@@ -173,7 +173,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     if program.profile == "small":
         if not (program.extras.tangent or step.adjoint):  # variations are differences of sweeps there
             along = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
-            looped = [kernel for kernel in looped if kernel.name not in {*VARIED, *along}]
+            looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in along]
         return Rows(with_formulas(operations(looped) & set(REACHING)), (), frozenset())
     formed = _called_in_forms(step)
     called = operations(swept) & formed

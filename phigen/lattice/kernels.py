@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from phigen.lattice.cell import Cell
-from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.staging import Coefficients
 from phigen.symbolic.expression import Expression, symbols_of
 from phigen.symbolic.symbols import BEGINS, CHOSEN, GATHERED, INITIAL, PRESENT, VARIATION, kind_of
@@ -18,6 +18,7 @@ def site_kernel(
     values: Sequence[Expression],
     output: str,
     coefficients: Coefficients | None = None,
+    role: Role = Role.OTHER,
 ) -> Kernel:
     """A kernel at a site: inputs are coefficients, or parameters, then what it reads at sites, and the weights."""
     used = symbols_of(*values)
@@ -35,4 +36,4 @@ def site_kernel(
     inputs |= {"bonds": bonds} if bonds else {}
     inputs |= {"varied": of_kind(VARIATION)} if of_kind(VARIATION) else {}
     inputs |= {"start": of_kind(INITIAL)} if of_kind(INITIAL) else {}
-    return Kernel(name, purpose, inputs, (Output(output, tuple(values)),))
+    return Kernel(name, purpose, inputs, (Output(output, tuple(values)),), role=role)

@@ -19,6 +19,7 @@ from phigen.lattice.realisation import CellRealisation, realise_cell
 from phigen.lattice.variations import along, along_start
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.composition import find, orders
+from phigen.scheme.kernel import Role
 from phigen.scheme.order import Order
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Equation
@@ -97,17 +98,20 @@ def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients, *, tangen
     """The kernels of a stage, and those of its derivative if they are asked for."""
     size = len(plan.middle)
     values = coefficients.hoist([*plan.middle.values(), *plan.increment.values()])
-    relax = site_kernel(cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients)
+    relax = site_kernel(
+        cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients, Role.RELAX
+    )
     purpose = "what a stage adds to x at a site, from y around it"
-    advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients)
+    advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
     slopes = coefficients.hoist(along(cell, values[:size]))
-    slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients)
+    slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients, Role.SLOPE)
     if not tangent:
         return Equation(relax, advance, slope)
     starts, ends = (coefficients.hoist(e) for e in (along_start(values[:size]), along(cell, values[size:])))
-    side = site_kernel(cell, "side", "how y at a site follows x there", starts, "v", coefficients)
+    side = site_kernel(cell, "side", "how y at a site follows x there", starts, "v", coefficients, Role.SIDE)
     purpose = "how what a stage adds to x at a site follows y around it"
-    return Equation(relax, advance, slope, (side, site_kernel(cell, "follow", purpose, ends, "v", coefficients)))
+    follow = site_kernel(cell, "follow", purpose, ends, "v", coefficients, Role.FOLLOW)
+    return Equation(relax, advance, slope, (side, follow))
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:

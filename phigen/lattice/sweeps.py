@@ -34,7 +34,7 @@ from phigen.scheme.alternation import schedule as alternating
 from phigen.scheme.choosing import Choice, is_dated, planned, with_carrier
 from phigen.scheme.forces import forces_said
 from phigen.scheme.gathering import staged
-from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.lowering import operation_counts
 from phigen.scheme.noise import noise_said, with_noise
 from phigen.scheme.nystrom import Nystrom
@@ -324,7 +324,7 @@ def _sweep(
     suffix = "_beside" if beside else f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
     where = f" on the seam {flow.window}" if flow.window else " near seams" if beside else ""
     named = f"the flow of {what}{where}: {motion.manner}".replace(KICK, KICK.kind)
-    kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients)
+    kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients, Role.SWEEP)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
     varied = _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
@@ -338,7 +338,7 @@ def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coeffici
     slopes = staged(along(cell, list(motion.increments.values())), coefficients)
     moved = tuple(cell.fields.index(f) for f in motion.increments)
     purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
-    kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients)
+    kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients, Role.SWEEP_TANGENT)
     sums = [replace(s, values=with_variations(cell, s.values)) for s in motion.gathered]
     purpose = "what all other sites b add to forces at a site a, and to their variations"
     return Sweep(kernel, moved, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))

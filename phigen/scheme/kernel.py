@@ -7,11 +7,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum, auto
 
 from phigen.symbolic.expression import Expression
 
 #: Arguments of kernels that are numbers, not arrays: the step, or the time of a flow; the time.
 SCALARS = ("h", "t")
+
+
+class Role(Enum):
+    """Purpose of a kernel at a site of a lattice, by which loops choose the arrays that they read and write."""
+
+    OTHER = auto()
+    SWEEP = auto()  # the change of a state by a flow
+    SWEEP_TANGENT = auto()  # its derivative, the change of a variation
+    RELAX = auto()  # the right-hand side of the equation of a stage
+    ADVANCE = auto()  # what the stage adds to the state
+    SLOPE = auto()  # the derivative of RELAX along a variation of y
+    OWN_SLOPE = auto()  # its part at the site itself, as a matrix
+    SIDE = auto()  # the derivative of RELAX along a variation of x
+    FOLLOW = auto()  # the derivative of ADVANCE along a variation of y
+
+
+#: Kernels that read the start of a stage, and those that read variations.
+_OF_STARTS = frozenset({Role.RELAX, Role.SLOPE, Role.SIDE})
+_OF_VARIATIONS = frozenset({Role.SWEEP_TANGENT, Role.SLOPE, Role.SIDE, Role.FOLLOW})
 
 
 @dataclass(frozen=True)
@@ -35,6 +55,17 @@ class Kernel:
     inputs: Mapping[str, tuple[str, ...]]
     outputs: tuple[Output, ...]
     named: tuple[tuple[str, Expression], ...] = ()
+    role: Role = Role.OTHER
+
+    @property
+    def reads_start(self) -> bool:
+        """Whether the loop of the kernel has the start of a stage at hand."""
+        return self.role in _OF_STARTS
+
+    @property
+    def reads_variations(self) -> bool:
+        """Whether the loop of the kernel has a variation at hand."""
+        return self.role in _OF_VARIATIONS
 
     @property
     def roots(self) -> list[Expression]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen.scheme.alternation import Schedule
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
 
 #: How far an implicit step may lead, in sizes of the state and of what the vector field says, if the energy is lost.
@@ -369,12 +369,7 @@ class Sweep:
     @property
     def is_tangent(self) -> bool:
         """Whether it changes variations."""
-        return self.kernel.name.startswith("tangent")
-
-
-#: The kernels of an equation that read the start of a stage, and those that read variations.
-STARTED = frozenset({"relax", "slope", "side"})
-VARIED = frozenset({"slope", "side", "follow"})
+        return self.kernel.role is Role.SWEEP_TANGENT
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
-from phigen.scheme.steps import BACK, VARIED, Gather, Partners, Sweep, Sweeps
+from phigen.scheme.steps import BACK, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets import lattice
@@ -91,7 +91,7 @@ class Layout:
 
     def gathered(self, kernel: Kernel) -> Gather:
         """What a kernel of the equation of a stage reads of bonds or pairs."""
-        return self.partners.varied if kernel.name in VARIED else self.partners.field
+        return self.partners.varied if kernel.reads_variations else self.partners.field
 
     @property
     def graph(self) -> bool:

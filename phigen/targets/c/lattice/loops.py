@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.lanes.functions import REACHING
-from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep
 from phigen.symbolic import functions as elementary
@@ -34,7 +34,11 @@ def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
     own = {places[s][0]: s for s in relax.inputs["site"] if not any(places[s][1])}
     slopes = [gradient(e, [own[f]])[0] if f in own else ZERO for e in relax.roots for f in program.coordinates]
     return replace(
-        relax, name=BLOCK, purpose="how y at a site follows y there", outputs=(Output(BLOCK, tuple(slopes)),)
+        relax,
+        name=BLOCK,
+        purpose="how y at a site follows y there",
+        outputs=(Output(BLOCK, tuple(slopes)),),
+        role=Role.OWN_SLOPE,
     )
 
 
@@ -180,7 +184,7 @@ def middle_loop(
     fields = program.coordinates
     outputs = (
         [Symbol("out", f, g) for f in fields for g in fields]
-        if kernel.name == BLOCK
+        if kernel.role is Role.OWN_SLOPE
         else [Symbol("out", f) for f in fields]
     )
     out = [names.scope[s] for s in outputs]

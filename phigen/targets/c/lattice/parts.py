@@ -8,16 +8,15 @@ from dataclasses import dataclass, replace
 
 from phigen.ir.lattice import bounds
 from phigen.lanes.lowering import Rows
-from phigen.scheme.kernel import Kernel
+from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
-from phigen.scheme.steps import VARIED, Sweep, Sweeps
+from phigen.scheme.steps import Sweep, Sweeps
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c import functions
 from phigen.targets.c.kernels import members
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, layout_of, switches, wide
 from phigen.targets.c.lattice.loops import (
-    BLOCK,
     Loop,
     far_calls,
     forms_of,
@@ -372,8 +371,8 @@ def _of_equation(
 ) -> Iterator[str]:
     """The loops of a kernel of the equation of a stage over rows and their sites, in each form, or of that of the
     ``end`` of a stage where this moves x; whether they are told of arguments that are far."""
-    name, relaxing, adds = program.name, kernel.name == "relax", kernel.name == "follow"
-    varied = kernel.name in VARIED
+    name, relaxing, adds = program.name, kernel.role is Role.RELAX, kernel.role is Role.FOLLOW
+    varied = kernel.reads_variations
     gathers = over_ends(layout.gathered(kernel)) if kernel.inputs["gathered"] else ()
     gathered = [f"{name}_{own.kernel.name}(&row);" for own, _ in gathers]
     lines = {}
@@ -390,11 +389,11 @@ def _of_equation(
         lines[form] = _either("to == s->x", both[1], both[0]) if end else both[0]
     reads = ["row.start = s->x;"] * ("start" in kernel.inputs) + ["row.varied = v;"] * varied
     titles = {
-        "relax": "A sweep, or to x the end of a stage",
-        "slope": "How a sweep follows y along v",
-        BLOCK: "How a sweep follows y at the site itself",
-        "side": "How a sweep follows x along v",
-        "follow": "How the end of a stage follows y along v, added",
+        Role.RELAX: "A sweep, or to x the end of a stage",
+        Role.SLOPE: "How a sweep follows y along v",
+        Role.OWN_SLOPE: "How a sweep follows y at the site itself",
+        Role.SIDE: "How a sweep follows x along v",
+        Role.FOLLOW: "How the end of a stage follows y along v, added",
     }
     moved = range(program.dimension) if relaxing or adds else ()
     setup = ["row.x = y;", *reads, "row.out = to;"]
@@ -402,7 +401,7 @@ def _of_equation(
         program,
         layout,
         [Case([*gathered, *either(lines)], setup, has_ends(program, [kernel, *end]), (), moved, "to")],
-        title=titles[kernel.name],
+        title=titles[kernel.role],
         head="stage_piece" if end else f"{kernel.name}_piece",
         arguments=f"const double *coef, {'int far, ' * far}double *const *y, {'double *const *v, ' * varied}"
         "double *const *to",
