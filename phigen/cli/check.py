@@ -70,7 +70,7 @@ def command(
             if not as_json:
                 if found:
                     out("")
-                _print(examination)
+                _print(examination, verbose=console.verbose)
             _collect(examination, collector, console)
             if independent:
                 compared = _compared(examination, terms, seconds, console, collector, shown=not as_json)
@@ -145,7 +145,7 @@ def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) 
             collector.errors.append(SpecError(hints))
 
 
-def _print(examination: Examination) -> None:
+def _print(examination: Examination, *, verbose: bool) -> None:
     from phigen.proofs.statements import METHOD, SPLITTING
 
     spec = examination.spec
@@ -155,6 +155,8 @@ def _print(examination: Examination) -> None:
         out(f"  {compilation.told(group) if compilation and group.startswith((METHOD, SPLITTING)) else group}")
         for statement in statements:
             out("\n".join(_lines(statement)))
+            for part, residual in statement.failing if verbose else ():
+                out(f"    {'':<19}  {part}: {residual}")
     if examination.unexamined:
         out(f"  Not examined, since they rest on it: {examination.unexamined}")
 
@@ -189,7 +191,8 @@ def _described(examination: Examination) -> dict[str, object]:
 
 
 def _described_statement(s: Statement) -> dict[str, object]:
-    return {"name": s.name, "verdict": s.verdict, "detail": s.detail, "residual": s.residual}
+    failing = {"failing": dict(s.failing)} if s.failing else {}
+    return {"name": s.name, "verdict": s.verdict, "detail": s.detail, "residual": s.residual, **failing}
 
 
 def _described_comparison(c: Comparison) -> dict[str, object]:

@@ -22,6 +22,8 @@ DIGITS = 60
 #: A value below 10**-ZERO_DIGITS of its scale counts as zero; rounding stays 15 digits below that.
 ZERO_DIGITS = 40
 _ATTEMPTS = 64
+#: Failing parts that a refutation lists: all that anybody reads, and bounded memory for those of large structures.
+MOST_LISTED = 1000
 
 
 @dataclass(frozen=True)
@@ -30,13 +32,15 @@ class Statement:
 
     ``verdict`` is ``proved`` (in exact arithmetic, for all values of the symbols), ``refuted`` (``residual`` is
     what should be zero and is not), ``checked numerically`` (``detail`` says at how many points and to
-    which tolerance) or ``undecided`` (not provable, and no point of the domain was found).
+    which tolerance) or ``undecided`` (not provable, and no point of the domain was found). ``failing`` lists the parts
+    of a refuted statement that do not reduce to 0, such as the triples of a Jacobi identity, with their residuals.
     """
 
     name: str
     verdict: str
     detail: str = ""
     residual: str = ""
+    failing: tuple[tuple[str, str], ...] = ()
 
     @property
     def holds(self) -> bool:
@@ -96,7 +100,8 @@ def _at_points(
         if isinstance(found, str):
             where = f"{label}, " if label else ""
             more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
-            return Statement(name, REFUTED, f"{where}at {found}{more}", cut(shown(k)))
+            failing = tuple((part, cut(shown(i))) for i, (part, _) in enumerate(pending[:MOST_LISTED]) if part)
+            return Statement(name, REFUTED, f"{where}at {found}{more}", cut(shown(k)), failing)
         fewest = min(fewest, found)
     parts = ", ".join(label for label, _ in pending if label)
     about = f" for {parts}" if parts and len(parts) <= LONGEST else ""

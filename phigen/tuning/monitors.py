@@ -44,6 +44,8 @@ UNEVEN = 3.0
 #: Distances that are looked at, at most; the quarters of powers of their squares that are tried, the likeliest first;
 #: and of 1 + the square of the speed.
 MOST_BASES, QUARTERS, OF_SPEED = 6, (3, 2, 4), (2, 1)
+#: Letters of a monitor, at most: what a user can read and vary. Two distances in space have room.
+MOST_LETTERS = 160
 #: The order at which monitors are compared, at most; the fewest steps, and the seconds of one run.
 HIGHEST, FEWEST, SECONDS = 6, 24, 2.0
 #: The share of the time that is left for runs when all is built.
@@ -86,14 +88,22 @@ def is_uneven(rates: Callable[[Floats], Floats], states: Floats) -> bool:
 
 
 def candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
-    """Positive functions that are small where the motion is fast."""
+    """Positive functions that are small where the motion is fast, none longer than `MOST_LETTERS`."""
+    return (g for g in _candidates(system, parameters, states) if _is_short(g))
+
+
+def _is_short(monitor: Expression) -> bool:
+    written = str(monitor)  # very long expressions are cut there
+    return len(written) <= MOST_LETTERS and "…" not in written
+
+
+def _candidates(system: System, parameters: Mapping[str, float], states: Floats) -> Iterator[Expression]:
     columns: dict[str, Floats | float] = {**parameters}
     columns |= {c: states[:, i] for i, c in enumerate(system.coordinates)}
-    bases = [b for b in _bases(system) if _is_positive(b, columns)][:MOST_BASES]
-    nearness = total(power(b, -1) for b in bases)
+    bases = [b for b in _bases(system) if _is_positive(b, columns)]
+    bases = sorted(bases, key=lambda b: _least_share(b, columns))[:MOST_BASES]
     for k in QUARTERS:
-        if len(bases) > 1:
-            yield power(ONE + nearness, number(Fraction(-k, 4)))
+        yield from _nearness(bases, Fraction(-k, 4))
         yield from (power(b, number(Fraction(k, 4))) for b in bases if _is_square(b))
     size = total(symbol(c) ** 2 for c in system.coordinates)
     yield power(ONE + size, number(Fraction(-1, 2)))
@@ -104,6 +114,21 @@ def candidates(system: System, parameters: Mapping[str, float], states: Floats) 
     if math.isfinite(scale) and scale > 0:
         near = number(Fraction(f"{scale:.1e}"))
         yield from (power(ONE + speed / near, number(Fraction(-k, 4))) for k in OF_SPEED)
+
+
+def _nearness(bases: Sequence[Expression], exponent: Fraction) -> Iterator[Expression]:
+    """(1 + Σ 1/b)^exponent over as many of the first bases as a line has room for, if these are two or more."""
+    for count in range(len(bases), 1, -1):
+        monitor = power(ONE + total(power(b, -1) for b in bases[:count]), number(exponent))
+        if _is_short(monitor):
+            yield monitor
+            return
+
+
+def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
+    """The smallest value beside the median: of distances it is smallest for those of close encounters."""
+    (values,) = evaluate([b], columns)
+    return float(np.min(values) / np.median(values))
 
 
 def _bases(system: System) -> list[Expression]:

@@ -360,3 +360,16 @@ def test_check_tells_what_a_target_of_the_spec_refuses(phigen, in_tmp):
     assert done.exit_code == 1
     assert "not offered in JavaScript" in done.stderr
     assert "p.yaml:" in done.stderr
+
+
+def test_all_triples_that_fail_the_jacobi_identity_are_listed_on_request(phigen, write):
+    """They are those whose cyclic sum is not 0, each with it: (a, b, d) alone vanishes here."""
+    brackets = "{a: {b: c, c: a*d, d: 1}, b: {c: a, d: b}, c: {d: c}}"
+    text = f"phigen: 1\nname: j\ncoordinates: [a, b, c, d]\npoisson: {{brackets: {brackets}}}\nhamiltonian: a\n"
+    path = write("j.yaml", text)
+    sums = {"(a, b, c)": "a*b - c*d", "(a, c, d)": "-a*d + d", "(b, c, d)": "-2*a + 1"}
+    listed = [f"{triple}: {value}" for triple, value in sums.items()]
+    assert all(line in phigen("check", "-v", path).stdout for line in listed)
+    assert not any(line in phigen("check", path).stdout for line in listed)
+    (jacobi,) = (s for s in json.loads(phigen("check", "--json", path).stdout)[0]["statements"] if "failing" in s)
+    assert jacobi["failing"] == sums

@@ -1,5 +1,6 @@
 """Monitors that tune proposes: where H is singular, measured by steps for the same error of the energy."""
 
+import re
 import time
 from dataclasses import replace
 from types import SimpleNamespace
@@ -11,7 +12,8 @@ from scipy.integrate import solve_ivp
 from phigen import spec as specs
 from phigen.cli.tune_summary import print_monitors
 from phigen.compiler import compile_spec
-from phigen.tuning import monitors
+from phigen.geometry.system import system_from_spec
+from phigen.tuning import monitors, settings
 from phigen.tuning.problem import Problem
 from phigen.tuning.settings import Setting, own_setting
 
@@ -50,6 +52,26 @@ def test_distances_are_found_where_h_has_them(states):
     six = np.random.default_rng(1).normal(size=(20, 6))
     found = [str(g) for g in candidates(compile_spec(specs.loads(VORTICES)).system, six)]
     assert any(g.count("x1") == 2 and g.startswith("(1 + ") and g.endswith("**(-1/2)") for g in found)
+
+
+def test_monitors_of_many_bodies_are_short_and_about_the_closest_encounter():
+    """Every formula that is proposed can be pasted into the spec."""
+    bodies, axes = range(6), "xyz"
+    names = [f"{a}_{k}" for a in axes for k in bodies]
+    pairs = [(i, j) for i in bodies for j in range(i)]
+    text = f"phigen: 1\nname: n\ncoordinates: [{', '.join([*names, *(f'p{n}' for n in names)])}]\norder: 2\n"
+    text += f"poisson: {{canonical: {{q: [{', '.join(names)}], p: [{', '.join(f'p{n}' for n in names)}]}}}}\n"
+    distances = (" + ".join(f"({a}_{i} - {a}_{j})**2" for a in axes) for i, j in pairs)
+    h = " + ".join([*(f"p{n}**2" for n in names), *(f"-1/sqrt({d})" for d in distances)])
+    spec = specs.loads(f"{text}hamiltonian: {h.replace('+ -', '- ')}\n")
+    rows = np.random.default_rng(2).normal(size=(30, 36))
+    rows[3, [k * 6 + 4 for k in range(3)]] = rows[3, [k * 6 + 2 for k in range(3)]] + 1e-3
+    found = [str(g) for g in candidates(system_from_spec(spec), rows)]
+    assert found
+    assert max(map(len, found)) <= monitors.MOST_LETTERS
+    assert all(settings.monitor_of(g, spec) is not None for g in found)
+    first = next(g for g in found if g.startswith("(1 + "))
+    assert all(re.search(f"{a}_[24] - {a}_[24]", first) for a in axes)
 
 
 def candidates(system, states):
