@@ -1,94 +1,182 @@
-"""``python -m benchmarks``: all questions, or some of them; see docs/benchmarks.md."""
+"""``python -m benchmarks``: all tables of docs/benchmarks.md, or some of them."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import os
+import sys
 import tempfile
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from benchmarks import lattices, plots, studies, tables
+from benchmarks import document, eccentric, ensembles, lattices, plots, studies, tables
 from benchmarks.problems import PROBLEMS, Problem
 from benchmarks.studies import Effort
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENT = ROOT / "docs" / "benchmarks.md"
-FIGURES = DOCUMENT.parent / "figures"
-BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
-QUESTIONS = ("work", "steps", "ensembles", "growth", "build", "lattices")
+TABLES = ("work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "gradients", "sharing")
+#: Of a table that is made alone, in a process of its own: what it imports reads variables of the environment.
+ALONE = ("gradients", "sharing")
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="less of everything, in about a minute")
-    parser.add_argument("--only", nargs="+", choices=QUESTIONS, default=QUESTIONS, help="questions; all by default")
-    names = [p.name for p in PROBLEMS]
-    parser.add_argument("--problem", nargs="+", choices=names, default=names, help="problems; all by default")
-    parser.add_argument("--output", type=Path, default=Path("benchmark-results"), help="folder for Markdown and JSON")
-    parser.add_argument("--write-docs", action="store_true", help="put the tables into docs/benchmarks.md")
-    options = parser.parse_args()
-    effort = studies.QUICK if options.quick else Effort()
-    chosen = [p for p in PROBLEMS if p.name in options.problem]
+@dataclass(frozen=True)
+class Session:
+    """What the command line asked for."""
+
+    problems: Sequence[Problem]
+    effort: Effort
+    folder: Path
+    docs: bool
+    say: Callable[[str], None]
+
+    def save(self, name: str, data: object, text: str) -> None:
+        """A table and its data in the folder of results, and in the docs if they are to be written."""
+        (self.folder / f"{name}.json").write_text(json.dumps(data, indent=1), encoding="utf-8")
+        (self.folder / f"{name}.md").write_text(text, encoding="utf-8")
+        if self.docs:
+            document.write({name: text})
+
+
+def main() -> int:
+    options = parsed()
     began = time.perf_counter()
 
     def say(text: str) -> None:
         print(f"{time.perf_counter() - began:6.1f} s  {text}", flush=True)
 
-    data: dict[str, object] = {"machine": tables.machine()}
-    parts = [f"Measured on {data['machine']}.\n"]
+    problems = [p for p in PROBLEMS if p.name in options.problem]
+    effort = studies.QUICK if options.quick else Effort()
     options.output.mkdir(parents=True, exist_ok=True)
-    # Compilers are timed too: an empty cache, and none that the user has.
+    os.environ["PHIGEN_CACHE_DIR"] = str((options.output / "cache").resolve())
+    session = Session(problems, effort, options.output, options.write_docs, say)
+    if options.prepare:
+        prepare(problems, say)
+        return 0
+    if options.write_docs:
+        document.write({"machine": f"Measured on {tables.machine()}."})
+    failures: list[str] = []
+    for name in options.only:
+        say(name)
+        failures += MAKERS[name](session)
+    for line in failures:
+        say(line)
+    say(f"done: {options.output}")
+    return 1 if failures else 0
+
+
+def parsed() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="less of everything, for a trial")
+    parser.add_argument("--only", nargs="+", choices=TABLES, default=TABLES, help="tables; all by default")
+    names = [p.name for p in PROBLEMS]
+    parser.add_argument("--problem", nargs="+", choices=names, default=names, help="problems of work and steps")
+    parser.add_argument("--output", type=Path, default=Path("benchmark-results"), help="folder for tables and data")
+    parser.add_argument("--prepare", action="store_true", help="compile the solvers of work and steps, no more")
+    parser.add_argument("--write-docs", action="store_true", help="put the tables into docs/benchmarks.md")
+    return parser.parse_args()
+
+
+def prepare(problems: Sequence[Problem], say: Callable[[str], None]) -> None:
+    """Fill the cache of compiled solvers, two at a time: nothing is timed."""
+    with ProcessPoolExecutor(max_workers=2) as pool:
+        for name, notes in zip([p.name for p in problems], pool.map(built, problems), strict=True):
+            say("; ".join([name, *notes]))
+
+
+def built(problem: Problem) -> list[str]:
+    return studies.methods_of(problem, Effort())[1]
+
+
+@contextmanager
+def empty_cache() -> Iterator[None]:
+    """Where compilers are timed, nothing has been compiled before."""
+    before = os.environ["PHIGEN_CACHE_DIR"]
     with tempfile.TemporaryDirectory() as empty:
         os.environ["PHIGEN_CACHE_DIR"] = empty
-        for question in options.only:
-            say(question)
-            data[question], text = answer(question, chosen, effort, say, FIGURES if options.write_docs else None)
-            parts.append(text)
-            # after each question, for whoever interrupts the next
-            (options.output / "results.md").write_text("\n".join(parts), encoding="utf-8")
-            (options.output / "results.json").write_text(json.dumps(data, indent=1), encoding="utf-8")
-    if options.write_docs:
-        write_into(DOCUMENT, "\n".join(parts))
-    say(f"done: {options.output}/results.md and results.json")
+        yield
+    os.environ["PHIGEN_CACHE_DIR"] = before
 
 
-def answer(
-    question: str, chosen: Sequence[Problem], effort: Effort, say: Callable[[str], None], figures: Path | None
-) -> tuple[object, str]:
-    """The data of one question, and its part of the text; figures are drawn where a folder for them is given."""
-    if question == "work":
-        found = [s for p in chosen for s in studies.work_precision(p, effort, say)]
-        drawn = plots.draw(found, figures) if figures else {}
-        parts = ["## Work and precision\n\n" + tables.speed_ups(found)]
-        for s in found:
-            parts += [tables.work_precision(s), drawn.pop(s.problem, "")]
-        return [asdict(s) for s in found], "\n".join(parts)
-    if question == "lattices":
-        measured = {"kernels": lattices.kernels(effort.quick), "rings": lattices.rings(effort.quick)}
-        return measured, f"## Lattices\n\n{lattices.shown(measured)}"
-    if question == "steps":
-        rows = [row for p in chosen for row in studies.cost_of_steps(p, effort)]
-        return rows, "## Cost of a step\n\n" + tables.cost_of_steps(rows)
-    if question == "ensembles":
-        rows = studies.ensembles(effort)
-        return rows, "## Ensembles\n\n" + tables.ensembles(rows)
-    if question == "growth":
-        rows = studies.growth(effort)
-        return rows, "## Growth with dimension\n\n" + tables.growth(rows)
-    rows = studies.build_times(ROOT / "specs", effort)
-    return rows, "## Time to build\n\n" + tables.build_times(rows)
+def work(session: Session) -> list[str]:
+    """A table for each problem and horizon; the summary is made of those of all problems, of earlier calls too."""
+    failures = []
+    for problem in session.problems:
+        measured = studies.work_precision(problem, session.effort, session.say)
+        failures += [note for s in measured for note in s.notes if note.startswith(studies.GRID_FAILED)]
+        drawn = plots.draw(measured, document.FIGURES) if session.docs else {}
+        text = "\n".join(f"{tables.work_precision(s)}{drawn.pop(s.problem, '')}" for s in measured)
+        data = {"summary": [tables.speed_up_row(s) for s in measured], "studies": [asdict(s) for s in measured]}
+        session.save(f"work-{problem.name}", data, text)
+    files = [session.folder / f"work-{p.name}.json" for p in PROBLEMS]
+    rows = [row for f in files if f.exists() for row in json.loads(f.read_text(encoding="utf-8"))["summary"]]
+    session.save("summary", rows, tables.speed_ups(rows))
+    return failures
 
 
-def write_into(document: Path, text: str) -> None:
-    """Replace what stands between the markers."""
-    before, _, rest = document.read_text(encoding="utf-8").partition(BEGIN)
-    _, _, after = rest.partition(END)
-    document.write_text(f"{before}{BEGIN}\n\n{text.replace('## ', '### ')}\n{END}{after}", encoding="utf-8")
+def steps(session: Session) -> list[str]:
+    rows = [row for p in session.problems for row in studies.cost_of_steps(p, session.effort)]
+    session.save("steps", rows, tables.cost_of_steps(rows))
+    return []
 
+
+def members(session: Session) -> list[str]:
+    data = ensembles.measured(session.effort.quick)
+    session.save("ensembles", data, ensembles.shown(data))
+    return []
+
+
+def growth(session: Session) -> list[str]:
+    with empty_cache():
+        rows = studies.growth(session.effort)
+    session.save("growth", rows, tables.growth(rows))
+    return []
+
+
+def build(session: Session) -> list[str]:
+    rows = studies.build_times(ROOT / "specs", session.effort)
+    session.save("build", rows, tables.build_times(rows))
+    return []
+
+
+def sites(session: Session) -> list[str]:
+    quick = session.effort.quick
+    data = {"kernels": lattices.kernels(quick), "rings": lattices.rings(quick)}
+    session.save("lattices", data, lattices.shown(data))
+    return []
+
+
+def orbit(session: Session) -> list[str]:
+    periods = 50 if session.effort.quick else 1000
+    rows = eccentric.measured(periods)
+    session.save("eccentric", [asdict(r) for r in rows], eccentric.shown(rows, periods))
+    return []
+
+
+def alone(name: str) -> Callable[[Session], list[str]]:
+    """A table by the module of its name, in another process."""
+
+    def make(session: Session) -> list[str]:
+        import subprocess
+
+        command = [sys.executable, "-m", f"benchmarks.{name}", *(["--quick"] if session.effort.quick else [])]
+        done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
+        if done.returncode:
+            return [f"{name}: {done.stderr.strip().splitlines()[-1]}"]
+        session.save(name, {}, done.stdout)
+        return []
+
+    return make
+
+
+MAKERS: dict[str, Callable[[Session], list[str]]] = {
+    "work": work, "steps": steps, "ensembles": members, "growth": growth, "build": build, "lattices": sites,
+    "eccentric": orbit, **{name: alone(name) for name in ALONE},
+}  # fmt: skip
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -1,206 +1,272 @@
-"""A very eccentric orbit over many periods: ``monitor: log`` and the series with ``monitor: r2**(3/4)`` beside DOP853
-with step control, compiled, and heyoka.
+"""A very eccentric orbit over many periods: monitors beside step control, for the same physical time and output.
 
-``python -m benchmarks.eccentric [PERIODS]`` prints the table of docs/benchmarks.md. Times are CPU time on one core.
-Errors of phigen are those of all steps, where they are largest near the planet; of the others at eight times a period.
+Each row is timed for a run from the start to the first step at or after the end, of which only the last state is kept.
+Errors of the energy are those after all steps, from a second run. CPU time of one core.
 """
 
 from __future__ import annotations
 
 import ctypes
 import math
-import subprocess
-import sys
-import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache as cached
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from scipy.integrate._ivp import dop853_coefficients as tableau
 
 import phigen
+from benchmarks.lanes import lanes_source, tuned
+from benchmarks.solvers import tables, texts
+from benchmarks.tables import table
 from phigen import spec
 from phigen.api import solver_of
 from phigen.compiler import compile_spec
-from phigen.runtime import toolchain
+from phigen.runtime import cache
 
 ECCENTRICITY, OBLATENESS = 0.99, 1e-6
-START = [1 - ECCENTRICITY, 0.0, 0.0, math.sqrt((1 + ECCENTRICITY) / (1 - ECCENTRICITY))]
+START = (1 - ECCENTRICITY, 0.0, 0.0, math.sqrt((1 + ECCENTRICITY) / (1 - ECCENTRICITY)))
 PERIOD = 2 * math.pi
-#: Where energies are looked at, for each period.
-SAMPLES = 8
 
-Row = tuple[str, str, float, float, float]
+#: Energy errors for which the cheapest setting of each method is compared.
+TARGETS = (1e-6, 1e-8, 1e-10, 1e-11)
 
-DOP853 = """
-#include <math.h>
-#include <string.h>
-enum {{ N = 4, S = 12 }};
-static const double A[S][S] = {{ {a} }}, B[S] = {{ {b} }}, E3[S + 1] = {{ {e3} }}, E5[S + 1] = {{ {e5} }};
-static void field(double eps, const double x[N], double f[N])
-{{
-    const double r2 = x[0] * x[0] + x[1] * x[1], r = sqrt(r2), u = 1.0 / (r2 * r), w = 1.5 * eps * u / r2;
-    const double ratio = 5.0 * x[1] * x[1] / r2;
-    f[0] = x[2];
-    f[1] = x[3];
-    f[2] = -x[0] * (u + w * (1.0 - ratio));
-    f[3] = -x[1] * (u + w * (3.0 - ratio));
-}}
-/* From x at 0 to the time end, with the local errors asked for; the number of steps. */
-long integrate(double eps, double x[N], double end, double tol, double *h)
-{{
-    double k[S + 1][N], y[N], t = 0.0;
-    long steps = 0;
-    field(eps, x, k[0]);
-    while (t < end) {{
-        const double size = t + *h > end ? end - t : *h;
-        for (int s = 1; s <= S; ++s) {{
-            for (int i = 0; i < N; ++i) {{
-                double sum = 0.0;
-                for (int j = 0; j < s; ++j) sum += (s < S ? A[s][j] : B[j]) * k[j][i];
-                y[i] = x[i] + size * sum;
-            }}
-            field(eps, y, k[s]);
-        }}
-        double five = 0.0, three = 0.0;
-        for (int i = 0; i < N; ++i) {{
-            double a = 0.0, b = 0.0;
-            const double scale = tol + tol * fmax(fabs(x[i]), fabs(y[i]));
-            for (int s = 0; s <= S; ++s) {{
-                a += E5[s] * k[s][i];
-                b += E3[s] * k[s][i];
-            }}
-            five += a * a / (scale * scale);
-            three += b * b / (scale * scale);
-        }}
-        const double error = five > 0.0 ? size * five / sqrt((five + 0.01 * three) * N) : 0.0;
-        const double factor = error > 0.0 ? 0.9 * pow(error, -0.125) : 10.0;
-        if (error < 1.0) {{
-            t += size;
-            memcpy(x, y, sizeof y);
-            memcpy(k[0], k[S], sizeof k[0]);
-            ++steps;
-            if (size >= *h || factor < 1.0) *h = size * fmin(10.0, factor);
-        }} else {{
-            *h = size * fmax(0.2, factor);
-        }}
-    }}
-    return steps;
-}}
-"""
+#: Duration of a period in τ over that in t, where dt = r^(3/2) dτ; a little more, for runs to be long enough.
+TAU_OVER_T = 4.75
+
+#: Settings of a method: a scan goes from the first to finer ones until all targets are met.
+FINER = 2 ** (1 / 3)
+MOST_SETTINGS = 18
+
+
+@dataclass(frozen=True)
+class Row:
+    """A method at one setting: physical time and steps, errors in the first tenth and at all, seconds."""
+
+    method: str
+    setting: str
+    time: float
+    steps: int
+    first: float
+    worst: float
+    seconds: float
+
+
+Trial = Callable[[float], Row]
+"""A run at a setting: a number of steps, or a tolerance."""
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """A method with the coarsest setting that is tried, and the factor to the next one."""
+
+    name: str
+    trial: Trial
+    coarsest: float
+    factor: float
 
 
 def energy(x: np.ndarray) -> np.ndarray:
     """H of states (rows, 4)."""
     r2 = x[:, 0] ** 2 + x[:, 1] ** 2
     quadrupole = OBLATENESS / (2 * r2**1.5) * (1 - 3 * x[:, 1] ** 2 / r2)
-    found: np.ndarray = (x[:, 2] ** 2 + x[:, 3] ** 2) / 2 - r2**-0.5 - quadrupole
-    return found
+    return np.asarray((x[:, 2] ** 2 + x[:, 3] ** 2) / 2 - r2**-0.5 - quadrupole)
 
 
-def worst(x: np.ndarray) -> tuple[float, float]:
+def errors(x: np.ndarray) -> tuple[float, float]:
     """The largest relative errors of the energy in the first tenth and at all."""
-    errors = np.abs(energy(x) / energy(np.array([START]))[0] - 1)
-    return float(errors[: max(2, len(errors) // 10)].max()), float(errors.max())
+    each = np.abs(energy(x) / energy(np.array([START]))[0] - 1)
+    return float(each[: max(2, len(each) // 10)].max()), float(each.max())
 
 
-def of_phigen(periods: int) -> Iterator[Row]:
-    """``monitor: log``, order 8."""
-    solver = phigen.compile("kepler_eccentric")
-    for steps in (480, 640, 960, 1280):
-        h, total = PERIOD / steps, periods * steps
-        begin = time.process_time()
-        solver.integrate(START, h, total, total, oblateness=OBLATENESS)
-        taken = time.process_time() - begin
-        found = solver.integrate(START, h, total, oblateness=OBLATENESS)
-        yield ("phigen, order 8, log", f"{steps} steps a period", *worst(found.x), taken)
+def cpu_seconds(work: Callable[[], Any]) -> float:
+    """The least CPU time of two runs."""
+    times = []
+    for _ in range(2):
+        begun = time.process_time()
+        work()
+        times.append(time.process_time() - begun)
+    return min(times)
 
 
-def of_series(periods: int) -> Iterator[Row]:
-    """The series with dt = r^(3/2) dτ, steps of order 2 composed to the orders 6, 8 and 10."""
-    text = (Path(__file__).parents[1] / "specs" / "kepler_eccentric.yaml").read_text()
-    changes = {"scheme: splitting": "scheme: series", "monitor: log": "monitor: r2**(3/4)", "profile: small": ""}
-    for old, new in changes.items():
-        text = text.replace(old, new)
-    for order, per in ((6, 60), (6, 100), (8, 40), (8, 60), (8, 80), (10, 24)):
-        solver = solver_of(compile_spec(spec.loads(text), order=order), "c")
-        h = PERIOD / per
-        few = solver.integrate(START, h, 50 * per, 50 * per, oblateness=OBLATENESS).t[-1]
-        total = round(periods * PERIOD * 50 * per / few)
-        begin = time.process_time()
-        solver.integrate(START, h, total, total, oblateness=OBLATENESS)
-        taken = time.process_time() - begin
-        found = solver.integrate(START, h, total, oblateness=OBLATENESS)
-        yield (f"phigen, order {order}, series", f"{total / periods:.0f} steps a period", *worst(found.x), taken)
-
-
-def of_dop853(periods: int) -> Iterator[Row]:
-    """DOP853 with the step control of its authors, in C with the flags of phigen."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder)
-        rows = ", ".join("{" + ", ".join(repr(float(v)) for v in row[:12]) + "}" for row in tableau.A[:12])
-        listed = {n: ", ".join(repr(float(v)) for v in values) for n, values in
-                  (("b", tableau.B), ("e3", tableau.E3), ("e5", tableau.E5))}  # fmt: skip
-        (path / "dop853.c").write_text(DOP853.format(a=rows, **listed))
-        command = [
-            *toolchain.find().command,
-            "-std=c99",
-            "-O3",
-            "-march=native",
-            "-ffp-contract=fast",
-            "-shared",
-            "-fPIC",
-        ]
-        subprocess.run([*command, "dop853.c", "-o", "dop853.so", "-lm"], cwd=path, check=True)
-        library = ctypes.CDLL(str(path / "dop853.so"))
-        library.integrate.restype = ctypes.c_long
-        library.integrate.argtypes = [
-            ctypes.c_double,
-            ctypes.c_void_p,
-            ctypes.c_double,
-            ctypes.c_double,
-            ctypes.c_void_p,
-        ]
-        for tolerance in (1e-9, 1e-11, 1e-13, 1e-15):
-            x, h, rows_of = np.array(START), np.array([1e-4]), [START]
-            begin, steps = time.process_time(), 0
-            for _ in range(periods * SAMPLES):
-                steps += library.integrate(OBLATENESS, x.ctypes.data, PERIOD / SAMPLES, tolerance, h.ctypes.data)
-                rows_of.append(x.tolist())
-            taken = time.process_time() - begin
-            said = f"tolerance {tolerance:g}: {steps / periods:.0f} steps a period"
-            yield ("DOP853", said, *worst(np.array(rows_of)), taken)
-
-
-def of_heyoka(periods: int) -> Iterator[Row]:
-    """heyoka's Taylor method, where it is installed."""
+def contestants(periods: int) -> Iterator[Contestant]:
+    """All methods; heyoka where it is installed."""
+    for order in (6, 8):
+        yield monitored("log", order, periods, 160 if order == 6 else 240)
+    for order in (6, 8, 10):
+        yield monitored("r2**(3/4)", order, periods, {6: 56, 8: 40, 10: 16}[order])
+    yield Contestant("DOP853 with step control, in C", controlled(periods), 1e-6, 0.1)
+    for order in (8, 12, 16):
+        yield Contestant(f"Gauss {order}, SIMD, g = r^(3/2), in C", gauss(order, periods), 10, FINER)
     try:
-        import heyoka as hy
+        yield Contestant("heyoka", taylor(periods), 1e-6, 0.1)
     except ImportError:
         return
+
+
+def monitored(monitor: str, order: int, periods: int, coarsest: float) -> Contestant:
+    """phigen with a monitor, by splitting where K splits and by the series where it does not."""
+    text = (Path(phigen.__file__).parents[1] / "specs" / "kepler_eccentric.yaml").read_text(encoding="utf-8")
+    scheme = "splitting" if monitor == "log" else "series"
+    changes = {"scheme: splitting": f"scheme: {scheme}", "monitor: log": f"monitor: {monitor}", "profile: small": ""}
+    for old, new in changes.items():
+        text = text.replace(old, new)
+    solver = solver_of(compile_spec(spec.loads(text), order=order), "c")
+    name = f"phigen {order}, " + ("`log`" if monitor == "log" else "series, g = r^(3/2)")
+    start, end = list(START), periods * PERIOD
+
+    def advance(h: float, steps: int, stride: int) -> Any:
+        return solver.integrate(start, h, steps, stride, oblateness=OBLATENESS)
+
+    def trial(steps_of_period: float) -> Row:
+        h = PERIOD / steps_of_period
+        pace = advance(h, math.ceil(20 * steps_of_period), 1).t[-1] / 20
+        count = math.ceil(steps_of_period * (end / pace + 1))
+        whole = advance(h, count, 1)
+        while whole.t[-1] < end:
+            count = math.ceil(1.05 * count)
+            whole = advance(h, count, 1)
+        steps = int(np.searchsorted(whole.t, end))
+        seconds = cpu_seconds(lambda: advance(h, steps, steps))
+        return row(name, "", whole.t[steps], steps, periods, whole.x[: steps + 1], seconds)
+
+    return Contestant(name, trial, coarsest, FINER)
+
+
+def row(name: str, setting: str, end: float, steps: int, periods: int, x: np.ndarray, seconds: float) -> Row:
+    text = f"{steps / periods:.0f} steps a period"
+    return Row(name, f"{setting}: {text}" if setting else text, float(end), steps, *errors(x), seconds)
+
+
+@cached
+def controlled_library() -> ctypes.CDLL:
+    main = "\n".join(
+        [
+            "#define _POSIX_C_SOURCE 199309L",
+            f'#define OBLATENESS {OBLATENESS!r}\n#include "common.h"\n#include "kepler.h"',
+            tables(("dop853",)),
+            '#include "step_control.h"\n',
+        ]
+    )
+    library = cache.load({"main.c": main, **texts()})
+    pointer, double, long = ctypes.c_void_p, ctypes.c_double, ctypes.c_long
+    library.follow_controlled.restype = long
+    library.follow_controlled.argtypes = (pointer, double, double, long, pointer)
+    library.measure_controlled.argtypes = (
+        pointer, double, double, long, double, pointer, pointer, pointer, pointer,
+    )  # fmt: skip
+    return library
+
+
+def controlled(periods: int) -> Trial:
+    """DOP853 with the step control of its authors, in C."""
+    library, start, end = controlled_library(), np.array(START), periods * PERIOD
+
+    def trial(tolerance: float) -> Row:
+        last, number = np.zeros(4), np.zeros(3)
+        each = [number[i:].ctypes.data for i in range(3)]
+
+        def work() -> None:
+            library.measure_controlled(start.ctypes.data, tolerance, end, 1, math.inf, last.ctypes.data, *each)
+
+        seconds = cpu_seconds(work)
+        states = np.empty((int(number[2]) + 1, 4))
+        steps = library.follow_controlled(start.ctypes.data, tolerance, end, len(states), states.ctypes.data)
+        name = "DOP853 with step control, in C"
+        return row(name, f"tolerance {tolerance:.0e}", end, steps, periods, states[:steps], seconds)
+
+    return trial
+
+
+def gauss(order: int, periods: int) -> Trial:
+    """Gauss' method with stages in lanes on K = g (H − H₀), which needs no control of its steps either."""
+    constants = {"OBLATENESS": OBLATENESS, "ENERGY": float(energy(np.array([START]))[0])}
+    lines = [f"#define {name} ({value!r})" for name, value in constants.items()]
+    run = tuned(lanes_source("\n".join([*lines, '#include "kepler_monitored.h"']), order), order // 2)
+    start, end = [*START, 0.0], periods * PERIOD
+    name = f"Gauss {order}, SIMD, g = r^(3/2), in C"
+
+    def trial(steps_of_period: float) -> Row:
+        h, count = PERIOD / steps_of_period, math.ceil(TAU_OVER_T * steps_of_period * (periods + 1))
+        whole = run(start, h, 1, count, math.inf)
+        while whole.status == "ok" and whole.states[-1, 4] < end:
+            count = math.ceil(1.1 * count)
+            whole = run(start, h, 1, count, math.inf)
+        if whole.status != "ok":
+            return Row(name, f"{steps_of_period:.0f} steps in 2π of τ: {whole.status}", math.nan, 0, *[math.inf] * 3)
+        steps = int(np.searchsorted(whole.states[:, 4], end)) + 1
+        seconds = cpu_seconds(lambda: run(start, h, steps, 1, math.inf))
+        return row(name, "", whole.states[steps - 1, 4], steps, periods, whole.states[:steps, :4], seconds)
+
+    return trial
+
+
+def taylor(periods: int) -> Trial:
+    """heyoka's Taylor method; its compilation is not timed."""
+    import heyoka as hy
+
     x, y, u, v = hy.make_vars("x", "y", "u", "v")
     r2 = x * x + y * y
     potential = r2**-0.5 + OBLATENESS * 0.5 * r2**-1.5 * (1 - 3 * y * y / r2)
     system = [(x, u), (y, v), (u, hy.diff(potential, x)), (v, hy.diff(potential, y))]
-    for tolerance in (1e-8, 1e-10, 1e-13, 2e-16):
-        taylor, rows_of, steps = hy.taylor_adaptive(system, START, tol=tolerance), [START], 0
-        begin = time.process_time()
-        for k in range(1, periods * SAMPLES + 1):
-            steps += taylor.propagate_until(k * PERIOD / SAMPLES)[3]
-            rows_of.append(taylor.state.tolist())
-        taken = time.process_time() - begin
-        said = f"tolerance {tolerance:g}: {steps / periods:.0f} steps a period"
-        yield ("heyoka", said, *worst(np.array(rows_of)), taken)
+    end = periods * PERIOD
+
+    def trial(tolerance: float) -> Row:
+        solver = hy.taylor_adaptive(system, list(START), tol=tolerance, high_accuracy=tolerance < 1e-12)
+
+        def again() -> None:
+            solver.time = 0.0
+            solver.state[:] = START
+
+        def work() -> None:
+            again()
+            solver.propagate_until(end)
+
+        seconds = cpu_seconds(work)
+        again()
+        states = []
+        while solver.time < end:
+            solver.step(end - solver.time)
+            states.append(solver.state.copy())
+        return row("heyoka", f"tolerance {tolerance:.0e}", end, len(states), periods, np.array(states), seconds)
+
+    return trial
 
 
-def main() -> None:
-    periods = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
-    print(f"| {periods} periods | | energy: first tenth | all | s |\n|---|---|---|---|---|")
-    for rows in (of_phigen, of_series, of_dop853, of_heyoka):
-        for name, said, first, whole, taken in rows(periods):
-            print(f"| {name} | {said} | {first:.1e} | {whole:.1e} | {taken:.2f} |", flush=True)
+def rows_of(contestant: Contestant, targets: Sequence[float]) -> list[Row]:
+    """From the coarsest setting to the first that meets all targets; coarser ones while the coarsest is best."""
+    setting, found = contestant.coarsest, []
+    for _ in range(MOST_SETTINGS):
+        found.append(contestant.trial(setting))
+        if found[-1].worst <= min(targets) or setting < 3e-16:
+            break
+        setting *= contestant.factor
+    setting = contestant.coarsest
+    while any(best(found, target) is found[0] for target in targets):
+        setting /= contestant.factor
+        found.insert(0, contestant.trial(setting))
+    return found
 
 
-if __name__ == "__main__":
-    main()
+def best(rows: Sequence[Row], target: float) -> Row | None:
+    return min((r for r in rows if r.worst <= target), key=lambda r: r.seconds, default=None)
+
+
+def measured(periods: int) -> list[Row]:
+    """All rows of all methods."""
+    return [r for contestant in contestants(periods) for r in rows_of(contestant, TARGETS)]
+
+
+def shown(rows: Sequence[Row], periods: int) -> str:
+    """The cheapest setting of each method for each error; how the error at the finest of them grew."""
+    entries = []
+    for name in dict.fromkeys(r.method for r in rows):
+        chosen = [best([r for r in rows if r.method == name], target) for target in TARGETS]
+        entry = [f"{1e3 * r.seconds:.3g} ms ({r.setting})" if r else "not reached" for r in chosen]
+        reached = [r for r in chosen if r]
+        growth = f"{reached[-1].worst / reached[-1].first:.1f}" if reached else ""
+        entries.append([name, *entry, growth])
+    head = (f"{periods:,} periods", *(f"energy to {t:.0e}" for t in TARGETS), "error in all / in the first tenth")
+    return f"{table(head, entries)}\n"

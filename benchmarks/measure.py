@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
@@ -13,11 +13,19 @@ import sympy
 from benchmarks.problems import Problem
 from benchmarks.solvers import Method
 
-#: Sampling times of one run; between two samples there are a multiple of 8 steps, which suits blocked solvers.
+#: Sampling times of one run. Between two samples phigen makes multiples of 8 steps, as its solvers work in blocks.
 SAMPLES = {"short": 125, "long": 500}
 BLOCK = 8
 
-TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-12, 1e-14, 2.3e-16)
+#: Steps and tolerances of one grid: 2^(1/3) apart, and ten times. A scan begins at ``Problem.first`` or here.
+FINER = 2 ** (1 / 3)
+FIRST_TOLERANCE, SMALLEST_TOLERANCE = 1e-4, 2.3e-16
+
+#: More than the finest step that a scan can afford.
+FINEST = 60
+
+#: Runs over the long horizon for one method and target.
+MOST_LONG_RUNS = 6
 
 #: A solve that keeps Casimirs this well is a converged one.
 CONVERGED = 1e-10
@@ -45,6 +53,9 @@ class Result:
     steps: int
     evaluations: float
     status: str
+    variant: str = ""
+    step_based: bool = True
+    row: str = ""
     energy: float = math.nan
     orbit: float = math.nan
     casimir: float = math.nan
@@ -111,15 +122,14 @@ class Judge:
 def run(method: Method, setting: float, horizon: float, samples: int, judge: Judge, limit: float) -> Result:
     """One integration and its errors; phigen's runs are failures if they lose Casimirs."""
     span = horizon / samples
+    chunk = steps_of_sample(method, setting, span) if method.step_based else span
     if method.step_based:
-        chunk = max(1, round(span / setting / BLOCK)) * BLOCK
         setting = span / chunk
-    else:
-        chunk = span
     done = method.run(judge.start.tolist(), setting, chunk, samples, limit)
     result = Result(
-        method.name, method.family, method.order, setting, done.seconds, done.steps, done.evaluations, done.status
-    )
+        method.name, method.family, method.order, setting, done.seconds, done.steps, done.evaluations, done.status,
+        method.variant, method.step_based, method.row or method.name,
+    )  # fmt: skip
     if done.status != "ok":
         return result
     errors = judge.errors(done.states)
@@ -131,48 +141,116 @@ def run(method: Method, setting: float, horizon: float, samples: int, judge: Jud
     return Result(**{**result.__dict__, **errors, "status": status})
 
 
-def settings(method: Method, problem: Problem, finer: float) -> Iterator[float]:
-    """Steps from coarse to fine by a factor ``finer``, or tolerances."""
-    if not method.step_based:
-        yield from TOLERANCES
+def steps_of_sample(method: Method, setting: float, span: float) -> int:
+    """Steps between two samples; those of phigen fill blocks where a sample has some of them."""
+    block = BLOCK if method.family == "phigen" and span / setting >= 4 * BLOCK else 1
+    return max(1, round(span / setting / block)) * block
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Numbered settings of a method: 0 is where a scan begins, the next is a finer step, or a smaller tolerance."""
+
+    method: Method
+    problem: Problem
+
+    def setting(self, index: int) -> float:
+        if self.method.step_based:
+            return self.problem.first / FINER**index
+        return max(FIRST_TOLERANCE / 10.0**index, SMALLEST_TOLERANCE)
+
+    def indices(self) -> range:
+        """All that there is: a sample has at least one step, and tolerances end at the precision of numbers."""
+        if self.method.step_based:
+            longest = self.problem.short / SAMPLES["short"]
+            return range(-math.floor(math.log(longest / self.problem.first, FINER)), FINEST)
+        return range(-3, 1 + math.ceil(math.log10(FIRST_TOLERANCE / SMALLEST_TOLERANCE)))
+
+
+@dataclass
+class Scan:
+    """Results of one method over the short horizon, by their number on its grid."""
+
+    grid: Grid
+    judge: Judge
+    targets: Sequence[Target]
+    limit: float
+    results: dict[int, Result] = field(default_factory=dict)
+
+    def try_at(self, index: int) -> Result:
+        """The result of a setting; of two that amount to the same steps a sample, that of the first."""
+        grid, horizon = self.grid, self.grid.problem.short
+        setting, span = grid.setting(index), horizon / SAMPLES["short"]
+        if grid.method.step_based:
+            setting = span / steps_of_sample(grid.method, setting, span)
+        same = [r for r in self.results.values() if r.setting == setting]
+        result = same[0] if same else run(grid.method, setting, horizon, SAMPLES["short"], self.judge, self.limit)
+        self.results[index] = result
+        return result
+
+    def extend_finer(self) -> None:
+        """From number 0 on, until every target is met, or a run would be too slow."""
+        for index in self.grid.indices():
+            if index < 0:
+                continue
+            result = self.try_at(index)
+            met = all(any(r.meets(t) for r in self.results.values()) for t in self.targets)
+            if met or result.status == "too slow" or result.seconds > self.limit:
+                break
+
+    def extend_coarser(self) -> None:
+        """Below number 0, as long as a coarsest setting is the cheapest for some target."""
+        while self.best_at_coarse_end():
+            index = min(self.results) - 1
+            if index not in self.grid.indices():
+                break
+            self.try_at(index)
+
+    def best_at_coarse_end(self) -> list[Target]:
+        """The targets for which no setting has been tried that is coarser than the cheapest."""
+        first = self.results[min(self.results)]
+        return [t for t in self.targets if cheapest(list(self.results.values()), t) is first]
+
+    def failure(self) -> str:
+        """Why the cheapest settings are not known: a coarser one than the coarsest of all might be cheaper."""
+        ends = [f"{name} {bound:.0e}" for name, bound in self.best_at_coarse_end()]
+        coarsest = self.results[min(self.results)].setting
+        return f"{self.grid.method.name}: {coarsest:.3g} is the best for {', '.join(ends)}" if ends else ""
+
+
+def scan(method: Method, problem: Problem, judge: Judge, targets: Sequence[Target], limit: float) -> Scan:
+    """Settings from coarse to fine until all targets are met, then coarser ones while these are better still."""
+    scanned = Scan(Grid(method, problem), judge, targets, limit)
+    scanned.extend_finer()
+    scanned.extend_coarser()
+    return scanned
+
+
+def reach(scanned: Scan, judge: Judge, target: Target, limit: float, results: dict[int, Result]) -> None:
+    """Runs over the long horizon, added to ``results``: from the setting that the short one promises on, finer until
+    the target is met, or coarser as long as it is. Runs that would take longer than ``limit`` are not begun."""
+    grid, growth = scanned.grid, scanned.grid.problem.long / scanned.grid.problem.short
+    usable = {k: r for k, r in scanned.results.items() if r.status == "ok"}
+    if not usable:
         return
-    # low orders never need the coarsest steps
-    h = problem.largest * (1.0 if method.order > 4 or method.family == "phigen" else 0.5)
-    for k in range(60):
-        yield h / finer**k
-
-
-def scan(method: Method, problem: Problem, judge: Judge, targets: Sequence[Target], limit: float) -> list[Result]:
-    """From coarse to fine until every target is met, or a run would be too slow, or only rounding is left."""
-    results: list[Result] = []
-    seen: set[float] = set()
-    for setting in settings(method, problem, 2 ** (1 / 3)):
-        result = run(method, setting, problem.short, SAMPLES["short"], judge, limit)
-        if result.setting in seen:
-            continue
-        seen.add(result.setting)
-        results.append(result)
-        if all(any(r.meets(t) for r in results) for t in targets):
+    expected = [k for k, r in usable.items() if r.energy * (growth if r.drift > 2.5 else 1) <= target[1]]
+    index = max(expected, key=lambda k: usable[k].setting) if expected else max(usable) + 1
+    nearest = usable[min(usable, key=lambda k: abs(k - index))]
+    seconds = growth * nearest.seconds
+    direction = 0
+    for _ in range(MOST_LONG_RUNS):
+        if index not in grid.indices() or seconds > limit:
             break
-        if result.status == "too slow" or result.seconds > limit:
+        if index not in results:
+            results[index] = run(
+                grid.method, grid.setting(index), grid.problem.long, SAMPLES["long"], judge, 1.5 * limit
+            )
+        met, seconds = results[index].meets(target), results[index].seconds
+        if results[index].status == "too slow" or direction == (1 if met else -1):
             break
-    return results
-
-
-def reach(
-    method: Method, problem: Problem, judge: Judge, scanned: Sequence[Result], target: Target, limit: float
-) -> list[Result]:
-    """Runs over the long horizon: the first guess comes from the scan of the short one, then finer until it holds."""
-    results: list[Result] = []
-    growth = problem.long / problem.short
-    usable = sorted((r for r in scanned if r.status == "ok"), key=lambda r: -r.setting)
-    expected = [r for r in usable if r.energy * (growth if r.drift > 2.5 else 1) <= target[1]]
-    for candidate in expected[:3]:
-        result = run(method, candidate.setting, problem.long, SAMPLES["long"], judge, limit)
-        results.append(result)
-        if result.meets(target) or result.status == "too slow":
-            break
-    return results
+        direction = -1 if met else 1
+        index += direction
+        seconds *= FINER**direction
 
 
 def cheapest(results: Sequence[Result], target: Target) -> Result | None:

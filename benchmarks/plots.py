@@ -14,7 +14,7 @@ PEERS = {
     "DOP853 in C": "-.",
     "heyoka": ":",
     "RK4 in C": (0, (1, 1)),
-    "Gauss 6 in C": (0, (5, 1)),
+    "Gauss, SIMD, in C": (0, (5, 1)),
     "splitting, Kahan–Li 8, in C": (0, (3, 1, 1, 1)),
 }
 
@@ -45,9 +45,7 @@ def _curves(study: Study) -> list[tuple[str, list[Result], Any]]:
     groups: dict[str, list[Result]] = {}
     for r in study.scans:
         if r.status == "ok":
-            groups.setdefault("phigen," + r.method.partition(",")[2] if r.family == "phigen" else r.method, []).append(
-                r
-            )
+            groups.setdefault(r.row, []).append(r)
     ours = [(label, results, "-") for label, results in groups.items() if label.startswith("phigen")]
     return ours + [(label, groups[label], style) for label, style in PEERS.items() if label in groups]
 

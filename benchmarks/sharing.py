@@ -1,4 +1,4 @@
-"""What a second core brings: ``python -m benchmarks.sharing [MEMBERS]``, on a machine with two quiet cores.
+"""What a second core brings: ``python -m benchmarks.sharing``, on a machine with two quiet cores.
 
 Runs of 1,000 steps of the rigid body with random starts: by a plain loop over `ensemble`, with one thread and with two,
 and by a sweep with one worker and with two. Elapsed times; those of a sweep are beyond what a very small one takes,
@@ -38,7 +38,7 @@ def swept(members: int, workers: int) -> float:
 
 
 def main() -> None:
-    members = int(sys.argv[1]) if sys.argv[1:] else 200_000
+    members = 20_000 if "--quick" in sys.argv else 200_000
     solver = phigen.compile("rigid_body", target="c")
     starts = np.random.default_rng(1).uniform(0.2, 1.0, (members, 3))
     head = f"{members:,} members, {STEPS} steps, {os.cpu_count()} cores"

@@ -6,7 +6,7 @@ import ctypes
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache as cached
 from pathlib import Path
 from typing import Any
@@ -61,6 +61,10 @@ class Method:
     family: str = "peer"
     step_based: bool = True
     note: str = ""
+    row: str = ""
+    """The row of the tables; the name by default."""
+    variant: str = ""
+    """What tells the method from others of its row, of which the best is shown."""
 
 
 # phigen ------------------------------------------------------------------------------------------------------------
@@ -97,7 +101,15 @@ def build_phigen(text: str) -> Built:
 def phigen_method(problem: Problem, order: int, method: str) -> Method:
     built = build_phigen(problem.spec(order, method))
     label = f"phigen {order}, {method}"
-    return Method(label, _runner(built.library, 0), order, "phigen", note=built.summary)
+    return Method(
+        label,
+        runner_of(built.library, 0),
+        order,
+        "phigen",
+        note=built.summary,
+        row=f"phigen, {method}",
+        variant=f"order {order}",
+    )
 
 
 # Peers in C --------------------------------------------------------------------------------------------------------
@@ -108,8 +120,8 @@ def peer_names(problem: Problem) -> dict[str, tuple[str, int]]:
     names = {
         "rk4": ("RK4 in C", 4),
         "dop853": ("DOP853 in C", 8),
+        "dop853_compensated": ("DOP853 with compensated sums, in C", 8),
         "gauss1": ("implicit midpoint in C", 2),
-        "gauss3": ("Gauss 6 in C", 6),
     }
     if problem.quadratic:
         names |= {"kahan": ("Kahan in C", 2), "kahan_kl8": ("Kahan, Kahan–Li 8, in C", 8)}
@@ -121,13 +133,33 @@ def peer_names(problem: Problem) -> dict[str, tuple[str, int]]:
 def c_peers(problem: Problem) -> list[Method]:
     names = peer_names(problem)
     library = cache.load({"main.c": _peer_source(problem, list(names)), **texts()})
-    return [Method(title, _runner(library, i), order) for i, (title, order) in enumerate(names.values())]
+    peers = {
+        name: Method(title, runner_of(library, i), order) for i, (name, (title, order)) in enumerate(names.items())
+    }
+    compensated = replace(peers["dop853_compensated"], row="DOP853 in C", variant="compensated")
+    return [*(peers | {"dop853_compensated": compensated}).values(), _controlled(library)]
+
+
+def dop853_in_vectors(problem: Problem) -> Method:
+    """DOP853 for some more dimensions, its stages combined in vectors."""
+    lines = [
+        "#define _POSIX_C_SOURCE 199309L",
+        '#include "common.h"',
+        field_source(problem, jacobian=False),
+        tables(("dop853",)),
+        '#include "dop853_vectors.h"',
+        "static struct { int failed; long evaluations; } gauss;\nstatic void reset(void) {}",
+        "static void (*const methods[])(real *, double, long) = { dop853_vectors };",
+        '#include "run_peers.h"\n',
+    ]
+    library = cache.load({"main.c": "\n".join(lines), **texts()})
+    return Method("DOP853 in C, vectors", runner_of(library, 0), 8)
 
 
 def reference(problem: Problem, horizon: float, chunks: int) -> tuple[np.ndarray, float]:
     """States at the ends of the chunks by Gauss' method of order 16 in long double, and their uncertainty."""
     library = cache.load({"main.c": _reference_source(problem), **texts()})
-    run = _runner(library, 0)
+    run = runner_of(library, 0)
     chunk = math.ceil(horizon / chunks / problem.typical)
     coarse, fine = (
         run(problem.start, horizon / chunks / steps, steps, chunks, math.inf) for steps in (chunk, chunk + chunk // 3)
@@ -135,16 +167,18 @@ def reference(problem: Problem, horizon: float, chunks: int) -> tuple[np.ndarray
     return fine.states, float(np.abs(fine.states - coarse.states).max())
 
 
-def vector_rk4(problem: Problem, width: int = 8) -> ctypes.CDLL:
-    """RK4 for ensembles, ``width`` members at once (polynomial fields only)."""
+def vector_peers(problem: Problem, width: int = 4) -> ctypes.CDLL:
+    """RK4 and DOP853 for ensembles, ``width`` members at once (polynomial fields only)."""
     main = "\n".join(
         [
             f"#define _POSIX_C_SOURCE 199309L\n#define WIDTH {width}",
             f"typedef double lanes __attribute__((vector_size({8 * width})));\n#define REAL lanes",
             '#include "common.h"',
-            _field_source(problem, jacobian=False),
+            field_source(problem, jacobian=False),
             tables(("rk4", "dop853")),
-            '#include "runge_kutta.h"\n#include "run_ensemble.h"\n',
+            '#include "runge_kutta.h"',
+            "static void (*const methods[])(real *, double, long) = { rk4, dop853 };",
+            '#include "run_ensemble.h"\n',
         ]
     )
     return cache.load({"main.c": main, **texts()})
@@ -154,19 +188,20 @@ def _peer_source(problem: Problem, names: Sequence[str]) -> str:
     parts = [
         "#define _POSIX_C_SOURCE 199309L\n#define ROUNDING 1.5e-16",
         '#include "common.h"',
-        _field_source(problem, jacobian=problem.quadratic),
-        tables(("rk4", "dop853", "gauss1", "gauss3")),
+        field_source(problem, jacobian=problem.quadratic),
+        tables(("rk4", "dop853", "gauss1")),
         array("kahan_li8", KAHAN_LI),
-        '#include "runge_kutta.h"\n#include "gauss.h"\n#include "compose.h"\nGAUSS(gauss1, 1)\nGAUSS(gauss3, 3)',
+        '#include "runge_kutta.h"\n#include "gauss.h"\n#include "compose.h"\nGAUSS(gauss1, 1)',
+        '#include "step_control.h"',
+        "static void reset(void)\n{\n    memset(&gauss, 0, sizeof gauss);\n    memset(carry, 0, sizeof carry);\n}",
     ]
     if problem.quadratic:
         parts.append('#include "kahan.h"')
     if problem.splitting:
         parts += [f"#define {name} ({value!r})" for name, value in problem.constants.items()]
         parts.append(f'#include "elementary.h"\n#include "splitting_{problem.splitting}.h"')
-        parts.append(
-            "COMPOSE(splitting, splitting_step, whole_step)\nCOMPOSE(splitting_kl8, splitting_step, kahan_li8)"
-        )
+        for name, fractions in (("splitting", "whole_step"), ("splitting_kl8", "kahan_li8")):
+            parts.append(f"COMPOSE_SPLITTING({name}, OUTER, INNER, {fractions})")
     parts.append(f"static void (*const methods[])(real *, double, long) = {{ {', '.join(names)} }};")
     return "\n".join([*parts, '#include "run_peers.h"\n'])
 
@@ -176,16 +211,17 @@ def _reference_source(problem: Problem) -> str:
         [
             "#define _POSIX_C_SOURCE 199309L\n#include <tgmath.h>\n#define REAL long double\n#define ROUNDING 1e-19L",
             '#include "common.h"',
-            _field_source(problem, jacobian=False),
+            field_source(problem, jacobian=False),
             tables(("gauss8",)),
             '#include "gauss.h"\nGAUSS(gauss8, 8)',
+            "static void reset(void) { memset(&gauss, 0, sizeof gauss); }",
             "static void (*const methods[])(real *, double, long) = { gauss8 };",
             '#include "run_peers.h"\n',
         ]
     )
 
 
-def _field_source(problem: Problem, *, jacobian: bool) -> str:
+def field_source(problem: Problem, *, jacobian: bool) -> str:
     """`field`, and `jacobian` for Kahan's method, with common subexpressions computed once."""
     x = "\n".join(f"    const real {c} = x[{i}];" for i, c in enumerate(problem.coordinates))
     lines = [f"#define DIM {problem.dimension}", "INLINE void field(const real x[DIM], real f[DIM])\n{", x]
@@ -210,25 +246,30 @@ def tables(names: Sequence[str]) -> str:
     lines = ["#define MOST_STAGES 16"]
     for name in names:
         if name in tables:
-            a, b = tables[name]()
+            a, b, estimates = tables[name]()
             lines += [array(f"{name}_a", a.ravel()), array(f"{name}_b", b)]
+            lines += [array(f"{name}_{part}", values) for part, values in estimates.items()]
         else:
             for part, values in _gauss(int(name.removeprefix("gauss"))).items():
                 lines.append(f"static const real {name}_{part}[] = {{ {', '.join(values)} }};")
     return "\n".join(lines)
 
 
-def _rk4() -> tuple[np.ndarray, np.ndarray]:
+Tables = tuple[np.ndarray, np.ndarray, dict[str, np.ndarray]]
+"""Matrix, weights, and weights of estimates of the error by name."""
+
+
+def _rk4() -> Tables:
     a = np.zeros((4, 4))
     a[1, 0] = a[2, 1] = 0.5
     a[3, 2] = 1.0
-    return a, np.array([1, 2, 2, 1]) / 6
+    return a, np.array([1, 2, 2, 1]) / 6, {}
 
 
-def _dop853() -> tuple[np.ndarray, np.ndarray]:
+def _dop853() -> Tables:
     from scipy.integrate._ivp import dop853_coefficients as table
 
-    return table.A[:12, :12], table.B
+    return table.A[:12, :12], table.B, {"e3": table.E3[:12], "e5": table.E5[:12]}
 
 
 def _gauss(stages: int) -> dict[str, list[str]]:
@@ -262,7 +303,26 @@ def texts(*names: str) -> dict[str, str]:
     return {f.name: f.read_text(encoding="utf-8") for f in files}
 
 
-def _runner(library: ctypes.CDLL, index: int) -> Runner:
+def _controlled(library: ctypes.CDLL) -> Method:
+    """DOP853 with step control, of the same library."""
+    function = library.measure_controlled
+    function.restype = ctypes.c_int
+    double, pointer = ctypes.c_double, ctypes.c_void_p
+    function.argtypes = (pointer, double, double, ctypes.c_long, double, pointer, pointer, pointer, pointer)
+
+    def run(start: Sequence[float], tolerance: float, chunk: float, chunks: int, limit: float) -> Run:
+        x0, (seconds, evaluations, steps) = np.array(start, dtype=np.float64), np.zeros((3, 1))
+        states = np.full((chunks, len(x0)), np.nan)
+        status = function(
+            x0.ctypes.data, tolerance, chunk, chunks, min(limit, 1e9),
+            states.ctypes.data, seconds.ctypes.data, evaluations.ctypes.data, steps.ctypes.data,
+        )  # fmt: skip
+        return Run(states, float(seconds[0]), int(steps[0]), float(evaluations[0]), STATUSES.get(status, str(status)))
+
+    return Method("DOP853 with step control, in C", run, 8, step_based=False)
+
+
+def runner_of(library: ctypes.CDLL, index: int) -> Runner:
     function = library.measure_run
     function.restype = ctypes.c_int
     double, pointer, long = ctypes.c_double, ctypes.c_void_p, ctypes.c_long

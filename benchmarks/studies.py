@@ -1,8 +1,7 @@
-"""The questions: work and precision, cost of a step, ensembles, growth with dimension, time to build."""
+"""The questions: work and precision, cost of a step, growth with dimension, time to build."""
 
 from __future__ import annotations
 
-import ctypes
 import math
 import time
 from collections.abc import Callable
@@ -11,12 +10,25 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import numpy as np
-
 from benchmarks import python_peers
-from benchmarks.measure import ENERGY, ORBIT, SAMPLES, Cell, Judge, Study, cheapest, reach, run, scan, time_cells
-from benchmarks.problems import PROBLEMS, Problem, volterra
-from benchmarks.solvers import Method, build_phigen, c_peers, phigen_method, reference, vector_rk4
+from benchmarks.lanes import lanes_methods
+from benchmarks.measure import (
+    ENERGY,
+    ORBIT,
+    SAMPLES,
+    Cell,
+    Judge,
+    Result,
+    Scan,
+    Study,
+    cheapest,
+    reach,
+    run,
+    scan,
+    time_cells,
+)  # fmt: skip
+from benchmarks.problems import Problem, volterra
+from benchmarks.solvers import Method, build_phigen, c_peers, dop853_in_vectors, phigen_method, reference
 from phigen import spec as specs
 from phigen.compiler import compile_proved, emit
 from phigen.errors import PhigenError
@@ -33,6 +45,9 @@ class Effort:
     quick: bool = False
 
 
+#: How notes begin that make a run a failure.
+GRID_FAILED = "the grid ends too soon"
+
 QUICK = Effort(rounds=3, limit=0.05, long_limit=0.0, quick=True)
 
 
@@ -48,7 +63,7 @@ def methods_of(problem: Problem, effort: Effort) -> tuple[list[Method], list[str
             except PhigenError as error:
                 notes.append(f"phigen {order} and above, {method}: {str(error).splitlines()[0]}")
                 break
-    peers = c_peers(problem)
+    peers = [*c_peers(problem), *lanes_methods(problem)]
     if not effort.quick:
         more, missing = python_peers.available(problem)
         peers += more
@@ -65,11 +80,13 @@ def work_precision(problem: Problem, effort: Effort, say: Callable[[str], None])
     judge, targets = Judge(problem, states), (*ENERGY, *ORBIT)
     say(f"{problem.name}: scanning")
     scans = {m.name: scan(m, problem, judge, targets, effort.limit) for m in methods}
-    cells = [cell for target in targets for cell in _cells(methods, scans, target)]
+    notes += [f"{GRID_FAILED}: {error}" for s in scans.values() if (error := s.failure())]
+    results = {name: list(scanned.results.values()) for name, scanned in scans.items()}
+    cells = [cell for target in targets for cell in _cells(methods, results, target)]
     say(f"{problem.name}: timing")
     named = {m.name: m for m in methods}
     time_cells(cells, named, problem.short, SAMPLES["short"], judge, effort.rounds)
-    everything = [r for results in scans.values() for r in results]
+    everything = [r for each in results.values() for r in dict.fromkeys(each)]
     studies = [Study(problem.name, problem.title, problem.short, everything, cells, notes)]
     if effort.long_limit:
         say(f"{problem.name}: long horizon")
@@ -77,33 +94,30 @@ def work_precision(problem: Problem, effort: Effort, say: Callable[[str], None])
     return studies
 
 
-def _long(problem: Problem, methods: list[Method], scans: dict[str, Any], short: list[Cell], effort: Effort) -> Study:
+def _long(problem: Problem, methods: list[Method], scans: dict[str, Scan], short: list[Cell], effort: Effort) -> Study:
     """Those that were best over the short horizon, and the classics, over the long one (energy only)."""
-    judge, cells, everything = Judge(problem), [], []
+    judge, cells = Judge(problem), []
+    runs: dict[str, dict[int, Result]] = {m.name: {} for m in methods}
     for target in ENERGY:
         chosen = {c.result.method for c in short if c.target == target and c.family == "phigen" and c.result}
         # A target of the short horizon that needs order k may need a neighbour of it here.
         ours = [m for m in methods if m.family == "phigen" and m.name in chosen]
-        peers = [
-            m
-            for m in methods
-            if m.family != "phigen" and not m.name.startswith(("scipy", "RK4", "Kahan in", "Poisson"))
-        ]
-        results = {m.name: reach(m, problem, judge, scans[m.name], target, effort.long_limit) for m in [*ours, *peers]}
-        everything += [r for rs in results.values() for r in rs]
-        cells += _cells([*ours, *peers], results, target)
+        peers = [m for m in methods if m.family != "phigen" and not m.name.startswith(("RK4", "Kahan in", "Poisson"))]
+        for m in (*ours, *peers):
+            reach(scans[m.name], judge, target, effort.long_limit, runs[m.name])
+        cells += _cells([*ours, *peers], {name: list(results.values()) for name, results in runs.items()}, target)
     rounds = max(2, effort.rounds - 3)
     time_cells(cells, {m.name: m for m in methods}, problem.long, SAMPLES["long"], judge, rounds)
+    everything = [r for results in runs.values() for r in results.values()]
     return Study(problem.name, problem.title, problem.long, everything, cells, [])
 
 
-def _cells(methods: list[Method], scans: dict[str, Any], target: tuple[str, float]) -> list[Cell]:
-    """One cell for each peer, and one for each gauge of phigen, of the best order."""
+def _cells(methods: list[Method], scans: dict[str, list[Result]], target: tuple[str, float]) -> list[Cell]:
+    """One cell for each row: the best order, or variant, of a peer or of a method of phigen."""
     cells = []
     groups: dict[str, list[Method]] = {}
     for m in methods:
-        label = "phigen" + m.name.partition(",")[1] + m.name.partition(",")[2] if m.family == "phigen" else m.name
-        groups.setdefault(label, []).append(m)
+        groups.setdefault(m.row or m.name, []).append(m)
     for label, members in groups.items():
         results = [r for m in members for r in scans[m.name]]
         cells.append(Cell(label, members[0].family, target, cheapest(results, target)))
@@ -130,69 +144,13 @@ def cost_of_steps(problem: Problem, effort: Effort) -> list[dict[str, Any]]:
     return list(rows.values())
 
 
-def ensembles(effort: Effort) -> list[dict[str, Any]]:
-    """Many rigid bodies on one sphere: seconds per member and unit of time, worst energy error at the end."""
-    problem, members, horizon = PROBLEMS[0], 256, 100.0 if effort.quick else 1000.0
-    judge = Judge(problem)
-    x0 = np.random.default_rng(1).normal(size=(3, members))
-    x0 *= np.sqrt(3 / (x0**2).sum(0))
-    libraries: dict[str, tuple[ctypes.CDLL, tuple[float, ...]]] = {
-        "RK4 in C, 8 members at once": (vector_rk4(problem), (0.1, 0.05, 0.025, 0.0125))
-    }
-    for method, steps in (("gauge auto", (0.5, 0.25, 0.125)), ("splitting", (1.0, 0.5, 0.25, 0.125))):
-        for order in (4, 6, 8):
-            built = build_phigen(problem.spec(order, method))
-            libraries[f"phigen {order}, {method}"] = (built.library, steps)
-    rows: dict[tuple[str, float], dict[str, Any]] = {}
-    for _ in range(min(effort.rounds, 3)):
-        for name, (library, steps) in libraries.items():
-            for h in steps:
-                x, seconds = x0.copy(), np.zeros(1)
-                function = library.measure_many
-                function.argtypes = (ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_long, ctypes.c_void_p)
-                status = function(x.ctypes.data, members, h, round(horizon / h), seconds.ctypes.data)
-                row = rows.setdefault((name, h), {"method": name, "h": h, "status": status, "times": []})
-                row["times"].append(float(seconds[0]) / members / horizon * 1e9)
-                with np.errstate(all="ignore"):
-                    row["energy"] = float(np.abs(judge.energy(*x) / judge.energy(*x0) - 1).max())
-                    row["casimir"] = float(np.abs((x**2).sum(0) / 3 - 1).max())
-    return [*rows.values(), *_heyoka_ensemble(problem, x0, horizon, judge)]
-
-
-def _heyoka_ensemble(problem: Problem, x0: np.ndarray, horizon: float, judge: Judge) -> list[dict[str, Any]]:
-    try:
-        import heyoka
-    except ImportError:
-        return []
-    width = heyoka.recommended_simd_size()
-    variables = heyoka.make_vars(*problem.coordinates)
-    table = dict(zip(problem.symbols, variables, strict=True))
-    system = [(v, heyoka.from_sympy(e.evalf(17), table)) for v, e in zip(variables, problem.field, strict=True)]
-    rows = []
-    for tolerance in (1e-4, 1e-6, 1e-8, 1e-10, 1e-12):
-        solver = heyoka.taylor_adaptive_batch(system, x0[:, :width].copy(), tol=tolerance)
-        x, seconds = x0.copy(), 0.0
-        for m in range(0, x.shape[1], width):
-            solver.set_time(0.0)
-            solver.state[:] = x[:, m : m + width]
-            began = time.thread_time()
-            solver.propagate_until(horizon)
-            seconds += time.thread_time() - began
-            x[:, m : m + width] = solver.state
-        row = {"method": f"heyoka, {width} members at once", "h": tolerance, "status": 0}
-        row["times"] = [seconds / x.shape[1] / horizon * 1e9]
-        row["energy"] = float(np.abs(judge.energy(*x) / judge.energy(*x0) - 1).max())
-        row["casimir"] = float(np.abs((x**2).sum(0) / 3 - 1).max())
-        rows.append(row)
-    return rows
-
-
 def growth(effort: Effort) -> list[dict[str, Any]]:
     """Volterra lattices: nanoseconds per step and coordinate, operation by operation the same system."""
     rows = []
     for n in (3, 5, 9) if effort.quick else (3, 5, 9, 15, 21, 30):
         problem = volterra(n)
-        methods = {m.name: m for m in c_peers(problem) if m.name in ("RK4 in C", "DOP853 in C", "Kahan in C")}
+        peers = [m for m in c_peers(problem) if m.name in ("RK4 in C", "DOP853 in C", "Kahan in C")]
+        methods = {m.name: m for m in (*peers, dop853_in_vectors(problem), *lanes_methods(problem))}
         for order in problem.orders:
             try:
                 built = build_phigen(problem.spec(order))

@@ -8,7 +8,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from benchmarks.measure import Cell, Study, Target, ratios
+from benchmarks.measure import ENERGY, ORBIT, Cell, Study, Target, ratios
 from phigen.runtime import toolchain
 
 
@@ -54,9 +54,9 @@ def work_precision(study: Study) -> str:
 def _entry(cell: Cell | None, best: Cell | None) -> str:
     if cell is None or cell.result is None or not cell.times:
         return "not reached"
-    name = f"h={cell.result.setting:.3g}" if cell.result.steps and cell.result.order else f"{cell.result.setting:.0e}"
-    if cell.family == "phigen":
-        name = f"order {cell.result.order}, {name}"
+    name = f"h={cell.result.setting:.3g}" if cell.result.step_based else f"{cell.result.setting:.0e}"
+    if cell.result.variant:
+        name = f"{cell.result.variant}, {name}"
     if best is None:
         return f"{1e3 * median(cell.times):.3g} ms ({name})"
     if cell is best:
@@ -87,14 +87,15 @@ def _failures(study: Study) -> list[str]:
     return [f"{m}: {status} at {', '.join(f'{h:.3g}' for h in hs)}" for (m, status), hs in failed.items()]
 
 
-def speed_ups(studies: Sequence[Study]) -> str:
-    """The summary: best peer over phigen, for all problems and horizons."""
-    targets = list(dict.fromkeys(c.target for s in studies for c in s.cells))
-    rows = []
-    for s in studies:
-        entries = [_speed_up(s, t, _best(s.cells, t, "phigen")) for t in targets]
-        rows.append([f"{s.title}, T = {s.horizon:g}", *entries])
-    return table(["best peer / phigen", *(f"{t[0]} {t[1]:.0e}" for t in targets)], rows) + "\n"
+def speed_up_row(study: Study) -> list[str]:
+    """A row of the summary: best peer over phigen, by target."""
+    entries = [_speed_up(study, t, _best(study.cells, t, "phigen")) for t in (*ENERGY, *ORBIT)]
+    return [f"{study.title}, T = {study.horizon:g}", *entries]
+
+
+def speed_ups(rows: Sequence[Sequence[str]]) -> str:
+    """The summary of all problems and horizons."""
+    return table(["best peer / phigen", *(f"{t[0]} {t[1]:.0e}" for t in (*ENERGY, *ORBIT))], rows) + "\n"
 
 
 def cost_of_steps(rows: Sequence[dict[str, Any]]) -> str:
@@ -107,19 +108,6 @@ def cost_of_steps(rows: Sequence[dict[str, Any]]) -> str:
         for r in rows
     ]  # fmt: skip
     return table(["", "method", "h", "ns per step", "over RK4 in C", "evaluations per step", "status"], text) + "\n"
-
-
-def ensembles(rows: Sequence[dict[str, Any]]) -> str:
-    base = min((median(r["times"]) for r in rows if r["method"].startswith("RK4")), default=1.0)
-    text = [
-        [
-            r["method"], f"{r['h']:.3g}", f"{median(r['times']):.1f}", f"{median(r['times']) / base:.2f}",
-            f"{r['energy']:.0e}", f"{r['casimir']:.0e}", "ok" if not r["status"] else f"status {r['status']}",
-        ]
-        for r in sorted(rows, key=lambda r: -r["energy"])
-    ]  # fmt: skip
-    head = ["", "h or tolerance", "ns per unit time and member", "over the coarsest RK4", "energy", "Casimir", "status"]
-    return table(head, text) + "\n"
 
 
 def growth(rows: Sequence[dict[str, Any]]) -> str:

@@ -10,6 +10,11 @@
 #endif
 typedef REAL real;
 
+/* Numbers of a state: not the vectors in which a method keeps its stages. */
+#ifndef STATE
+#define STATE real
+#endif
+
 static double seconds_of(clockid_t clock)
 {
     struct timespec now;
@@ -29,4 +34,4 @@ static inline double wall_time(void)
     return seconds_of(CLOCK_MONOTONIC);
 }
 
-enum { OK = 0, NOT_FINITE = 3, TOO_SLOW = 100 };
+enum { OK = 0, NO_CONVERGENCE = 1, NOT_FINITE = 3, TOO_SLOW = 100 };

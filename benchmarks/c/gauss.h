@@ -1,7 +1,7 @@
 /* Gauss collocation, solved by fixed-point iteration to round-off; one stage is the implicit midpoint rule. The first
    guess extrapolates the collocation polynomial of the previous step, x is summed with compensation. */
 static struct {
-    int started;
+    int started, failed;
     long evaluations;
     real k[MOST_STAGES][DIM], carry[DIM];
 } gauss;
@@ -19,7 +19,8 @@ INLINE void gauss_step(int stages, const real *a, const real *b, const real *ext
                 k[s][i] = 0;
                 for (int j = 0; j < stages; ++j) k[s][i] += extrapolation[s * stages + j] * gauss.k[j][i];
             }
-    for (int iteration = 0; iteration < 60; ++iteration) {
+    int converged = 0;
+    for (int iteration = 0; iteration < 200 && !converged; ++iteration) {
         real fresh[MOST_STAGES][DIM], change = 0, size = 0;
         for (int s = 0; s < stages; ++s) {
             for (int i = 0; i < DIM; ++i) {
@@ -36,9 +37,10 @@ INLINE void gauss_step(int stages, const real *a, const real *b, const real *ext
             }
         }
         memcpy(k, fresh, (size_t)stages * sizeof k[0]);
-        if (change <= ROUNDING * size || (change >= previous && change < 400 * ROUNDING * size)) break;
+        converged = change <= ROUNDING * size || (change >= previous && change < 400 * ROUNDING * size);
         previous = change;
     }
+    gauss.failed = !converged;
     memcpy(gauss.k, k, (size_t)stages * sizeof k[0]);
     for (int i = 0; i < DIM; ++i) {
         real sum = 0;
@@ -52,5 +54,6 @@ INLINE void gauss_step(int stages, const real *a, const real *b, const real *ext
 #define GAUSS(NAME, STAGES)                                                                                          \
     static void NAME(real x[DIM], double h, long steps)                                                              \
     {                                                                                                                \
-        for (long n = 0; n < steps; ++n) gauss_step(STAGES, NAME##_a, NAME##_b, NAME##_extrapolation, x, h);         \
+        for (long n = 0; n < steps && !gauss.failed; ++n)                                                             \
+            gauss_step(STAGES, NAME##_a, NAME##_b, NAME##_extrapolation, x, h);         \
     }

@@ -1,4 +1,5 @@
-/* Kahan's method for quadratic fields: (I - h/2 f'(x)) (x1 - x) = h f(x), by elimination without pivoting. */
+/* Kahan's method for quadratic fields: (I - h/2 f'(x)) (x1 - x) = h f(x), by elimination without pivoting, summed with
+   compensation. */
 INLINE void kahan_step(double x[DIM], double h)
 {
     double f[DIM], J[DIM][DIM];
@@ -25,7 +26,11 @@ INLINE void kahan_step(double x[DIM], double h)
         for (int j = i + 1; j < DIM; ++j) f[i] -= J[i][j] * f[j];
         f[i] /= J[i][i];
     }
-    for (int i = 0; i < DIM; ++i) x[i] += f[i];
+    for (int i = 0; i < DIM; ++i) {
+        const double addend = f[i] + carry[i], old = x[i];
+        x[i] = old + addend;
+        carry[i] = addend - (x[i] - old);
+    }
 }
 
 COMPOSE(kahan, kahan_step, whole_step)

@@ -1,11 +1,11 @@
 /* Members side by side in vectors of WIDTH: x[i * members + m]; members is a multiple of WIDTH. */
-int measure_many(double *x, long members, double h, long steps, double *seconds)
+int measure_many(int method, double *x, long members, double h, long steps, double *seconds)
 {
     const double began = cpu_time();
     for (long m = 0; m < members; m += WIDTH) {
         real block[DIM];
         for (int i = 0; i < DIM; ++i) memcpy(&block[i], x + i * members + m, sizeof block[i]);
-        rk4(block, h, steps);
+        methods[method](block, h, steps);
         for (int i = 0; i < DIM; ++i) memcpy(x + i * members + m, &block[i], sizeof block[i]);
     }
     *seconds = cpu_time() - began;

@@ -3,9 +3,9 @@
 int measure_run(int method, const double *start, double h, long chunk, long chunks, double limit, double *out,
               double *seconds, double *evaluations)
 {
-    real x[DIM];
+    STATE x[DIM];
     for (int i = 0; i < DIM; ++i) x[i] = start[i];
-    memset(&gauss, 0, sizeof gauss);
+    reset();
     const double began = cpu_time(), started = wall_time();
     int status = OK;
     for (long c = 0; c < chunks && status == OK; ++c) {
@@ -14,7 +14,8 @@ int measure_run(int method, const double *start, double h, long chunk, long chun
             out[c * DIM + i] = (double)x[i];
             if (!(fabs(x[i]) < 1e9)) status = NOT_FINITE;
         }
-        if (wall_time() - started > limit) status = c + 1 < chunks ? TOO_SLOW : OK;
+        if (gauss.failed) status = NO_CONVERGENCE;
+        else if (status == OK && c + 1 < chunks && wall_time() - started > limit) status = TOO_SLOW;
     }
     *seconds = cpu_time() - began;
     *evaluations = (double)gauss.evaluations;

@@ -13,13 +13,13 @@ INLINE void rotate(double x[6], int a, int b, double angle)
     turn(&x[3 + a], &x[3 + b], s, c);
 }
 
-INLINE void splitting_step(double x[6], double h)
+INLINE void rotations(double x[6], double h)
 {
-    kick(x, 0.5 * h);
     rotate(x, 1, 2, 0.25 * h * x[0]);
     rotate(x, 2, 0, 0.25 * h * x[1]);
     rotate(x, 0, 1, h * x[2]);
     rotate(x, 2, 0, 0.25 * h * x[1]);
     rotate(x, 1, 2, 0.25 * h * x[0]);
-    kick(x, 0.5 * h);
 }
+#define OUTER kick
+#define INNER rotations

@@ -20,11 +20,11 @@ INLINE void flow3(double x[3], double h)
     x[1] *= exponential(A23 * t);
 }
 
-INLINE void splitting_step(double x[3], double h)
+INLINE void flows(double x[3], double h)
 {
-    flow1(x, 0.5 * h);
     flow2(x, 0.5 * h);
     flow3(x, h);
     flow2(x, 0.5 * h);
-    flow1(x, 0.5 * h);
 }
+#define OUTER flow1
+#define INNER flows

@@ -3,18 +3,29 @@
 import math
 from functools import cache
 
+import mpmath
 import numpy as np
 import pytest
 from systems import slow_but
 
 pytest.importorskip("scipy")
 
-from benchmarks import lattices, tables
-from benchmarks.measure import Cell, Judge, Study, run
-from benchmarks.problems import PROBLEMS
-from benchmarks.solvers import Method, build_phigen, c_peers, phigen_method, reference
+from benchmarks import document, eccentric, ensembles, lanes, lattices, tables
+from benchmarks.lanes import collocation, lanes_method
+from benchmarks.measure import Cell, Grid, Judge, Result, Scan, Study, run
+from benchmarks.problems import PROBLEMS, volterra
+from benchmarks.solvers import (
+    Method,
+    Run,
+    build_phigen,
+    c_peers,
+    dop853_in_vectors,
+    phigen_method,
+    reference,
+)
 
-BODY = PROBLEMS[0]
+BODY, PENDULUM = PROBLEMS[0], PROBLEMS[-1]
+STEPPED = [m for m in c_peers(BODY) if m.step_based]
 
 
 @cache
@@ -31,7 +42,7 @@ def observed_order(method: Method) -> float:
     return math.log2(errors[0] / errors[1])
 
 
-@pytest.mark.parametrize("method", c_peers(BODY), ids=lambda m: m.name)
+@pytest.mark.parametrize("method", STEPPED, ids=lambda m: m.name)
 def test_a_peer_has_its_order_on_the_rigid_body(method):
     assert observed_order(method) > method.order - 0.5
 
@@ -41,8 +52,9 @@ def test_all_peers_solve_the_same_system(problem):
     h = problem.typical / 20
     exact, uncertainty = reference(problem, 100 * h, 2)
     assert uncertainty < 1e-11
-    for method in c_peers(problem):
-        done = method.run(problem.start, h, 50, 2, math.inf)
+    for method in (*c_peers(problem), lanes_method(problem, 16)):
+        setting, chunk = (h, 50) if method.step_based else (1e-8, 50 * h)
+        done = method.run(problem.start, setting, chunk, 2, math.inf)
         assert done.status == "ok"
         assert np.abs(done.states - exact).max() < (1e-2 if method.order == 2 else 1e-5), method.name
 
@@ -75,3 +87,162 @@ def test_peers_of_lattices_have_their_orders(sites):
     for index, order, h in ((0, 4, 0.05), (1, 8, 0.25)):
         coarse, fine = (np.abs(kernel.method(index)(x, h / k, round(k / h))[0] - exact).max() for k in (1, 2))
         assert math.log2(coarse / fine) > order - 0.7
+
+
+# Gauss methods in lanes ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("order", "h"), slow_but([(16, 2.5)], [(4, 0.2), (8, 1.0), (12, 2.0), (16, 2.5)]), ids=lambda v: str(v)
+)
+def test_gauss_in_lanes_has_its_order(order, h):
+    method, horizon = lanes_method(BODY, order), 20.0
+    exact = body_after(horizon, 4)
+    errors = [
+        np.abs(method.run(BODY.start, h / k, round(horizon * k / h / 4), 4, math.inf).states - exact).max()
+        for k in (1, 2)
+    ]
+    assert errors[1] > 1e-14
+    assert math.log2(errors[0] / errors[1]) > order - 1.0
+
+
+def test_gauss_in_lanes_keeps_quadratic_invariants_without_a_drift():
+    """With a_ij rounded, in place of mu_ij + mu_ji = 1, the energy drifts in proportion to the time."""
+    done = lanes_method(BODY, 16).run(BODY.start, 0.5, 2000, 100, math.inf)
+    errors = Judge(BODY).errors(done.states)
+    assert done.status == "ok"
+    assert max(errors["energy"], errors["casimir"]) < 3e-14
+
+
+@pytest.mark.slow
+def test_sine_in_lanes_is_right_to_rounding():
+    """The pendulum is the only peer with a sine: its orbit, over many turns, is that of the reference."""
+    spinning = (0.3, 40.0, 0.0)
+    fast = type(PENDULUM)(**{**PENDULUM.__dict__, "start": spinning, "typical": 0.002})
+    exact, _ = reference(fast, 4.0, 2)
+    done = lanes_method(fast, 16).run(spinning, 0.01, 200, 2, math.inf)
+    assert np.abs(done.states - exact).max() < 1e-11
+
+
+def test_coefficients_of_gauss_are_symplectic():
+    _, a, b = collocation(8)
+    with mpmath.workdps(60):
+        defect = max(abs(b[i] * a[i][j] + b[j] * a[j][i] - b[i] * b[j]) for i in range(8) for j in range(8))
+        assert defect < 1e-40
+        assert abs(sum(b) - 1) < 1e-40
+
+
+def test_a_predictor_reproduces_slow_signals():
+    stages = 8
+    nodes = [float(c) for c in collocation(stages)[0]]
+    past = np.array([np.cos(0.5 * (c - back)) for back in (1, 2) for c in nodes])
+    weights = lanes.predictors(stages)[1].reshape(lanes.HISTORY, stages, stages)
+    guess = sum(weights[m] @ past[m * stages : (m + 1) * stages] for m in range(lanes.HISTORY))
+    assert np.abs(guess - np.cos(0.5 * np.array(nodes))).max() < 1e-8
+
+
+# grids ---------------------------------------------------------------------------------------------------------------
+
+
+def pretending(best: float) -> Method:
+    """A method that is always accurate enough, and the cheaper the nearer its step is to ``best``."""
+
+    def run(start, h, chunk, chunks, limit):
+        return Run(np.tile(start, (chunks, 1)), 1e-3 + abs(math.log(h / best)), chunk * chunks, 0, "ok")
+
+    return Method("pretending", run, 4)
+
+
+def scanned(best: float) -> Scan:
+    scan = Scan(Grid(pretending(best), BODY), Judge(BODY), [("energy", 1e-4)], math.inf)
+    scan.extend_finer()
+    return scan
+
+
+def test_a_best_setting_at_the_end_of_its_grid_extends_the_grid():
+    scan = scanned(best=5.5)
+    assert scan.best_at_coarse_end()  # the first step of the scan is 2
+    scan.extend_coarser()
+    assert not scan.failure()
+    cheapest = min(scan.results.values(), key=lambda r: r.seconds)
+    assert 4.5 < cheapest.setting < 6.7
+    assert max(r.setting for r in scan.results.values()) > cheapest.setting
+
+
+def test_a_grid_that_cannot_be_extended_is_a_failure():
+    scan = scanned(best=1e6)
+    scan.extend_coarser()
+    assert "is the best for energy 1e-04" in scan.failure()
+
+
+def test_ensembles_extend_their_grids():
+    def advance(x, h):
+        return 1e-3 + abs(math.log(h / 7.0))
+
+    trials = ensembles.scanned(ensembles.Bodies(1.0), ensembles.Contestant("", "", advance, 1.0, 0.5))
+    assert ensembles.best(trials, 1e-4).setting == 8.0
+    assert trials[0].setting > 8.0
+
+
+def test_a_table_names_the_variant_and_the_setting_of_a_row():
+    result = Result("DOP853 compensated", "peer", 8, 1e-9, 1.0, 1, 0, "ok", "compensated", step_based=False)
+    ours = Result("phigen 4", "phigen", 4, 0.5, 2.0, 1, 0, "ok", "order 4")
+    target = ("energy", 1e-8)
+    cells = [Cell("phigen", "phigen", target, ours, [2.0]), Cell("DOP853 in C", "peer", target, result, [1.0])]
+    text = tables.work_precision(Study("P1", "a body", 1.0, [], cells, []))
+    assert "0.50 [0.50–0.50] (compensated, 1e-09)" in text
+    assert "**1** (order 4, h=0.5)" in text
+
+
+def test_dop853_in_vectors_makes_the_steps_of_dop853():
+    problem = volterra(9)
+    plain = next(m for m in c_peers(problem) if m.name == "DOP853 in C")
+    one, other = (m.run(problem.start, 0.05, 20, 1, math.inf).states for m in (plain, dop853_in_vectors(problem)))
+    assert np.abs(one - other).max() < 1e-13
+
+
+# an eccentric orbit --------------------------------------------------------------------------------------------------
+
+
+def test_all_rows_of_the_eccentric_orbit_cover_the_same_physical_time():
+    """Steps of monitors are equal in another time, of which a period takes more or less: rows once ended half way."""
+    periods = 3
+    end = periods * eccentric.PERIOD
+    trials = [
+        (eccentric.monitored("log", 4, periods, 0).trial, 400),
+        (eccentric.monitored("r2**(3/4)", 4, periods, 0).trial, 200),
+        (eccentric.controlled(periods), 1e-9),
+        (eccentric.gauss(16, periods), 20),
+    ]
+    for trial, setting in trials:
+        row = trial(setting)
+        assert end <= row.time < end + 0.03 * eccentric.PERIOD, row.method
+        assert row.worst < 1e-2, row.method
+        assert row.seconds > 0
+        assert row.steps > 20 * periods
+
+
+def test_heyoka_covers_the_same_physical_time():
+    pytest.importorskip("heyoka")
+    row = eccentric.taylor(3)(1e-10)
+    assert row.time == 3 * eccentric.PERIOD
+    assert row.worst < 1e-6
+
+
+# the document --------------------------------------------------------------------------------------------------------
+
+
+def test_a_table_replaces_what_stands_between_its_markers():
+    begin, end = document.markers("steps")
+    text = document.replaced(f"before\n{begin}\nold\n{end}\nafter", "steps", "new\n")
+    assert text == f"before\n{begin}\n\nnew\n\n{end}\nafter"
+    with pytest.raises(LookupError, match="no place for growth"):
+        document.replaced(text, "growth", "new")
+
+
+def test_the_document_has_a_place_for_every_table():
+    names = [f"work-{p.name}" for p in PROBLEMS]
+    text = document.DOCUMENT.read_text(encoding="utf-8")
+    for name in (*names, "summary", "machine", "steps", "ensembles", "growth", "build", "lattices", "eccentric",
+                 "gradients", "sharing"):  # fmt: skip
+        document.replaced(text, name, "")
