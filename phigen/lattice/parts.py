@@ -239,14 +239,15 @@ def colourings(cell: Cell) -> Iterator[Colouring]:
 
 
 def summands_of(cell: Cell) -> list[Summand]:
-    """The terms of H as they are written."""
+    """The terms of H as they are written; 0 is a term of H = 0, so that there is a flow, in which nothing moves."""
     if cell.relation == GRID:
-        return [Summand(term, *cell.extent(term)) for term in cell.terms]
+        return [Summand(term, *cell.extent(term)) for term in cell.terms or (ZERO,)]
     bonds = cell.bond_hamiltonian + cell.pair_hamiltonian
-    return [
+    summands = [
         *(Summand(term) for term in cell.terms),
         *(Summand(term, bond=True) for term in cell.additive_terms(bonds)),
     ]
+    return summands or [Summand(ZERO)]
 
 
 @dataclass

@@ -41,7 +41,8 @@ def split(system: System) -> Splitting:
     """
     listed = hamiltonian_terms(system)
     ring = ring_of(system, listed)
-    terms = terms_of(ring, listed)
+    # A constant H is one term, so that there is a flow, in which nothing moves.
+    terms = terms_of(ring, listed) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
     best: list[Flow] | None = None

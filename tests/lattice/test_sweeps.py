@@ -487,6 +487,9 @@ NOTHING_MOVES = {
     "graph": "lattice: {graph: g}\ncoordinates: [a]\npoisson: {bonds: {}}\nhamiltonian: {sites: a**2/2}\n",
     "pairs": "lattice: {pairs: all}\ncoordinates: [a]\npoisson: {brackets: {}}\nhamiltonian: {pairs: 'a[a]*a[b]'}\n",
     "flat": "lattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: 3\n",
+    "zero": "lattice: {axes: [i]}\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: 0\n",
+    "zero graph": "lattice: {graph: g}\ncoordinates: [a]\npoisson: {bonds: {'a[a]': {'a[b]': 1}}}\nhamiltonian: 0\n",
+    "zero pairs": "lattice: {pairs: all}\ncoordinates: [a]\npoisson: {brackets: {}}\nhamiltonian: {pairs: 0}\n",
 }
 
 
@@ -496,7 +499,7 @@ def test_without_brackets_or_forces_nothing_moves(kind: str, target: str) -> Non
     spec = specs.loads(f"phigen: 1\nname: nothing\n{NOTHING_MOVES[kind]}")
     found = phigen.compile(spec, target, tangent=True, adjoint=True)
     x = np.random.default_rng(1).normal(size=(len(spec.coordinates), 4))
-    more = {"bonds": [[0, 1], [1, 2]]} if kind == "graph" else {}
+    more = {"bonds": [[0, 1], [1, 2]]} if "graph" in kind else {}
     assert np.array_equal(found.integrate(x, 0.1, 3, **more).x, [x] * 4)
     vectors = np.random.default_rng(2).normal(size=(2, *x.shape))
     assert np.array_equal(found.step_tangent(x, 0.1, vectors, **more)[1], vectors)

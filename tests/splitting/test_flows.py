@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 from support import compile_text
 
+from phigen.api import solver_of
 from phigen.errors import SpecError
 from phigen.scheme.lowering import operation_counts
 from phigen.splitting.statements import check
@@ -178,3 +179,16 @@ def test_two_spins_turn_by_two_cross_products():
     counts = operation_counts(flow.roots)
     assert counts["functions"] == 2
     assert counts["multiplications"] <= 29
+
+
+@pytest.mark.parametrize("hamiltonian", ["0", "3", "k", "z"])
+def test_a_hamiltonian_that_moves_nothing_is_one_part(hamiltonian):
+    text = (
+        "coordinates: [x, y, z]\nparameters: {k: 2}\npoisson: {brackets: {x: {y: 1}}}\nscheme: splitting\n"
+        f"hamiltonian: {hamiltonian}\n"
+    )
+    compilation = compile_text(text)
+    assert len(compilation.splitting.flows) == 1
+    assert all(s.verdict == PROVED for s in check(compilation.system, compilation.splitting))
+    solver = solver_of(compilation, "numpy")
+    assert solver.integrate([1, 2, 3], 0.1, 4).x[-1].tolist() == [1, 2, 3]
