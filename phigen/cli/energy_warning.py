@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from phigen.spec.model import Spec
 from phigen.study.conservation import LARGE_ENERGY_ERROR, RELATIVE, SITES, TERMS, Unit
 from phigen.study.summary import Summary
@@ -27,6 +29,9 @@ def summary_warning(spec: Spec, summary: Summary, h: float, order: int) -> str:
 
 def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -> str:
     """The warning about an energy error, with a smaller step to try; empty if the error is not large."""
+    if not math.isfinite(error):
+        said = "H is not a finite number on all of this run: do not trust these states"
+        return f"{said}\n  hint: the run begins where H is not defined, or gets there"
     if unit.kind not in _SCALES or not error > LARGE_ENERGY_ERROR:
         return ""
     said = f"the energy error reaches {_multiple(error)} {_SCALES[unit.kind]}: do not trust these states"

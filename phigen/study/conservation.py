@@ -56,7 +56,8 @@ class Unit:
 
     def errors(self, values: Floats, start: float) -> Floats:
         """The errors (rows,) of values (rows,)."""
-        found: Floats = np.abs(values - start) / self.size
+        with np.errstate(invalid="ignore"):  # of energies that are not finite
+            found: Floats = np.abs(values - start) / self.size
         return found
 
 

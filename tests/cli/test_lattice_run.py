@@ -304,3 +304,14 @@ def test_another_seed_is_that_of_a_spec_with_it(phigen, chain, tmp_path):
 
 def test_a_lattice_without_noise_has_no_seed(phigen, chain):
     assert "chain has no noise" in phigen("run", chain, "--seed", 7).stderr
+
+
+def test_an_energy_that_is_no_number_is_told(phigen, tmp_path):
+    path = tmp_path / "eaters.yaml"
+    path.write_text(
+        "phigen: 1\nname: eaters\nlattice: {pairs: all}\ncoordinates: [x, y]\npoisson: {brackets: {x: {y: x*y}}}\n"
+        "hamiltonian: {sites: x - log(x) + y}\nruns: {r: {initial: {x: [1, -1], y: 1}, step: 0.1, steps: 4}}\n",
+        encoding="utf-8",
+    )
+    done = phigen("run", path, "-t", "numpy")
+    assert "warning: H is not a finite number on all of this run: do not trust these states" in done.stderr
