@@ -54,6 +54,8 @@ def _random(given: Mapping[str, Any], declared: Declarations, whole: bool) -> Va
         if key not in RANDOM_KEYS:
             hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
             reader.error(node, f"random values have no key {shown(key)}", hint)
+    if not given:  # its keys are no names, which was reported
+        return None
     if "random" not in given:
         first = next(iter(given.values()))[0]
         return reader.error(first, "values are a number, a formula, a list, or {random: …, seed: …}")

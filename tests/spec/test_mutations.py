@@ -1,0 +1,99 @@
+"""Specs with one value replaced by another: each is read as what it says, or refused with a place; nothing else.
+
+PHIGEN_RANDOM_SEEDS sets how many samples of mutants are drawn with --all.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import product
+from typing import Any
+
+import pytest
+from mutated_specs import BASES, document, mutants, places, replaced, tree_of
+from support import slow_but
+
+from phigen.errors import SpecError
+from phigen.spec import loads
+from phigen.spec.fields import SPEC
+from phigen.spec.kinds import Either, Kind, ListOf, MapOf, Record
+from phigen.spec.model import Spec
+
+SEEDS = int(os.environ.get("PHIGEN_RANDOM_SEEDS", "2"))
+FEW, MANY = 6, 100
+SAMPLES = slow_but(product(BASES, [0]), product(BASES, range(SEEDS)))
+#: Values that a key may have by default; all others must change what is read.
+DEFAULTS = ("[]", "{}", '""', "0", "auto", "true", "q")
+
+
+def meaning(text: str) -> Spec:
+    """What a spec says, but for its text and places."""
+    return replace(loads(text), source="", source_sha256="", locations={}, file="")
+
+
+def complaint(base: str, path: tuple[Any, ...], value: str) -> str:
+    """What is wrong with how a mutant is read; "" if nothing is."""
+    tree = tree_of(BASES[base])
+    text = document(replaced(tree, path, value))
+    try:
+        found = meaning(text)
+    except SpecError as error:
+        placed = [d.location is not None and d.source_line in text.split("\n") for d in error.diagnostics]
+        return "" if placed and all(placed) else f"an error without a place: {error}"
+    if value in DEFAULTS:
+        return ""
+    try:
+        without = meaning(document(replaced(tree, path, None)))
+    except SpecError:
+        return ""
+    return "accepted, and ignored" if found == without else ""
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_a_base_is_written_as_it_is_read(base: str) -> None:
+    assert meaning(document(tree_of(BASES[base]))) == meaning(BASES[base])
+
+
+@pytest.mark.parametrize(("base", "seed"), SAMPLES)
+def test_a_mutant_is_read_as_what_it_says_or_refused_at_its_place(base: str, seed: int) -> None:
+    sample = mutants(base, random.Random(f"{base} {seed}"), MANY if seed else FEW)
+    complaints = {(".".join(map(str, path)), value): complaint(base, path, value) for path, value in sample}
+    assert {mutant: said for mutant, said in complaints.items() if said} == {}
+
+
+#: Mutants that were read as something else, or ended in an internal error.
+DEFECTS = [
+    ("plane", ("runs", "a", "initial", "scale"), "[q]"),
+    ("plane", ("runs", "a", "initial", "scale"), "{random: normal}"),
+    ("plane", ("runs", "a", "initial", "seed"), "[1, [2]]"),
+    ("graph", ("runs", "b", "parameters", "k", "seed"), "²"),
+    ("graph", ("runs", "b", "initial", "q"), "{0: 0}"),
+]
+
+
+@pytest.mark.parametrize(("base", "path", "value"), DEFECTS)
+def test_mutants_that_were_misread_are_refused(base: str, path: tuple[Any, ...], value: str) -> None:
+    assert complaint(base, path, value) == ""
+    with pytest.raises(SpecError):
+        loads(document(replaced(tree_of(BASES[base]), path, value)))
+
+
+def records(kind: Kind) -> Iterator[Record]:
+    """All records of the format below a kind."""
+    if isinstance(kind, Record):
+        yield kind
+        for field in kind.fields:
+            yield from records(field.kind)
+    inner = [*kind.kinds.values()] if isinstance(kind, Either) else []
+    inner += [kind.item] if isinstance(kind, ListOf) else []
+    inner += [kind.value] if isinstance(kind, MapOf) else []
+    for each in inner:
+        yield from records(each)
+
+
+def test_the_bases_use_every_key() -> None:
+    used = {part for text in BASES.values() for path in places(tree_of(text)) for part in path if isinstance(part, str)}
+    assert {field.key for record in records(SPEC) for field in record.fields} - used == set()
