@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build ablowitz_ladik
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2ec4d4d4c9e0e2a9f11c0b8ea3d8a3f8e4ba34a2b46832760ca0e2f0e8eaa720
+ * body-sha256: ec30350c4cd94523c9779638f9d74b1c85e31104b8e8dc0325e5762c338a86b6
  */
 #include "ablowitz_ladik.h"
 #include <float.h>
@@ -445,11 +445,11 @@ int ablowitz_ladik_saved(const ablowitz_ladik_solver *s, double *x, size_t *far)
 
 ablowitz_ladik_status ablowitz_ladik_resume(ablowitz_ladik_solver *s, double h, const double *x, size_t far)
 {
-    const ablowitz_ladik_status status = ablowitz_ladik_set_step(s, h);
-    s->far = far;
-    if (status == ablowitz_ladik_OK && x == NULL) return ablowitz_ladik_OK;
-    if (status != ablowitz_ladik_OK || !ablowitz_ladik_finite(x, ablowitz_ladik_DIM * s->sites))
+    if (s == NULL || (x != NULL && !ablowitz_ladik_finite(x, ablowitz_ladik_DIM * s->sites)))
         return ablowitz_ladik_BAD_ARGUMENT;
+    if (ablowitz_ladik_set_step(s, h) != ablowitz_ladik_OK) return ablowitz_ladik_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return ablowitz_ladik_OK;
     for (size_t k = 0; k < ablowitz_ladik_DIM; ++k) ablowitz_ladik_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return ablowitz_ladik_OK;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build chiral_magnet
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 688153b463d490c47daf003f8e51bc3f984373ba185a350c6a3f2dbe94c4c77c
+ * body-sha256: 0fb028417184f5bd8c861a04cf93ed8ed7add484706d838d0094127a31b87d99
  */
 #include "chiral_magnet.h"
 #include <float.h>
@@ -615,11 +615,11 @@ int chiral_magnet_saved(const chiral_magnet_solver *s, double *x, size_t *far)
 
 chiral_magnet_status chiral_magnet_resume(chiral_magnet_solver *s, double h, const double *x, size_t far)
 {
-    const chiral_magnet_status status = chiral_magnet_set_step(s, h);
-    s->far = far;
-    if (status == chiral_magnet_OK && x == NULL) return chiral_magnet_OK;
-    if (status != chiral_magnet_OK || !chiral_magnet_finite(x, chiral_magnet_DIM * s->sites))
+    if (s == NULL || (x != NULL && !chiral_magnet_finite(x, chiral_magnet_DIM * s->sites)))
         return chiral_magnet_BAD_ARGUMENT;
+    if (chiral_magnet_set_step(s, h) != chiral_magnet_OK) return chiral_magnet_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return chiral_magnet_OK;
     for (size_t k = 0; k < chiral_magnet_DIM; ++k) chiral_magnet_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return chiral_magnet_OK;

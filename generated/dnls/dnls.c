@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: a4455b0dc521125e7405d6871f634e3a5e42d7035ac08432b63ee8dbd50c5ae3
+ * body-sha256: 08e73a1bb48dacb89276b67ae269eed973aca037515c21d38fd58ce90b3b98d5
  */
 #include "dnls.h"
 #include <float.h>
@@ -422,10 +422,10 @@ int dnls_saved(const dnls_solver *s, double *x, size_t *far)
 
 dnls_status dnls_resume(dnls_solver *s, double h, const double *x, size_t far)
 {
-    const dnls_status status = dnls_set_step(s, h);
+    if (s == NULL || (x != NULL && !dnls_finite(x, dnls_DIM * s->sites))) return dnls_BAD_ARGUMENT;
+    if (dnls_set_step(s, h) != dnls_OK) return dnls_BAD_ARGUMENT;
     s->far = far;
-    if (status == dnls_OK && x == NULL) return dnls_OK;
-    if (status != dnls_OK || !dnls_finite(x, dnls_DIM * s->sites)) return dnls_BAD_ARGUMENT;
+    if (x == NULL) return dnls_OK;
     for (size_t k = 0; k < dnls_DIM; ++k) dnls_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return dnls_OK;

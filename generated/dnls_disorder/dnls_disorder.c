@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build dnls_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: f85faa24feb6db0ac4d8b788a42952c35da47160274b7f3b8a4357b80e17b4ae
+ * body-sha256: 6abedc662a76f10aea65782f9a3df6bbf8b1c78035e3c3c086ab98ba7b578090
  */
 #include "dnls_disorder.h"
 #include <float.h>
@@ -448,11 +448,11 @@ int dnls_disorder_saved(const dnls_disorder_solver *s, double *x, size_t *far)
 
 dnls_disorder_status dnls_disorder_resume(dnls_disorder_solver *s, double h, const double *x, size_t far)
 {
-    const dnls_disorder_status status = dnls_disorder_set_step(s, h);
-    s->far = far;
-    if (status == dnls_disorder_OK && x == NULL) return dnls_disorder_OK;
-    if (status != dnls_disorder_OK || !dnls_disorder_finite(x, dnls_disorder_DIM * s->sites))
+    if (s == NULL || (x != NULL && !dnls_disorder_finite(x, dnls_disorder_DIM * s->sites)))
         return dnls_disorder_BAD_ARGUMENT;
+    if (dnls_disorder_set_step(s, h) != dnls_disorder_OK) return dnls_disorder_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return dnls_disorder_OK;
     for (size_t k = 0; k < dnls_disorder_DIM; ++k) dnls_disorder_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return dnls_disorder_OK;

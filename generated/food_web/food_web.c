@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4285e23939b8aab8792fd3bc85407b99ff77b7a3022f2d1ed04ece7d89662e08
+ * body-sha256: 6993d9a8b438574dd3d2f4db44c1ccd11507dd6a4b821f5be46dd71150ea8782
  */
 #include "food_web.h"
 #include <float.h>
@@ -520,10 +520,11 @@ int food_web_saved(const food_web_solver *s, double *x, size_t *far)
 
 food_web_status food_web_resume(food_web_solver *s, double h, const double *x, size_t far)
 {
-    const food_web_status status = food_web_set_step(s, h);
+    if (s == NULL || (x != NULL && !food_web_finite(x, food_web_DIM * s->sites)))
+        return food_web_BAD_ARGUMENT;
+    if (food_web_set_step(s, h) != food_web_OK) return food_web_BAD_ARGUMENT;
     s->far = far;
-    if (status == food_web_OK && x == NULL) return food_web_OK;
-    if (status != food_web_OK || !food_web_finite(x, food_web_DIM * s->sites)) return food_web_BAD_ARGUMENT;
+    if (x == NULL) return food_web_OK;
     for (size_t k = 0; k < food_web_DIM; ++k) food_web_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return food_web_OK;

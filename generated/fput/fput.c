@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 5f36887915674d2f134b8f4e63a73a9c0398e0402bb4f4664993e8c87d630a34
+ * body-sha256: 41f78097d819b10224588bf79ca6480372963967151734dca974978df4437a2f
  */
 #include "fput.h"
 #include <float.h>
@@ -213,8 +213,14 @@ static void fput_vector_field_row(const fput_row *row, double *restrict out)
 
 /* ---- The lattice ---- */
 #ifdef _OPENMP
+#ifdef __cplusplus
+extern "C" {
+#endif
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#ifdef __cplusplus
+}
+#endif
 #define fput_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
 #define fput_THREADS (size_t)omp_get_num_threads()
 #define fput_THREAD (size_t)omp_get_thread_num()
@@ -534,10 +540,10 @@ int fput_saved(const fput_solver *s, double *x, size_t *far)
 
 fput_status fput_resume(fput_solver *s, double h, const double *x, size_t far)
 {
-    const fput_status status = fput_set_step(s, h);
+    if (s == NULL || (x != NULL && !fput_finite(x, fput_DIM * s->sites))) return fput_BAD_ARGUMENT;
+    if (fput_set_step(s, h) != fput_OK) return fput_BAD_ARGUMENT;
     s->far = far;
-    if (status == fput_OK && x == NULL) return fput_OK;
-    if (status != fput_OK || !fput_finite(x, fput_DIM * s->sites)) return fput_BAD_ARGUMENT;
+    if (x == NULL) return fput_OK;
     for (size_t k = 0; k < fput_DIM; ++k) fput_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return fput_OK;
@@ -610,14 +616,16 @@ fput_status fput_sweep(fput_solver *s, size_t number, int far, size_t from, size
 
 fput_status fput_planes(const fput_solver *s, size_t field, size_t from, size_t to, double *x)
 {
-    if (s == NULL || field >= fput_DIM || from > to || to > s->sizes[0]) return fput_BAD_ARGUMENT;
+    if (s == NULL || x == NULL || field >= fput_DIM || from > to || to > s->sizes[0])
+        return fput_BAD_ARGUMENT;
     memcpy(x, s->x[field] + from, (to - from) * sizeof *x);
     return fput_OK;
 }
 
 fput_status fput_put_planes(fput_solver *s, size_t field, size_t from, size_t to, const double *x)
 {
-    if (s == NULL || field >= fput_DIM || from > to || to > s->sizes[0]) return fput_BAD_ARGUMENT;
+    if (s == NULL || x == NULL || field >= fput_DIM || from > to || to > s->sizes[0])
+        return fput_BAD_ARGUMENT;
     s->open = 0;
     memcpy(s->x[field] + from, x, (to - from) * sizeof *x);
     fput_ends(s->x[field], s->length, 0, s->length);

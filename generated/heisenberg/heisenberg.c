@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 3c321cc7298eae47a6ed67d9f5f60f3b34d91c45003a38e45a9ff1d5ebc37855
+ * body-sha256: 96308aa58e982cac518c9140e90d70c3b12e3797fad5858aa05b7d7367375430
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -467,8 +467,14 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 
 /* ---- The lattice ---- */
 #ifdef _OPENMP
+#ifdef __cplusplus
+extern "C" {
+#endif
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#ifdef __cplusplus
+}
+#endif
 #define heisenberg_PARALLEL _Pragma("omp parallel if (s->sites > 4096)")
 #define heisenberg_THREADS (size_t)omp_get_num_threads()
 #define heisenberg_THREAD (size_t)omp_get_thread_num()
@@ -877,11 +883,11 @@ int heisenberg_saved(const heisenberg_solver *s, double *x, size_t *far)
 
 heisenberg_status heisenberg_resume(heisenberg_solver *s, double h, const double *x, size_t far)
 {
-    const heisenberg_status status = heisenberg_set_step(s, h);
-    s->far = far;
-    if (status == heisenberg_OK && x == NULL) return heisenberg_OK;
-    if (status != heisenberg_OK || !heisenberg_finite(x, heisenberg_DIM * s->sites))
+    if (s == NULL || (x != NULL && !heisenberg_finite(x, heisenberg_DIM * s->sites)))
         return heisenberg_BAD_ARGUMENT;
+    if (heisenberg_set_step(s, h) != heisenberg_OK) return heisenberg_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return heisenberg_OK;
     for (size_t k = 0; k < heisenberg_DIM; ++k) heisenberg_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return heisenberg_OK;
@@ -965,7 +971,8 @@ heisenberg_status heisenberg_sweep(heisenberg_solver *s, size_t number, int far,
 heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, size_t from, size_t to,
     double *x)
 {
-    if (s == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0]) return heisenberg_BAD_ARGUMENT;
+    if (s == NULL || x == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0])
+        return heisenberg_BAD_ARGUMENT;
     const size_t rows = heisenberg_rows_of_plane(s), length = (size_t)s->length;
     for (size_t r = from * rows; r < to * rows; ++r, x += length)
         memcpy(x, s->x[field] + (ptrdiff_t)r * s->width, length * sizeof *x);
@@ -975,7 +982,8 @@ heisenberg_status heisenberg_planes(const heisenberg_solver *s, size_t field, si
 heisenberg_status heisenberg_put_planes(heisenberg_solver *s, size_t field, size_t from, size_t to,
     const double *x)
 {
-    if (s == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0]) return heisenberg_BAD_ARGUMENT;
+    if (s == NULL || x == NULL || field >= heisenberg_DIM || from > to || to > s->sizes[0])
+        return heisenberg_BAD_ARGUMENT;
     s->open = 0;
     const size_t rows = heisenberg_rows_of_plane(s), length = (size_t)s->length;
     for (size_t r = from * rows; r < to * rows; ++r, x += length) {

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build heisenberg_plane
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: c4fd059d5cd06e041b50ce4f0ca2c58826870dc346ed7daf99d1716b3c0d0ab4
+ * body-sha256: efd850e9bc801ec90799030c5bd8713c53a984dca21668ad599990f433961ea3
  */
 #include "heisenberg_plane.h"
 #include <float.h>
@@ -564,11 +564,11 @@ int heisenberg_plane_saved(const heisenberg_plane_solver *s, double *x, size_t *
 heisenberg_plane_status heisenberg_plane_resume(heisenberg_plane_solver *s, double h, const double *x,
     size_t far)
 {
-    const heisenberg_plane_status status = heisenberg_plane_set_step(s, h);
-    s->far = far;
-    if (status == heisenberg_plane_OK && x == NULL) return heisenberg_plane_OK;
-    if (status != heisenberg_plane_OK || !heisenberg_plane_finite(x, heisenberg_plane_DIM * s->sites))
+    if (s == NULL || (x != NULL && !heisenberg_plane_finite(x, heisenberg_plane_DIM * s->sites)))
         return heisenberg_plane_BAD_ARGUMENT;
+    if (heisenberg_plane_set_step(s, h) != heisenberg_plane_OK) return heisenberg_plane_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return heisenberg_plane_OK;
     for (size_t k = 0; k < heisenberg_plane_DIM; ++k) heisenberg_plane_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return heisenberg_plane_OK;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build klein_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 2d4b30d3ebc349f38eaeb15ae1775f0a9167e05fd2750b3bf67d1878464b17b9
+ * body-sha256: 55aa0ee8b62f4ddf562bfff749388b3be75599c16601683020aa31a33fdb1a8f
  */
 #include "klein_gordon.h"
 #include <float.h>
@@ -378,11 +378,11 @@ int klein_gordon_saved(const klein_gordon_solver *s, double *x, size_t *far)
 
 klein_gordon_status klein_gordon_resume(klein_gordon_solver *s, double h, const double *x, size_t far)
 {
-    const klein_gordon_status status = klein_gordon_set_step(s, h);
-    s->far = far;
-    if (status == klein_gordon_OK && x == NULL) return klein_gordon_OK;
-    if (status != klein_gordon_OK || !klein_gordon_finite(x, klein_gordon_DIM * s->sites))
+    if (s == NULL || (x != NULL && !klein_gordon_finite(x, klein_gordon_DIM * s->sites)))
         return klein_gordon_BAD_ARGUMENT;
+    if (klein_gordon_set_step(s, h) != klein_gordon_OK) return klein_gordon_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return klein_gordon_OK;
     for (size_t k = 0; k < klein_gordon_DIM; ++k) klein_gordon_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return klein_gordon_OK;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build nonlinear_wave
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 226cf25755dca2f096b20ebff83bbb17cab588ba917fd101993d1ab45ca3a118
+ * body-sha256: 7b2882d836c4476329b492116cbdb0b9e856a7c2487dbbe0efdf78d88f432266
  */
 #include "nonlinear_wave.h"
 #include <float.h>
@@ -396,11 +396,11 @@ int nonlinear_wave_saved(const nonlinear_wave_solver *s, double *x, size_t *far)
 
 nonlinear_wave_status nonlinear_wave_resume(nonlinear_wave_solver *s, double h, const double *x, size_t far)
 {
-    const nonlinear_wave_status status = nonlinear_wave_set_step(s, h);
-    s->far = far;
-    if (status == nonlinear_wave_OK && x == NULL) return nonlinear_wave_OK;
-    if (status != nonlinear_wave_OK || !nonlinear_wave_finite(x, nonlinear_wave_DIM * s->sites))
+    if (s == NULL || (x != NULL && !nonlinear_wave_finite(x, nonlinear_wave_DIM * s->sites)))
         return nonlinear_wave_BAD_ARGUMENT;
+    if (nonlinear_wave_set_step(s, h) != nonlinear_wave_OK) return nonlinear_wave_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return nonlinear_wave_OK;
     for (size_t k = 0; k < nonlinear_wave_DIM; ++k) nonlinear_wave_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return nonlinear_wave_OK;

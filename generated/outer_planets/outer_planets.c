@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build outer_planets
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 96b1c457aa65663fff5a1c1b2e2e4cc315cf9e1684dbc696fa56973b251c6f69
+ * body-sha256: 4ddfca8f72860881991f655fa31664aa33fa257aa895c4e7373a3399f38dd991
  */
 #include "outer_planets.h"
 #include <float.h>
@@ -464,11 +464,11 @@ int outer_planets_saved(const outer_planets_solver *s, double *x, size_t *far)
 
 outer_planets_status outer_planets_resume(outer_planets_solver *s, double h, const double *x, size_t far)
 {
-    const outer_planets_status status = outer_planets_set_step(s, h);
-    s->far = far;
-    if (status == outer_planets_OK && x == NULL) return outer_planets_OK;
-    if (status != outer_planets_OK || !outer_planets_finite(x, outer_planets_DIM * s->sites))
+    if (s == NULL || (x != NULL && !outer_planets_finite(x, outer_planets_DIM * s->sites)))
         return outer_planets_BAD_ARGUMENT;
+    if (outer_planets_set_step(s, h) != outer_planets_OK) return outer_planets_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return outer_planets_OK;
     for (size_t k = 0; k < outer_planets_DIM; ++k) outer_planets_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return outer_planets_OK;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sine_gordon
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 35984d290b946af0165390f2f5b004c5fb4654c0ecba4d8ed655821796226f94
+ * body-sha256: 8ef52e3cfdff9f44f820f0c81bd3a104fb5af49d1ebf7d6c5acad6ac57c02782
  */
 #include "sine_gordon.h"
 #include <float.h>
@@ -404,11 +404,11 @@ int sine_gordon_saved(const sine_gordon_solver *s, double *x, size_t *far)
 
 sine_gordon_status sine_gordon_resume(sine_gordon_solver *s, double h, const double *x, size_t far)
 {
-    const sine_gordon_status status = sine_gordon_set_step(s, h);
-    s->far = far;
-    if (status == sine_gordon_OK && x == NULL) return sine_gordon_OK;
-    if (status != sine_gordon_OK || !sine_gordon_finite(x, sine_gordon_DIM * s->sites))
+    if (s == NULL || (x != NULL && !sine_gordon_finite(x, sine_gordon_DIM * s->sites)))
         return sine_gordon_BAD_ARGUMENT;
+    if (sine_gordon_set_step(s, h) != sine_gordon_OK) return sine_gordon_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return sine_gordon_OK;
     for (size_t k = 0; k < sine_gordon_DIM; ++k) sine_gordon_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return sine_gordon_OK;

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: e277c3e2d08c0ef537573e5776456c0eafa89cbde6a9e08b00113f6101fc936a
+ * body-sha256: 4f6a3c467b39cc9a603a23cddc072ed60df0574ff9d1066079e0bb40fb528a82
  */
 #include "toda.h"
 #include <float.h>
@@ -410,10 +410,10 @@ int toda_saved(const toda_solver *s, double *x, size_t *far)
 
 toda_status toda_resume(toda_solver *s, double h, const double *x, size_t far)
 {
-    const toda_status status = toda_set_step(s, h);
+    if (s == NULL || (x != NULL && !toda_finite(x, toda_DIM * s->sites))) return toda_BAD_ARGUMENT;
+    if (toda_set_step(s, h) != toda_OK) return toda_BAD_ARGUMENT;
     s->far = far;
-    if (status == toda_OK && x == NULL) return toda_OK;
-    if (status != toda_OK || !toda_finite(x, toda_DIM * s->sites)) return toda_BAD_ARGUMENT;
+    if (x == NULL) return toda_OK;
     for (size_t k = 0; k < toda_DIM; ++k) toda_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return toda_OK;

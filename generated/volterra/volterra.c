@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build volterra
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 07041acf32a5aeec24bbac3bda5870985d62d40e0992fd3531ef072ed49fcfb3
+ * body-sha256: 8ceff4bff5d60ab70524e58305dcaa9b6f46e974c04ae25b1fe34e1ed3a4fb81
  */
 #include "volterra.h"
 #include <float.h>
@@ -416,10 +416,11 @@ int volterra_saved(const volterra_solver *s, double *x, size_t *far)
 
 volterra_status volterra_resume(volterra_solver *s, double h, const double *x, size_t far)
 {
-    const volterra_status status = volterra_set_step(s, h);
+    if (s == NULL || (x != NULL && !volterra_finite(x, volterra_DIM * s->sites)))
+        return volterra_BAD_ARGUMENT;
+    if (volterra_set_step(s, h) != volterra_OK) return volterra_BAD_ARGUMENT;
     s->far = far;
-    if (status == volterra_OK && x == NULL) return volterra_OK;
-    if (status != volterra_OK || !volterra_finite(x, volterra_DIM * s->sites)) return volterra_BAD_ARGUMENT;
+    if (x == NULL) return volterra_OK;
     for (size_t k = 0; k < volterra_DIM; ++k) volterra_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return volterra_OK;

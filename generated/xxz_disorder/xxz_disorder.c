@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build xxz_disorder
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 35c87143c217da393f5c6240cd9b3cfbeac1fc1785c8ae7254f782220a90f2e9
+ * body-sha256: 7441b5c1f0959aaa1e463308c7dcacedbe1b36b4f690a8332db2893adde2e2b3
  */
 #include "xxz_disorder.h"
 #include <float.h>
@@ -465,11 +465,11 @@ int xxz_disorder_saved(const xxz_disorder_solver *s, double *x, size_t *far)
 
 xxz_disorder_status xxz_disorder_resume(xxz_disorder_solver *s, double h, const double *x, size_t far)
 {
-    const xxz_disorder_status status = xxz_disorder_set_step(s, h);
-    s->far = far;
-    if (status == xxz_disorder_OK && x == NULL) return xxz_disorder_OK;
-    if (status != xxz_disorder_OK || !xxz_disorder_finite(x, xxz_disorder_DIM * s->sites))
+    if (s == NULL || (x != NULL && !xxz_disorder_finite(x, xxz_disorder_DIM * s->sites)))
         return xxz_disorder_BAD_ARGUMENT;
+    if (xxz_disorder_set_step(s, h) != xxz_disorder_OK) return xxz_disorder_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return xxz_disorder_OK;
     for (size_t k = 0; k < xxz_disorder_DIM; ++k) xxz_disorder_put(s, s->before[k], x + k * s->sites);
     s->open = 1;
     return xxz_disorder_OK;

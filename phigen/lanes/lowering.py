@@ -142,7 +142,7 @@ def _of_steps(program: Program) -> Blocks | Packs | None:
     if program.time and (program.monitor or not isinstance(program.step, Implicit)):
         return None  # members in packs would share coefficients that differ from step to step
     match program.step:
-        case Newton() as step:
+        case Newton() as step if program.offers("recurrences"):  # blocks are guessed by them
             return _newton(program, step)
         case Path() as step if step.lanes and (program.offers("recurrences") or not step.adjoint):
             return _paths(program, step, step.lanes)
@@ -169,7 +169,9 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     swept += step.equation.kernels if step.equation else ()
     gathers = (step.partners.energy, step.partners.field) if step.partners else ()
     seen = {kernel.name for gather in gathers for kernel in gather.kernels}
-    looped = [kernel for kernel in step.kernels if kernel is not step.prepare and kernel.name not in seen]
+    back = (step.adjoint.prepare, step.adjoint.refresh) if step.adjoint else ()
+    apart = {id(kernel) for kernel in (step.prepare, step.refresh, *back)}  # of coefficients, not of sites
+    looped = [kernel for kernel in step.kernels if id(kernel) not in apart and kernel.name not in seen]
     if program.profile == "small":
         if not (program.extras.tangent or step.adjoint):  # variations are differences of sweeps there
             along = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}

@@ -41,6 +41,8 @@ def collecting(fields: Sequence[str], step: Sweeps, sweep: Sweep, back: Kernel) 
     found = {field: _by_cotangents(total([own[field], *terms])) for field, terms in sums.items()}
     beside = {name for name, _ in given}
     values = [found.pop(name, ZERO if name in beside else value) for name, value in along]
+    read = {s for s in symbols_of(*values, *found.values()) if s in sites.places}
+    found |= dict.fromkeys(sorted(read.difference(back.inputs["site"], found)), ZERO)
     outputs = [replace(o, values=(*values, *found.values())) if o.name == "site_bar" else o for o in back.outputs]
     collected = replace(back, inputs={**back.inputs, "site": (*back.inputs["site"], *found)}, outputs=tuple(outputs))
     if _cost(collected.roots) > _cost(back.roots) + HANDING * len({value for _, value in given}):

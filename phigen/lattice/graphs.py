@@ -187,11 +187,13 @@ def energies(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def site_sums(cell: Cell) -> tuple[BondSum, ...]:
-    """What bonds or pairs add to the forces at a site or, where brackets run along bonds, to its motion."""
+    """What bonds or pairs add to the forces at a site or, where brackets run along bonds, to its motion.
+
+    Forces on fields without brackets are left out: they move nothing."""
     if cell.relation == PAIRS:
-        return alike([BondSum(_forces_at(cell, cell.pair_hamiltonian, "a"))])
+        return alike([BondSum(_moving_forces(cell, cell.pair_hamiltonian, "a"))])
     if not cell.bond_bracket:
-        return alike([BondSum(_forces_at(cell, cell.bond_hamiltonian, end), end) for end in ENDS])
+        return alike([BondSum(_moving_forces(cell, cell.bond_hamiltonian, end), end) for end in ENDS])
     values: dict[str, dict[str, Expression]] = {"a": {}, "b": {}}
     for f, end, rate in bond_rates(cell, cell.hamiltonian):
         values[end][_gathered(f)] = values[end].get(_gathered(f), ZERO) + rate
@@ -237,6 +239,12 @@ def _forces_at(cell: Cell, density: Expression, end: str) -> dict[str, Expressio
     """The derivatives of the density of a bond by the fields of an end."""
     slopes = gradient(density, [cell.at(f, (end,)) for f in cell.fields])
     return {_gathered(f): seen_from(cell, e, end) for f, e in zip(cell.fields, slopes, strict=True) if not e.is_zero}
+
+
+def _moving_forces(cell: Cell, density: Expression, end: str) -> dict[str, Expression]:
+    """Those of `_forces_at` that the vector field reads."""
+    read = symbols_of(*field_at_site(cell, {f: symbol(_gathered(f)) for f in cell.fields}))
+    return {name: e for name, e in _forces_at(cell, density, end).items() if name in read}
 
 
 def _monomials(cell: Cell, rate: Expression) -> Iterator[tuple[Expression, Expression]]:

@@ -207,9 +207,12 @@ static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, ph
 static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, phi_params *params_bar)
 #endif
 {
-    double found[sizeof(phi_params) / sizeof(double) + 1], sums[sizeof(phi_params) / sizeof(double) + 1] = { 0.0 };
+    double found[sizeof(phi_params) / sizeof(double) + 1];
 #if PHI_PARAMETERS
+    double sums[sizeof(phi_params) / sizeof(double)] = { 0.0 };
     if (params_bar != NULL) memcpy(sums, params_bar, sizeof *params_bar);
+#else
+    (void)params_bar;
 #endif
 #if PHI_MONITOR
     double level[1];
@@ -235,7 +238,9 @@ static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, ph
         phi_prepare_adjoint(&s->params, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found);
 #endif
 #endif
-        for (size_t i = 0; i < sizeof(phi_params) / sizeof(double); ++i) sums[i] += found[i];
+#if PHI_PARAMETERS
+        for (size_t i = 0; i < sizeof sums / sizeof sums[0]; ++i) sums[i] += found[i];
+#endif
 #if PHI_MONITOR
         if (e_bar != NULL) *e_bar += level[0];
 #endif

@@ -32,8 +32,14 @@
 #endif
 #if PHI_SHARED
 #ifdef _OPENMP
+#ifdef __cplusplus
+extern "C" {
+#endif
 int omp_get_num_threads(void); /* as in omp.h, which compilers without OpenMP lack */
 int omp_get_thread_num(void);
+#ifdef __cplusplus
+}
+#endif
 #if PHI_PAIRS
 #define PHI_PARALLEL _Pragma("omp parallel if (s->sites > 512)")
 #else
@@ -568,13 +574,19 @@ int phi_saved(const phi_solver *s, double *x, size_t *far)
 
 phi_status phi_resume(phi_solver *s, double h, const double *x, size_t far)
 {
-    const phi_status status = phi_set_step(s, h);
-    s->far = far;
 #if PHI_NOISE
-    return x == NULL ? status : PHI_BAD_ARGUMENT;
+    if (x != NULL || phi_set_step(s, h) != PHI_OK) return PHI_BAD_ARGUMENT;
+    s->far = far;
+    return PHI_OK;
 #else
-    if (status == PHI_OK && x == NULL) return PHI_OK;
-    if (status != PHI_OK || !phi_finite(x, PHI_DIM * s->sites)) return PHI_BAD_ARGUMENT;
+#if PHI_COMPENSATED
+    if (s == NULL || (x != NULL && !phi_finite(x, 2 * PHI_DIM * s->sites))) return PHI_BAD_ARGUMENT;
+#else
+    if (s == NULL || (x != NULL && !phi_finite(x, PHI_DIM * s->sites))) return PHI_BAD_ARGUMENT;
+#endif
+    if (phi_set_step(s, h) != PHI_OK) return PHI_BAD_ARGUMENT;
+    s->far = far;
+    if (x == NULL) return PHI_OK;
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->before[k], x + k * s->sites);
 #if PHI_COMPENSATED
     for (size_t k = 0; k < PHI_DIM; ++k) phi_put(s, s->carry[PHI_DIM + k], x + (PHI_DIM + k) * s->sites);

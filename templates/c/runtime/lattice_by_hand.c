@@ -74,7 +74,7 @@ phi_status phi_sweep(phi_solver *s, size_t number, int far, size_t from, size_t 
 
 phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to, double *x)
 {
-    if (s == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+    if (s == NULL || x == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
 #if PHI_ONE_ROW
     memcpy(x, s->x[field] + from, (to - from) * sizeof *x);
 #else
@@ -86,7 +86,7 @@ phi_status phi_planes(const phi_solver *s, size_t field, size_t from, size_t to,
 
 phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, const double *x)
 {
-    if (s == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
+    if (s == NULL || x == NULL || field >= PHI_DIM || from > to || to > s->sizes[0]) return PHI_BAD_ARGUMENT;
     s->open = 0;
 #if PHI_ONE_ROW
     memcpy(s->x[field] + from, x, (to - from) * sizeof *x);

@@ -187,7 +187,10 @@ def hands(program: Program, step: Sweeps) -> list[bool]:
     """Of each part of H whether its transpose gives anything to other sites."""
     found: list[bool] = []
     if step.equation and step.adjoint:
-        return [step.partners is not None or any(any(offset) for _, offset in step.sites.places.values())]
+        kernels = [kernel for kernel in step.adjoint.steps if "sums_bar" not in kernel.inputs]
+        read = [pair for kernel in kernels for pair in kernel.along("site")]
+        summed = any(kernel.inputs["gathered"] for kernel in kernels)
+        return [summed or any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)]
     for part, kernels in zip(step.parts, transposes(program, step), strict=False):
         read = [(s, e) for kernel in kernels for s, e in kernel.along("site")]
         beside = any(any(step.sites.places[s][1]) and not e.is_zero for s, e in read)

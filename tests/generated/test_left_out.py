@@ -1,0 +1,61 @@
+"""The C of ordinary systems with derivatives compiles without a warning, in combinations that few systems have."""
+
+import pytest
+from support import WARNINGS, run, tool, write
+
+from phigen import spec
+from phigen.compiler import compile_spec, emit
+from phigen.spec.model import Extras
+
+pytestmark = pytest.mark.usefixtures("as_users_compile")
+
+OSCILLATOR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2/2 + q**4/4\n"
+BODY = "coordinates: [x, y, z]\npoisson: {lie_algebra: {name: so(3)}}\nhamiltonian: x**2/2 + y**2 + z**2/5 + x\n"
+WITH_A = "parameters: {a: 1.5}\n"
+SERIES, MONITOR, TIME = "scheme: series\n", "monitor: 1 + q**2\n", "time: t\n"
+
+SYSTEMS = {
+    "monitor, no parameters": OSCILLATOR + MONITOR,
+    "monitor": OSCILLATOR.replace("q**4", "a*q**4") + WITH_A + MONITOR,
+    "monitor of a splitting, no parameters": OSCILLATOR.replace("+ q**4/4", "- exp(q)")
+    + "monitor: log\nscheme: splitting\n",
+    "series, no parameters": OSCILLATOR + SERIES,
+    "series, lanes off": OSCILLATOR + SERIES + "solver: {lanes: false}\n",
+    "series, time": OSCILLATOR.replace("/4", "*(1 + cos(t)/9)") + TIME + SERIES,
+    "series, composed": BODY + SERIES + "order: 4\ncomposition: suzuki\n",
+    "path": BODY + "birealisation: karasev\n",
+    "splitting": BODY + "scheme: splitting\n",
+}
+WITHOUT = [frozenset[str](), frozenset(["recurrences"]), frozenset(["lanes"]), frozenset(["members", "ensemble"])]
+
+#: A system, what is left out, and the profile; those of one system suffice to see what each does to the others.
+FEW = [
+    ("monitor, no parameters", WITHOUT[0], "fast"),
+    ("monitor, no parameters", WITHOUT[0], "small"),
+    ("monitor", WITHOUT[1], "fast"),
+    ("series, no parameters", WITHOUT[1], "fast"),
+]
+
+
+def expect_clean(name, extras, profile, folder, *compilers):
+    """Compile the C with all warnings as C, or as C++."""
+    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{SYSTEMS[name]}"), extras=extras, profile=profile)
+    write(folder, emit(made.program, "c", "phigen build"))
+    for compiler in compilers:
+        language = ["-x", "c++", "-std=c++17"] if compiler.endswith("++") else ["-std=c99"]
+        run([tool(compiler), *language, *WARNINGS, "-fsyntax-only", "t.c"], folder)
+
+
+@pytest.mark.parametrize(("name", "without", "profile"), FEW)
+def test_gradients_compile_whatever_is_left_out(name, without, profile, tmp_path):
+    expect_clean(name, Extras(adjoint=True, without=without), profile, tmp_path, "gcc", "clang")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SYSTEMS)
+def test_code_compiles_with_and_without_each_part(name, tmp_path):
+    for tangent, adjoint in ((False, True), (True, True), (True, False)):
+        for without in WITHOUT:
+            extras = Extras(tangent=tangent, adjoint=adjoint, without=without)
+            expect_clean(name, extras, "fast", tmp_path, "gcc", "clang")
+        expect_clean(name, Extras(tangent=tangent, adjoint=adjoint), "small", tmp_path, "gcc", "clang", "g++")
