@@ -94,10 +94,10 @@ def compile(
     """A solver of a `System` or a spec, of the path of a spec file, or of the name of a bundled one.
 
     ``target`` is ``c``, ``numpy``, or ``auto``: C if there is a compiler, else NumPy with a `PhigenWarning`. ``order``
-    overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``auto``) its scheme; ``tangent`` asks for
-    `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks for. The
-    code is that of the profile ``fast``, or of ``profile``: the one of a spec is about what ``phigen build`` writes.
-    Compiled C is cached by its content. Gives a `Solver`, of a lattice a `LatticeSolver`.
+    overrides the order of the spec, ``scheme`` (``series``, ``splitting``, ``gauss``, ``auto``) its scheme; ``tangent``
+    asks for `Solver.step_tangent`, ``adjoint`` for `Solver.pullback` and `Solver.jacobian`, beside what the spec asks
+    for. The code is that of the profile ``fast``, or of ``profile``: the one of a spec is about what ``phigen build``
+    writes. Compiled C is cached by its content. Gives a `Solver`, of a lattice a `LatticeSolver`.
     Raises `SpecError`, `LimitError`, `CheckError` if the mathematics is refuted, e.g. since π is not Poisson, and
     `ToolchainError` if C was asked for in vain, or by naming a compiler in CC that does not work.
     """

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+from phigen.gauss.realisation import Realisation
 from phigen.geometry.system import System, system_of_lattice
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
@@ -53,6 +54,7 @@ class Compilation:
     scheme: Discretisation | None = None
     cell: Cell | None = None
     sweeps: LatticePlan | None = None
+    gauss: Realisation | None = None
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
@@ -67,7 +69,7 @@ class Compilation:
     def chart(self) -> BiRealisation:
         """The bi-realisation; a splitting has none, and must not be asked."""
         if self.realisation is None:
-            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no bi-realisation")
+            raise ValueError(f"{self.spec.name} is compiled to {self.label}, which has no bi-realisation")
         return self.realisation
 
     @property
@@ -75,6 +77,8 @@ class Compilation:
         """The kind of the method, for every place that names it to the user."""
         if self.realisation:
             return self.realisation.label
+        if self.gauss:
+            return self.gauss.label
         if self.sweeps is None:
             return "splitting"
         from phigen.lattice.series import SeriesPlan
@@ -95,11 +99,21 @@ class Compilation:
         """The method for machines; of a lattice its colours too, and why it is the series, or has more of them, where
         sizes of runs ask it."""
         if self.sweeps is None:
-            return {"scheme": "splitting" if self.splitting else "series"}
+            return {"scheme": self.scheme_name} | ({"structure": self.structure} if self.gauss else {})
         from phigen.lattice.series import SeriesPlan
 
         scheme = "series" if isinstance(self.sweeps, SeriesPlan) else "splitting"
         return {"scheme": scheme, "colours": self.sweeps.colouring.count, "since": self.sweeps.since or None}
+
+    @property
+    def scheme_name(self) -> str:
+        """The scheme of a system of a few coordinates, as in specs."""
+        return "gauss" if self.gauss else "splitting" if self.splitting else "series"
+
+    @property
+    def structure(self) -> str:
+        """That of a Gauss method, as in specs."""
+        return "to truncation" if self.gauss and not self.gauss.exact else "exact"
 
     def told(self, method: str) -> str:
         """A line that names the method, and why it is the series, or has more colours, where sizes of runs ask it."""
@@ -116,8 +130,9 @@ class Compilation:
 
     @property
     def exact(self) -> bool:
-        """Whether a step starts and ends at the ends of one p to round-off; see `poisson`."""
-        return self.realisation is None or self.realisation.exact
+        """Whether a step starts and ends at the ends of one p to round-off, or has exact structure; see `poisson`."""
+        method = self.gauss or self.realisation
+        return method is None or method.exact
 
     @property
     def poisson(self) -> bool:
@@ -148,7 +163,7 @@ class Compilation:
     def series(self) -> HamiltonJacobi:
         """The series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
         if self.gauged is None:
-            raise ValueError(f"{self.spec.name} is compiled to a splitting, which has no generating function")
+            raise ValueError(f"{self.spec.name} is compiled to {self.label}, which has no generating function")
         return self.gauged.series
 
     def _repr_latex_(self) -> str:

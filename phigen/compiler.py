@@ -31,6 +31,7 @@ from phigen.scheme.choosing import plan as plan_splitting
 from phigen.scheme.choosing import planned as plan_without_kicks
 from phigen.scheme.discretisation import discretise, expect_affordable, is_large
 from phigen.scheme.gauge import Gauge, choose, fixed_gauge_named, given
+from phigen.scheme.gauss import build_gauss, expect_offered, plan_gauss, realise_gauss
 from phigen.scheme.logarithmic import composition_of, logarithmic_of
 from phigen.scheme.monitor import monitor_of
 from phigen.scheme.order import plan_order
@@ -188,7 +189,7 @@ def _realised_early(spec: Spec, source: System, clock: _Clock) -> BiRealisation 
     that the proofs tell better.
     """
     as_it_is = isinstance(spec.gauge, str) and not (spec.monitor or source.forces or source.noise)
-    if spec.scheme == "splitting" or not as_it_is or not is_large(source):
+    if spec.scheme in ("splitting", "gauss") or not as_it_is or not is_large(source):
         return None
     try:
         realisation = clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
@@ -202,6 +203,8 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | 
     """Compile a system, by the series or to a splitting; ``early`` is what `_realised_early` has found."""
     if spec.scheme == "splitting":
         return _split(spec, source, clock)
+    if spec.scheme == "gauss":
+        return _collocated(spec, source, clock)
     realisation = early or clock.timed("bi-realisation", lambda: realise(source, spec.birealisation))
     plan = plan_order(spec.order, spec.terms, symmetric=realisation.symmetric)
     gauged = clock.timed("gauge", lambda: choose(source, realisation, spec.gauge, monitor_of(spec)))
@@ -249,8 +252,20 @@ def _split(spec: Spec, source: System, clock: _Clock) -> Compilation:
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 
 
+def _collocated(spec: Spec, source: System, clock: _Clock) -> Compilation:
+    """Compile to Gauss collocation."""
+    expect_offered(spec)
+    plan = plan_gauss(spec)
+    gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
+    realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
+    program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec))
+    return Compilation(spec, source, None, plan, program, gauge, clock.seconds, gauss=realisation)
+
+
 def _swept(spec: Spec, cell: Cell, clock: _Clock) -> Compilation:
     """Compile a lattice, of any sizes, to sweeps over its sites."""
+    if spec.scheme == "gauss":
+        expect_offered(spec)
     from phigen.lattice.building import expect_coloured
     from phigen.lattice.series import SeriesPlan
     from phigen.lattice.sweeps import build_sweeps, plan_sweeps

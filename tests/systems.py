@@ -30,7 +30,12 @@ FORCED = ("landau_lifshitz", "thruster_body")
 NOISY = ("double_well", "thermal_chain", "thermal_spin")
 #: Those with a monitor: tests/scheme/test_monitor.py and tests/splitting/test_logarithmic.py.
 MONITORED = ("kepler_eccentric",)
-NAMES = sorted({path.stem for path in resources.bundled_specs().glob("*.yaml")} - {*TIMED, *FORCED, *NOISY, *MONITORED})
+#: Those by Gauss collocation: tests/gauss.
+COLLOCATED = ("kowalevski_gauss",)
+NAMES = sorted(
+    {path.stem for path in resources.bundled_specs().glob("*.yaml")}
+    - {*TIMED, *FORCED, *NOISY, *MONITORED, *COLLOCATED}
+)
 
 
 #: The lattices of the corpus: tests/lattice/test_corpus.py is about these.
@@ -71,6 +76,14 @@ RATTLEBACK = """coordinates: [pitch, roll, spin]
 poisson: {brackets: {pitch: {spin: 4*pitch}, roll: {spin: -roll}}}
 hamiltonian: (pitch**2 + roll**2 + spin**2)/2
 order: 6
+"""
+
+#: so(3) in a basis that depends on parameters.
+SCALED = """coordinates: [x, y, z]
+parameters: {r: 2, s: 3}
+poisson: {brackets: {x: {y: r*z, z: -y/r}, y: {z: s*x}}}
+hamiltonian: x**4/4 + y**2/2 + x*y*z
+casimirs: {C: x**2*r*s + y**2 + r**2*z**2}
 """
 
 SPECIES = """coordinates: [x1, x2, x3]

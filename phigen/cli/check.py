@@ -97,8 +97,8 @@ def _compared(
     compilation, found = examination.compilation, []
     if compilation is None:
         return []
-    if compilation.splitting:
-        console.warn(f"{examination.spec.file}: a splitting has no S_i to be derived a second time")
+    if compilation.realisation is None:
+        console.warn(f"{examination.spec.file}: {compilation.label} has no S_i to be derived a second time")
         return []
     if shown:
         out("  Second derivation, by sympy alone")
@@ -146,13 +146,13 @@ def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) 
 
 
 def _print(examination: Examination, *, verbose: bool) -> None:
-    from phigen.proofs.statements import METHOD, SPLITTING
+    from phigen.proofs.statements import GAUSS, METHOD, SPLITTING
 
     spec = examination.spec
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     compilation = examination.compilation
     for group, statements in examination.groups.items():
-        out(f"  {compilation.told(group) if compilation and group.startswith((METHOD, SPLITTING)) else group}")
+        out(f"  {compilation.told(group) if compilation and group.startswith((METHOD, SPLITTING, GAUSS)) else group}")
         for statement in statements:
             out("\n".join(_lines(statement)))
             for part, residual in statement.failing if verbose else ():

@@ -98,7 +98,7 @@ def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -
 
 
 def _print(compilation: Compilation, modified: int, most: int | None) -> None:
-    from phigen.notation import flows
+    from phigen.notation import collocation, flows
 
     spec, system = compilation.spec, compilation.system
     corrected = _modified(compilation, modified, most)
@@ -119,6 +119,9 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     if compilation.splitting:
         lines = assignments(flows.formulas(compilation, most))
         section(f"Splitting: {flows.method(compilation)}", [*lines, *_unfamiliar(lines)])
+    elif compilation.gauss:
+        said = [*assignments(collocation.equations()), *collocation.lines(compilation)]
+        section(f"Gauss collocation: {collocation.method(compilation)}", said)
     else:
         _print_series(compilation, most)
     if corrected:
@@ -245,7 +248,6 @@ def _files(compilation: Compilation) -> dict[str, str]:
 
 
 def _described(compilation: Compilation) -> dict[str, object]:
-    from phigen.notation import flows
     from phigen.symbolic.readable import readable
 
     system, plan = compilation.system, compilation.order
@@ -260,10 +262,18 @@ def _described(compilation: Compilation) -> dict[str, object]:
         "casimirs": dict(_named(system.casimirs, None)),
         "invariants": dict(_named(system.invariants, None)),
         "order": plan.order,
-        **(flows.described(compilation) if compilation.splitting else _described_series(compilation)),
+        **_described_method(compilation),
         "operations": dict(compilation.program.about.operations),
         "files": {name: len(text.encode()) for name, text in _files(compilation).items()},
     }
+
+
+def _described_method(compilation: Compilation) -> dict[str, object]:
+    from phigen.notation import collocation, flows
+
+    if compilation.gauss:
+        return collocation.described(compilation)
+    return flows.described(compilation) if compilation.splitting else _described_series(compilation)
 
 
 def _described_series(compilation: Compilation) -> dict[str, object]:

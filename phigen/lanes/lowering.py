@@ -25,7 +25,7 @@ from phigen.lanes.undoing import undoing
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import PathSlopes
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Factorisation, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
+from phigen.scheme.steps import Explicit, Factorisation, Gauss, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
 from phigen.symbolic.expression import topological
 from phigen.symbolic.special import SPECIAL
 
@@ -121,7 +121,21 @@ class Traces:
     narrow: bool
 
 
-Lanes = Blocks | Packs | Rows | Traces
+@dataclass(frozen=True)
+class Stages:
+    """The stages of a Gauss method, one in each lane; ``narrow`` where half of the lanes are enough."""
+
+    kernels: tuple[LaneKernel, ...]
+    calls: frozenset[str]
+    narrow: bool
+
+    @property
+    def lanes(self) -> int:
+        """The number of lanes."""
+        return LANES // 2 if self.narrow else LANES
+
+
+Lanes = Blocks | Packs | Rows | Stages | Traces
 
 
 def in_lanes(program: Program) -> Lanes | None:
@@ -136,7 +150,9 @@ def in_lanes(program: Program) -> Lanes | None:
     return _traces(program, program.step)
 
 
-def _of_steps(program: Program) -> Blocks | Packs | None:
+def _of_steps(program: Program) -> Blocks | Packs | Stages | None:
+    if isinstance(program.step, Gauss):
+        return _stages(program.step)
     if program.noise:
         return None  # every step has coefficients of its own, and guesses from earlier steps miss it
     if program.time and (program.monitor or not isinstance(program.step, Implicit)):
@@ -195,6 +211,13 @@ def _called_in_forms(step: Sweeps) -> set[str]:
     found += [step.equation.relax, step.equation.advance] if step.equation else []
     back = step.adjoint.steps if step.adjoint else ()
     return operations([*found, *(kernel for kernel in back if "sums_bar" not in kernel.inputs)])
+
+
+def _stages(step: Gauss) -> Stages:
+    """The vector field of a Gauss method at all stages; what lies where a step starts is the same for all of them."""
+    kernels = [LaneKernel(step.slope, ("coef", "x"))]
+    kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
+    return Stages(tuple(kernels), with_formulas(operations([step.slope])), step.tableau.stages <= LANES // 2)
 
 
 def _newton(program: Program, step: Newton) -> Blocks | None:

@@ -66,10 +66,10 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
     approximate bi-realisation if more are asked for.
     """
     if not count:
-        leading = None if compilation.splitting else series_formulas(compilation, most).leading
+        leading = None if compilation.realisation is None else series_formulas(compilation, most).leading
         return [] if leading is None else [(compilation.order.order, leading)]
-    if compilation.splitting:
-        raise SpecError([Diagnostic("the modified Hamiltonian is not computed for a splitting")])
+    if compilation.realisation is None:
+        raise SpecError([Diagnostic(f"the modified Hamiltonian is not computed for {compilation.label}")])
     system, chart = compilation.system, compilation.chart
     expect_modified(system, chart, len(compilation.program.fractions))
     found = corrections(system, chart, compilation.order, count, compilation.gauge)

@@ -27,6 +27,13 @@ _RELATION, _COLUMN = 1.4, 1.2
 _COLUMNS = 10
 
 
+#: The equations of a Gauss step.
+_COLLOCATION = r"""\begin{align*}
+  Z_i &= z + \sum_j \mu_{ij} L_j, \quad L_j = h b_j f(Z_j), \quad \mu_{ij} + \mu_{ji} = 1 \\
+  z' &= z + \sum_j L_j
+\end{align*}"""
+
+
 def document(compilation: Compilation, modified: int = 0, most: int | None = SHOWN) -> str:
     """Equations for π, H, the Casimirs, α, β, S_1 … S_k, or the parts and flows of a splitting, and H̃.
 
@@ -37,6 +44,8 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
     blocks = system_blocks(compilation.system)
     if compilation.splitting:
         blocks += [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
+    elif compilation.gauss:
+        blocks.append(_COLLOCATION)
     else:
         blocks += [*_maps(compilation), aligned(_series(compilation, most))]
     if listed := modified_formulas(compilation, modified, most):

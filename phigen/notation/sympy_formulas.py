@@ -62,8 +62,10 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 
     Raises `SpecError` for a splitting, `LimitError` if the terms are too many to be written out.
     """
-    if compilation.splitting:
-        raise SpecError([Diagnostic("a splitting has no bi-realisation and no S_i", hint="ask for scheme series")])
+    if compilation.realisation is None:
+        raise SpecError(
+            [Diagnostic(f"{compilation.label} has no bi-realisation and no S_i", hint="ask for scheme series")]
+        )
     dictionary, chart = Dictionary(compilation), compilation.chart
     terms = terms or compilation.stage.terms
     try:

@@ -12,6 +12,7 @@ from phigen.proofs.statements import (
     CASIMIRS,
     DAMPING,
     DEFINEDNESS,
+    GAUSS,
     INVARIANTS,
     METHOD,
     MONITOR,
@@ -26,7 +27,7 @@ UNEXAMINED = "Casimirs, invariants, the method"
 
 #: Where a spec says what a group of statements is about.
 _PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
-_PLACES |= {DAMPING: ("damping",)}
+_PLACES |= {DAMPING: ("damping",), GAUSS: ("scheme",)}
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from phigen.compilation import Compilation
+from phigen.gauss.statements import check as check_gauss
 from phigen.geometry import checks
 from phigen.geometry.definedness import undefined_parts, undefined_starts
 from phigen.geometry.jacobi import jacobi_identity
@@ -14,6 +15,7 @@ from phigen.geometry.positivity import not_negative, positivity
 from phigen.geometry.system import System
 from phigen.realisations import axioms
 from phigen.scheme.noise import noise_flows
+from phigen.scheme.steps import Gauss
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Run, Spec
 from phigen.splitting.statements import check as check_splitting
@@ -28,6 +30,7 @@ DEFINEDNESS, CASIMIRS, FORCES, INVARIANTS = "Definedness", "Casimirs", "Forces",
 NOISE = "Noise"
 MONITOR, DAMPING = "Monitor", "Damping"
 METHOD, SPLITTING, ATTITUDE = "Bi-realisation", "Splitting", "Attitude"
+GAUSS = "Gauss collocation"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
@@ -115,6 +118,10 @@ def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     if compilation.splitting:
         flows = zip((s.name for s in compilation.system.noise), noise_flows(compilation.system), strict=True)
         return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting, list(flows)))} | last
+    if compilation.gauss and isinstance(compilation.program.step, Gauss):
+        tableau = compilation.program.step.tableau
+        proved = check_gauss(compilation.system, compilation.discretised, compilation.gauss, tableau)
+        return {compilation.label: tuple(proved)} | last
     found = axioms.check(compilation.system, compilation.chart)
     stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in found]
     label = f"{METHOD} ({compilation.chart.kind})"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from markupsafe import Markup
 
 from phigen.compilation import Compilation
-from phigen.notation import flows, generating, mathml
+from phigen.notation import collocation, flows, generating, mathml
 from phigen.report import page
 from phigen.report.equations import equation, group, polynomial
 from phigen.report.known import ALPHA_BETA_OF_A_PATH, BETA_OF_ALPHA, GAUGED, MODIFIED, PATH_STEP, PHI, STEP
@@ -20,10 +20,21 @@ FLOWS = 12
 
 def method_section(compilation: Compilation) -> Markup:
     """How a step is made, as formulas."""
-    split = compilation.splitting is not None
-    said = flows.method(compilation) if split else generating.method(compilation)
+    if compilation.gauss:
+        said, blocks = collocation.method(compilation), _collocation(compilation)
+    elif compilation.splitting:
+        said, blocks = flows.method(compilation), _splitting(compilation)
+    else:
+        said, blocks = generating.method(compilation), _series(compilation)
     lead = page.paragraph(page.typeset(f"{said[0].upper()}{said[1:]}."))
-    return page.joined([lead, *_gauge(compilation), *(_splitting(compilation) if split else _series(compilation))])
+    return page.joined([lead, *_gauge(compilation), *blocks])
+
+
+def _collocation(compilation: Compilation) -> list[Markup]:
+    """The equations of a Gauss step, and what its unknowns are."""
+    listed = [page.paragraph(page.typeset(f"{left} = {right}")) for left, right in collocation.equations()]
+    said = [page.paragraph(page.typeset(f"{line}.")) for line in collocation.lines(compilation)]
+    return [page.heading("One step"), *listed, page.heading("Unknowns"), *said]
 
 
 def _gauge(compilation: Compilation) -> list[Markup]:

@@ -156,6 +156,7 @@ class Program:
     ``observed`` are the names of the observables of the spec.
     ``lanes`` asks for C that does several steps or members at once, ``profile`` (``fast``, ``small``) says how much
     it does for speed. ``compensated`` asks for compensated sums over the steps of a lattice that splits.
+    ``truncated`` says that a step is a Poisson map up to its truncation error only.
     """
 
     name: str
@@ -180,6 +181,7 @@ class Program:
     profile: str = "fast"
     compensated: bool = False
     observed: tuple[str, ...] = ()
+    truncated: bool = False
 
     @property
     def version(self) -> str:

@@ -1,4 +1,4 @@
-"""The kinds of steps, each with the kernels that make it: ``Step = Newton | Explicit | Path | Splitting | Sweeps``.
+"""The kinds of steps, with their kernels: ``Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps``.
 
 Kernels of a step are of three stages. ``prepare`` computes, from parameters and step size, every value that does not
 depend on the state, nor on inputs of the single step: the coefficients ``c:0``, ``c:1``, … Where H depends on the time,
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from phigen.gauss.tableau import Tableau
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
@@ -224,6 +225,58 @@ class Path(_Staged):
         if self.tangent:
             return self.tangent.curvature
         return self.back.curvature if self.back else None
+
+
+#: Sweeps over the stages end where the next one would change so little, in sizes of the unknowns: 2e-17 leaves a linear
+#: drift of energy and Casimirs. Or they end when STALLS changes below ROUNDING were not less than those before. After
+#: MOST_RISING sweeps one after the other that change more than those before, the step is too large.
+SOLVED, ROUNDING, STALLS, MOST_RISING = 2e-18, 2e-14, 2, 3
+
+
+@dataclass(frozen=True)
+class GaussTangent:
+    """The Jacobians of the vector field of a stage, along the start of the step and the unknowns, and of the change."""
+
+    slope: Kernel
+    change: Kernel
+
+
+@dataclass(frozen=True)
+class Gauss(_Staged):
+    """Gauss collocation: Z_i = Σ_j μ_ij L_j with L_j = h b_j f(x, Z_j), by fixed-point sweeps; then x + D(x, Σ_j L_j).
+
+    The unknowns Z are offsets, 0 at the start of the step. ``slope`` is f; the input x is the point, with the time as
+    the last entry if f depends on it. ``change`` is D. ``frame`` turns the L_j of a step into those that the next one
+    would see, where that starts in another frame. The first ``plain`` unknowns are of the size of the state, those of
+    group elements of that of the unit.
+    """
+
+    slope: Kernel
+    change: Kernel
+    tableau: Tableau
+    plain: int
+    frame: Kernel | None = None
+    most_sweeps: int = 100
+    tangent: GaussTangent | None = None
+
+    unit = "evaluation at a stage"
+    manner = "implicit, all stages by fixed-point sweeps to round-off"
+
+    @property
+    def main(self) -> Kernel:
+        """The kernel that takes most of the time."""
+        return self.slope
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns of a stage."""
+        return len(self.slope.roots)
+
+    @property
+    def kernels(self) -> tuple[Kernel, ...]:
+        """All kernels, each once."""
+        varied = (self.tangent.slope, self.tangent.change) if self.tangent else ()
+        return _present((self.prepare, self.slope, self.change, self.frame, *varied))
 
 
 @dataclass(frozen=True)
@@ -474,9 +527,9 @@ class Sweeps(_Scheduled):
         return _present((self.prepare, self.refresh, *own, *self.transposed))
 
 
-Step = Newton | Explicit | Path | Splitting | Sweeps
+Step = Newton | Explicit | Path | Gauss | Splitting | Sweeps
 
-#: Those that solve an equation.
+#: Those that solve an equation for one point.
 Implicit = Newton | Path
 
 

@@ -35,6 +35,7 @@ from phigen.spec.names import (
     RECONSTRUCTIONS,
     SCHEMES,
     SPEC_NAME,
+    STRUCTURES,
 )
 from phigen.spec.yaml_source import Mapping, Scalar, Sequence
 
@@ -360,6 +361,12 @@ SPEC = Record(
         ),
         Field("monitor", FORMULA, "equal steps of τ, dt = g dτ: g > 0, or log for a splitting"),
         Field("scheme", _switch("scheme", *SCHEMES), "how the one-step map is made", default="auto"),
+        Field(
+            "structure",
+            _switch("structure", *STRUCTURES),
+            "scheme gauss: whether steps are exact Poisson maps, or to truncation only",
+            default="exact",
+        ),
         Field("profile", Choice(PROFILES), "small is short and readable, without blocks and searches", default="fast"),
         Field("real", Choice(REALS), "the numbers of the C; float goes with the profile small", default="double"),
         Field("without", ListOf(Choice(PARTS)), "parts of the code to leave out"),

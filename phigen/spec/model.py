@@ -377,6 +377,7 @@ class Spec:
     gauge: str | Mapping[str, Expression] = "auto"  # or the multiple of each Casimir
     monitor: str | Expression | None = None  # log, or g of dt = g dτ
     scheme: str = "auto"
+    structure: str = "exact"  # of a Gauss method: exact, to truncation
     profile: str = "fast"
     solver: SolverOptions = SolverOptions()
     extras: Extras = NO_EXTRAS

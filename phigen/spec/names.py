@@ -127,6 +127,8 @@ COMPOSITIONS = (
 )
 #: The monitor of a splitting in two, K = log(A + e) − log(−B).
 LOGARITHMIC = "log"
-SCHEMES = ("auto", "series", "splitting")
+SCHEMES = ("auto", "series", "splitting", "gauss")
+#: What a Gauss method is: an exact Poisson map, or one up to its truncation error.
+STRUCTURES = ("exact", "to truncation")
 #: Classical methods a run can be compared with.
 CLASSICAL_METHODS = ("euler", "rk2", "rk4", "implicit-midpoint", "dop853")

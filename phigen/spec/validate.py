@@ -93,6 +93,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "gauge": _gauge(raw.get("gauge", "auto"), declared),
         "monitor": _monitor(raw.get("monitor"), declared),
         "scheme": raw.get("scheme", "auto"),
+        "structure": raw.get("structure", "exact"),
         "profile": raw.get("profile", "small" if raw.get("real") == "float" else "fast"),
         "solver": _solver(raw.get("solver", {}), declared),
         "targets": without_repetition(raw.get("targets", DEFAULT), ("targets",), declared),
@@ -120,6 +121,11 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
 
 #: Keys of the Hamilton–Jacobi series, which mean nothing to a splitting, and the values that do no harm.
 SERIES_KEYS: Mapping[str, tuple[object, ...]] = {"terms": (), "birealisation": ("auto",), "modified_hamiltonian": (0,)}
+#: Schemes that have no series, and what they do instead.
+WITHOUT_SERIES = {
+    "splitting": "scheme: splitting follows exact flows of parts of H",
+    "gauss": "scheme: gauss solves for the stages of a collocation method",
+}
 
 
 #: Keys that lattices do not take yet, and the values that do no harm.
@@ -160,11 +166,15 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
             problems.add(f"{key}: not for lattices in this version", reader.locations[key,])
     if raw.get("real") == "float" and raw.get("profile") == "fast":
         problems.add("profile: real: float goes with the profile small", reader.locations["profile",], "remove profile")
-    if raw.get("scheme") != "splitting":
+    if raw.get("structure") is not None and raw.get("scheme") != "gauss":
+        message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
+        problems.add(message, reader.locations["structure",], "remove structure, or scheme: gauss")
+    how = WITHOUT_SERIES.get(raw.get("scheme", ""))
+    if how is None:
         return
     for key, harmless in SERIES_KEYS.items():
         if key in raw and raw[key] is not None and raw[key] not in harmless:
-            message = f"{key} belongs to scheme: series; scheme: splitting follows exact flows of parts of H"
+            message = f"{key} belongs to scheme: series; {how}"
             problems.add(message, reader.locations[key,], f"remove {key}, or the scheme")
 
 

@@ -73,6 +73,8 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     system, order = compilation.system, compilation.order
     if compilation.splitting or len(compilation.program.fractions) > 1:
         raise NotOfferedError("a step is composed of several maps")
+    if compilation.gauss:
+        raise NotOfferedError("it is not computed for Gauss methods")
     if system.time:
         raise NotOfferedError("it depends on the time, and is not constant")
     if not compilation.exact:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Explicit, Implicit, Newton, Path, Splitting, Sweeps
+from phigen.scheme.steps import Explicit, Gauss, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets.path import kinds, recurrences
 
 
@@ -29,9 +29,12 @@ def _sums(kind: str) -> Callable[[Program], bool]:
 FEATURES = (
     Feature("NEWTON", lambda p: isinstance(p.step, Newton)),
     Feature("PATH", lambda p: isinstance(p.step, Path)),
+    Feature("GAUSS", lambda p: isinstance(p.step, Gauss)),
+    Feature("FRAMED", lambda p: isinstance(p.step, Gauss) and p.step.frame),
     Feature("EXPLICIT", lambda p: isinstance(p.step, Explicit)),
     Feature("SPLITTING", lambda p: isinstance(p.step, Splitting)),
     Feature("IMPLICIT", lambda p: isinstance(p.step, Implicit)),
+    Feature("HISTORY", lambda p: isinstance(p.step, Implicit | Gauss)),
     Feature("COMPOSED", lambda p: len(p.fractions) > 1),
     Feature("KICKS", lambda p: isinstance(p.step, Splitting | Sweeps) and p.step.schedule.multiples),
     Feature("TIMED", lambda p: p.time),

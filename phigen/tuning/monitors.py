@@ -160,7 +160,7 @@ def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
 def settings(own: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
     """The settings to be built: steps equal in t, and each monitor, at the same order."""
     order = min(order + order % 2, HIGHEST)
-    series = Setting("auto", order, "none") if own.is_splitting else replace(own, order=order, gauge="none")
+    series = Setting("auto", order, "none") if own.scheme != "series" else replace(own, order=order, gauge="none")
     series = replace(series, composition="auto")
     explicit = Setting(SPLITTING, order, "none", "auto", monitor=LOGARITHMIC)
     return [series, explicit, *(replace(series, monitor=str(g)) for g in dict.fromkeys(monitors))]

@@ -25,6 +25,10 @@ ORDERS = tuple(range(2, limits.ORDER + 1, 2))
 #: The scheme that needs no bi-realisation, which stands in the place of its kind.
 SPLITTING = "splitting"
 
+#: So does this; the orders that are tried of it.
+GAUSS = "gauss"
+GAUSS_ORDERS = (4, 8, 12, 16)
+
 #: Kinds that need formulas of the user, and those with choices of their own.
 FORMULAS = ("custom", "group-map", "spray")
 CHOICES = ("auto", "canonical-euler", "product", "pullback")
@@ -35,8 +39,8 @@ _NESTED = (("product", "auto"), ("product", "cayley"), ("pullback", "auto"), ("p
 class Setting:
     """One way to solve a system; ``kind`` and ``gauge`` may be `OWN`. ``of`` is that of products and pull-backs.
 
-    A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``. ``monitor`` is that of the spec if it
-    is empty.
+    A splitting has the kind `SPLITTING`, no gauge, and the composition ``auto``; Gauss collocation the kind `GAUSS`.
+    ``monitor`` is that of the spec if it is empty.
     """
 
     kind: str
@@ -61,6 +65,8 @@ class Setting:
         """The orders there are in its family."""
         if self.is_splitting:
             return tuple(choosing.orders(self.composition))
+        if self.is_gauss:
+            return GAUSS_ORDERS
         if self.composition not in ("none", "auto"):
             return tuple(c.order for c in COMPOSITIONS if c.name == self.composition)
         return (1, *ORDERS) if self.kind == "canonical-euler" else ORDERS
@@ -69,7 +75,7 @@ class Setting:
         """In words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is what it turned out to be."""
         named = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
         words = [kind or named, f"order {self.order}"]
-        words += ["without gauge"] if self.gauge == "none" and not self.is_splitting else []
+        words += ["without gauge"] if self.gauge == "none" and self.scheme == "series" else []
         return ", ".join([*words, self.composition] if self.composition not in ("none", "auto") else words)
 
     @property
@@ -77,11 +83,21 @@ class Setting:
         """Whether its scheme is a splitting."""
         return self.kind == SPLITTING
 
+    @property
+    def is_gauss(self) -> bool:
+        """Whether its scheme is Gauss collocation."""
+        return self.kind == GAUSS
+
+    @property
+    def scheme(self) -> str:
+        """Its scheme, as in specs."""
+        return self.kind if self.kind in (SPLITTING, GAUSS) else "series"
+
     def lines(self) -> list[str]:
         """The top-level lines of a spec that ask for it; what is `OWN` stays as it is there."""
-        kind = "auto" if self.is_splitting else self.kind
+        kind = "auto" if self.scheme != "series" else self.kind
         named = kind if self.of == "auto" else f"{{kind: {kind}, of: {self.of}}}"
-        lines = [f"scheme: {SPLITTING if self.is_splitting else 'series'}"]
+        lines = [f"scheme: {self.scheme}"]
         lines += [] if kind == OWN else [f"birealisation: {named}"]
         lines += [f"order: {self.order}", f"composition: {self.composition}"]
         lines += [f"monitor: {self.monitor}"] if self.monitor else []
@@ -89,10 +105,10 @@ class Setting:
 
     def applied(self, spec: Spec) -> Spec:
         """The spec with this setting."""
-        kind = "auto" if self.is_splitting else self.kind
+        kind = "auto" if self.scheme != "series" else self.kind
         choice = spec.birealisation if kind == OWN else BirealisationChoice(kind, of=self.of)
         return replace(
-            spec, scheme=SPLITTING if self.is_splitting else "series", birealisation=replace(choice, order=self.order),
+            spec, scheme=self.scheme, birealisation=replace(choice, order=self.order),
             order=self.order, terms=None, composition=self.composition,
             gauge=spec.gauge if self.gauge == OWN else self.gauge,
             monitor=monitor_of(self.monitor, spec) if self.monitor else spec.monitor,
@@ -116,6 +132,8 @@ def own_setting(compilation: Compilation) -> Setting:
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
     if isinstance(compilation.sweeps, SeriesPlan):
         return _of_series(spec, compilation.sweeps, order)
+    if compilation.gauss:
+        return Setting(GAUSS, order, gauge, "none")
     if realisation is None:
         return Setting(SPLITTING, order, gauge, spec.composition)
     choice = spec.birealisation
@@ -147,6 +165,7 @@ def charts(system: System, own: Setting) -> list[Setting]:
     # The other side is the adjoint, whose errors are the same in reversed time.
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
+    split += [Setting(GAUSS, order, "none") for order in (8, 16)]
     first = [replace(own, order=order, composition=direct(own)) for order in (4, 8)]
     others = [s for s in (*split, *named, *nested, *euler) if s.chart != own.chart]
     return [s for s in (*first, *others) if s != own]

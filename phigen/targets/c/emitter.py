@@ -14,9 +14,9 @@ from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Rows, Traces, in_
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
-from phigen.scheme.steps import Adjoint, Explicit, Implicit, Newton, Path, PathAdjoint, Splitting, Sweeps
+from phigen.scheme.steps import Adjoint, Explicit, Gauss, Implicit, Newton, Path, PathAdjoint, Splitting, Sweeps
 from phigen.spec.model import Parameter
-from phigen.targets.c import functions, paths, splitting
+from phigen.targets.c import functions, gauss, paths, splitting
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.features import switches
 from phigen.targets.c.kernels import declaration, function, members, printer
@@ -125,7 +125,9 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
         found["flows.h"] = splitting.printed(program, step)
         found["tangent_flows.h"] = splitting.tangent(program, step) if has["TANGENT"] else ""
         found["adjoint_flows.h"] = splitting.adjoint(program, step, step.adjoint) if step.adjoint else ""
-    if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"]):
+    if isinstance(step, Gauss):
+        found["gauss_tables.h"] = gauss.tables(program, step, lanes)
+    if lanes and (has["BLOCKS"] or has["PACKS"] or has["TRACED"] or has["STAGED"]):
         found["model_lanes.h"] = "\n".join(kernels_in_lanes(program, lanes))
     if has["ABREAST"] and isinstance(lanes, Packs) and isinstance(step, Splitting):
         found["adjoint_flows_lanes.h"] = printed_back(program, lanes)
@@ -134,7 +136,7 @@ def printed(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> d
 
 
 def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -> dict[str, object]:
-    member = members(program)
+    member, step = members(program), program.step
     sizes: Sizes = [("STAGES", len(program.fractions), "of a step")] if has["COMPOSED"] else []
     only = f", and on {_renewing(program)}" if program.step.refresh else " only"
     sizes.append(("COEFFICIENTS", max(1, program.step.coefficients), f"numbers that depend on params and h{only}"))
@@ -150,6 +152,7 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         if has["EACH"]:
             kept = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
             sizes.append(("TRAIL_EACH", trail * max(1, kept), "the same for members that go back together"))
+    sizes += gauss.declared(step, lanes) if isinstance(step, Gauss) else []
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
         sizes.append(("REMEMBERED", memory["REMEMBERED"], "values that a recurrence is fitted to"))
@@ -248,6 +251,7 @@ def _constants(program: Program, lanes: Lanes | None, has: Mapping[str, bool]) -
         sizes.append(("PREPARED", step.prepared, "coefficients that depend on params and h only, before the others"))
     if isinstance(step, Implicit):
         sizes.append(("MAX_ITERATIONS", step.inner.max_iterations, "of an inner solve"))
+    sizes += gauss.constants(program, step) if isinstance(step, Gauss) else []
     if isinstance(step, Path):
         sizes.append(("TERMS", TERMS, "most of the expansion of a path; one that needs more is cut into pieces"))
         sizes.append(("SERIES", len(step.recurrences.series), "of a path, those of the coordinates first"))
@@ -294,7 +298,9 @@ def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], other
     step = program.step
     body = functions.called(program)
     own: list[Kernel | None] = []
-    if not isinstance(step, Splitting | Sweeps):
+    if isinstance(step, Gauss):
+        own = gauss.scalar_kernels(step, staged=has["STAGED"])
+    elif not isinstance(step, Splitting | Sweeps):
         own = [step.prepare, step.main]
     if isinstance(step, Implicit) and has["UNROLLED"]:
         own.append(step.eliminate)

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from phigen.lanes.lowering import Blocks, Lanes, Packs, Traces
+from phigen.lanes.lowering import Blocks, Lanes, Packs, Stages, Traces
 from phigen.scheme.program import Program
-from phigen.scheme.steps import Implicit, Newton, Path, Splitting, Sweeps
+from phigen.scheme.steps import Gauss, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import features
 from phigen.targets.c.lanes import grouped
 from phigen.targets.features import Feature
 
 FEATURES = (
-    Feature("GUESSED", lambda p: isinstance(p.step, Implicit) and not p.noise),
+    Feature("GUESSED", lambda p: isinstance(p.step, Implicit | Gauss) and not p.noise),
     Feature("SINGLE", lambda p: p.single),
     Feature("PARAMETERS", lambda p: p.parameters),
     Feature("RELATIVE", lambda p: isinstance(p.step, Implicit) and p.step.inner.relative),
@@ -23,7 +23,7 @@ FEATURES = (
     Feature("EACH", lambda p: not p.noise, ("ENSEMBLE",), "members"),
     Feature("ATTITUDES", requires=("ATTITUDE", "ENSEMBLE")),
     Feature("GAUGE_SEARCH", requires=("GAUGE",), part="gauge-search"),
-    Feature("RECURRENCES", requires=("GUESSED",), part="recurrences"),
+    Feature("RECURRENCES", lambda p: isinstance(p.step, Implicit), ("GUESSED",), "recurrences"),
 )
 
 
@@ -36,11 +36,13 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     blocks = lanes if isinstance(lanes, Blocks) else None
     traces = lanes if isinstance(lanes, Traces) else None
     packs = lanes if isinstance(lanes, Packs) else None
+    stages = lanes if isinstance(lanes, Stages) else None
     yield Feature("BLOCKS", lambda p: blocks, ("RECURRENCES",), "lanes")
     yield Feature("TRACED", lambda p: (blocks or traces) and isinstance(p.step, Implicit), ("ADJOINT",))
     blocked = blocks or traces  # their reverse pass solves in lanes, and leaves few stages to single steps
     yield Feature("UNROLLED_TRANSPOSE", lambda p: isinstance(p.step, Newton) and not blocked, ("UNROLLED", "ADJOINT"))
-    yield Feature("NARROW", lambda p: traces and traces.narrow, ("TRACED",))
+    yield Feature("STAGED", lambda p: stages, part="lanes")
+    yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
     yield Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")
     yield Feature("FAR", lambda p: packs and packs.near, ("PACKS",))

@@ -7,7 +7,7 @@ from itertools import accumulate
 from math import prod
 
 from phigen.lanes.functions import NEAR_FUNCTIONS, operations
-from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Traces
+from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Stages, Traces
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
@@ -63,7 +63,7 @@ def grouped(program: Program, lanes: Lanes | None) -> bool:
 def printed(program: Program, lanes: Lanes) -> list[str]:
     """The kernels in lanes."""
     found = functions.phi_lanes(program, lanes.calls)
-    if isinstance(lanes, Blocks | Traces):
+    if isinstance(lanes, Blocks | Stages | Traces):
         return found + [
             function(program, k.kernel, lanes=True, single=k.single, sparse=k.sparse, shared=k.shared)
             for k in lanes.kernels

@@ -11,7 +11,7 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Attitude, Program
-from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Implicit, Newton, Path, Splitting, Sweeps
+from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Gauss, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import special
 from phigen.targets.features import switches
 from phigen.targets.header import facts, header_lines, sealed
@@ -52,7 +52,7 @@ def _system_of_coordinates(program: Program) -> str:
     """The body of any other module."""
     step, features = program.step, switches(program)
     assert not isinstance(step, Sweeps)
-    chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Splitting: "splitting"}[type(step)]
+    chosen = {Newton: "newton", Explicit: "explicit", Path: "path", Gauss: "gauss", Splitting: "splitting"}[type(step)]
     modules = ["errors", "march", "solver", chosen]
     modules += ["taylor"] if isinstance(step, Path) else []
     modules += ["philox", "noise"] if program.noise else []
@@ -79,6 +79,7 @@ def _model(program: Program) -> str:
     pieces = [render("js", "system.mjs", _system(program))]
     pieces += [render("js", "schedule.mjs", _schedule(step, program.attitude))] if isinstance(step, Splitting) else []
     pieces += [render("js", "implicit.mjs", _inner(step))] if isinstance(step, Implicit) else []
+    pieces += [render("js", "gauss.mjs", _collocation(program, step))] if isinstance(step, Gauss) else []
     pieces += _functions(program)
     pieces += [_function(kernel) for kernel in _kernels(program)]
     pieces += [_path(program, step.recurrences, "path")] if isinstance(step, Path) else []
@@ -160,12 +161,27 @@ def _inner(step: Newton | Path) -> Mapping[str, object]:
     }
 
 
+def _collocation(program: Program, step: Gauss) -> Mapping[str, object]:
+    """The coefficients of a Gauss method."""
+    table = step.tableau
+    return {
+        "unknowns": step.unknowns,
+        "plain": step.plain,
+        "point": program.dimension + bool(program.time),
+        "most_sweeps": step.most_sweeps,
+        "weights": json.dumps(table.weights),
+        "mixing": [json.dumps(row) for row in table.mixing],
+        "prediction": [json.dumps(row) for row in table.prediction],
+    }
+
+
 def _contents(program: Program) -> list[str]:
     """The table of contents."""
     step = program.step
     how = {
         Newton: "Newton's method",
         Explicit: "a formula",
+        Gauss: "Gauss collocation",
         Path: "paths, each followed by its Taylor series",
         Splitting: "flows of parts of H",
     }[type(step)]
@@ -193,6 +209,8 @@ def _kernels(program: Program) -> list[Kernel]:
         flows = turned.turns if turned else step.flows
         return [replace(step.prepare, name="prepare_row"), *refresh, *flows, *step.tangents, *others]
     assert not isinstance(step, Sweeps)
+    if isinstance(step, Gauss):
+        return [*step.kernels, *others]
     varied = [step.tangent] if isinstance(step, Explicit) and step.tangent else []
     varied += [step.tangent.curvature] if isinstance(step, Path) and step.tangent else []
     return [step.prepare, *refresh, step.main, *varied, *others]

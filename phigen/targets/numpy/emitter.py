@@ -8,8 +8,13 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import (
+    MOST_RISING,
+    ROUNDING,
+    SOLVED,
+    STALLS,
     Adjoint,
     Explicit,
+    Gauss,
     Newton,
     Path,
     PathAdjoint,
@@ -113,6 +118,9 @@ def _step(program: Program) -> list[str]:
         case Newton(linearise=linearise):
             parts = rendered("solve", "plausible", "newton", f"newton_{guess}")
             return [*early, function(program, linearise), *parts]
+        case Gauss(slope=slope, change=change) as step:
+            values |= _gauss_values(step)
+            return [*early, function(program, slope), function(program, change), *rendered("gauss")]
         case Sweeps():
             raise AssertionError("lattices have a module of their own")
 
@@ -137,6 +145,20 @@ def _splitting_values(step: Splitting) -> dict[str, object]:
     }
 
 
+def _gauss_values(step: Gauss) -> dict[str, object]:
+    return {
+        "weights": listed(step.tableau.weights),
+        "mixing": [", ".join(map(repr, row)) for row in step.tableau.mixing],
+        "plain": step.plain,
+        "unknowns": step.unknowns,
+        "most_sweeps": step.most_sweeps,
+        "solved": repr(SOLVED),
+        "rounding": repr(ROUNDING),
+        "stalls": STALLS,
+        "most_rising": MOST_RISING,
+    }
+
+
 def _tangent(program: Program) -> list[str]:
     """The tangent map of a step, with what it needs."""
     values, kernels, parts = values_of(program), list[Kernel](), list[str]()
@@ -151,6 +173,9 @@ def _tangent(program: Program) -> list[str]:
             values |= statements(extended, path, PATH_SYNTAX)
             values |= {"series": len(path.series), "n_twice": extended.dimension}
             kernels, parts = [varied.curvature], ["holds", "piece", "seeds", "path"]
+        case Gauss(tangent=varied_stage) as step if varied_stage:
+            values |= _gauss_values(step)
+            kernels, parts = [varied_stage.slope, varied_stage.change], ["gauss"]
         case Newton():
             parts = ["newton"]
     pieces = [function(program, kernel) for kernel in kernels]

@@ -5,7 +5,9 @@
 
 #include "model.h"
 
-#if PHI_IMPLICIT
+#if PHI_GAUSS
+/* ---- Compensated sums ---- */
+#elif PHI_IMPLICIT
 /* ---- Compensated sums, linear equations ---- */
 #elif PHI_SPLITTING
 /* ---- The explicit step ---- */

@@ -5,7 +5,7 @@
 
 #include "algebra.c"
 #include "model.h"
-#if PHI_GUESSED
+#if PHI_GUESSED && !PHI_GAUSS
 #include "implicit.c"
 #endif
 #if PHI_MONITOR
@@ -95,7 +95,7 @@ static void phi_move_guesses(phi_solver *s, const double from[PHI_DIM])
 phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 {
     if (s == NULL || x == NULL || !phi_finite(x, PHI_DIM)) return PHI_BAD_ARGUMENT;
-#if PHI_GUESSED || PHI_MONITOR
+#if PHI_GUESSED && !PHI_GAUSS || PHI_MONITOR
     double from[PHI_DIM];
     memcpy(from, s->x, sizeof from);
 #endif
@@ -110,6 +110,8 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 #endif
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
+#elif PHI_GAUSS
+    memset(&s->history, 0, sizeof s->history);
 #elif PHI_GUESSED
     /* what guesses begin from moves with the state */
     PHI_EACH_STAGE
@@ -126,7 +128,7 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 {
     if (s == NULL || change == NULL) return PHI_BAD_ARGUMENT;
-#if PHI_GUESSED || PHI_MONITOR
+#if PHI_GUESSED && !PHI_GAUSS || PHI_MONITOR
     double from[PHI_DIM];
     memcpy(from, s->x, sizeof from);
 #endif
@@ -140,6 +142,8 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
 #endif
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
+#elif PHI_GAUSS
+    memset(&s->history, 0, sizeof s->history);
 #elif PHI_GUESSED
     PHI_EACH_STAGE
         for (int i = 0; i < PHI_DIM; ++i) PHI_OF(s->history, stage).difference[0][i] += s->x[i] - from[i];

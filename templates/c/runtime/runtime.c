@@ -15,7 +15,7 @@
 #if PHI_ENSEMBLE
 #include "ensemble.c"
 #endif
-#if PHI_BLOCKS || PHI_PACKS || PHI_TRACED
+#if PHI_BLOCKS || PHI_PACKS || PHI_TRACED || PHI_STAGED
 
 #if defined(__clang__)
 #pragma clang diagnostic pop

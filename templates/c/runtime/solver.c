@@ -8,6 +8,8 @@
 #include "newton.c"
 #elif PHI_PATH
 #include "path.c"
+#elif PHI_GAUSS
+#include "gauss.c"
 #else
 #include "explicit.c"
 #endif

@@ -5,7 +5,16 @@
 #include "status.h"
 const char *phi_status_string(phi_status status);
 
-#if PHI_GUESSED && !PHI_RECURRENCES
+#if PHI_GAUSS
+/* What the last step tells of the next one. For speed only. */
+typedef struct {
+    int count;   /* 0 before the first step */
+    int sweeps;  /* that the last step took */
+    double rate; /* at which changes of sweeps shrink */
+    double moves[PHI_UNKNOWNS][PHI_WIDTH]; /* of the stages of the last step, as seen from its end */
+} phi_history;
+
+#elif PHI_GUESSED && !PHI_RECURRENCES
 enum { PHI_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
@@ -51,7 +60,11 @@ typedef struct {
     double x[PHI_DIM];     /* the state; read it freely, change it only through functions */
     double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
     size_t steps;          /* good steps since phi_init */
+#if PHI_GAUSS
+    size_t evaluations;    /* sweeps over the stages, for statistics */
+#else
     size_t evaluations;    /* of the generating function, for statistics */
+#endif
 #if PHI_MONITOR
     double t, t_carry;     /* physical time since phi_init, t + t_carry: steps are equal in tau, not in it */
 #elif PHI_TIMED

@@ -1,7 +1,7 @@
 import { StepError, finite } from "./errors.mjs";
 import { march } from "./march.mjs";
 import { makeStage } from "./newton.mjs";
-// #if IMPLICIT
+// #if HISTORY
 import { History } from "./guess.mjs";
 // #endif
 import { chooseGauge } from "./gauge.mjs";
@@ -134,7 +134,7 @@ export class Solver {
   /** All that depends on parameters and step size only, for each stage. */
   // #endif
   coef = emptyTables();
-  // #if IMPLICIT
+  // #if HISTORY
   /** For starting guesses, for each stage. */
   history = FRACTIONS.map(() => new History());
   // #endif
@@ -247,7 +247,7 @@ export class Solver {
       // #else
       prepare(this.params, fraction * h, this.coef[stage]);
       // #endif
-      // #if IMPLICIT
+      // #if HISTORY
       this.history[stage].clear();
       // #endif
     });
@@ -431,7 +431,7 @@ export class Solver {
       });
     }
     // #endif
-    // #if IMPLICIT
+    // #if HISTORY
     for (const history of this.history) history.move(this.x, x);
     // #endif
     // #if RATE_OF_GAUGE
@@ -460,7 +460,11 @@ export class Solver {
     const { tCarry } = this;
     // #endif
     const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
+    // #if GAUSS
+    const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry), t };
+    // #else
     const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
+    // #endif
     // #if ATTITUDE
     const turned = Float64Array.from(this.turned);
     const turnedCarry = Float64Array.from(this.turnedCarry);

@@ -1,0 +1,178 @@
+"""Quaternions over commutative algebras, for Lie algebras that are the skew elements of such.
+
+A = K ⊕ g with ab = β(a, b) + ½[a, b] on g, where K commutes with all. It exists if [[a, b], c] = 4(β(b, c)a − β(a, c)b)
+for a symmetric β whose values are maps that commute with the bracket; K is spanned by the identity and those. For so(3)
+these are the quaternions, for sl(2) the 2×2 matrices, for so(3,1) and se(3) quaternions with complex and dual
+coefficients; Heisenberg algebras have β = 0, and so(4) is two copies of so(3).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from math import isqrt
+
+from phigen.gauss.star_algebra import StarAlgebra, Vector, difference, in_basis
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.linear import Span, add_multiple, kernel
+from phigen.symbolic.tower import rational
+
+#: A linear map of g, as entries (row, column).
+Map = dict[tuple[int, int], Scalar]
+
+#: Largest Lie algebra that is tried: the number of unknowns grows with the third power.
+MOST_QUATERNIONIC = 12
+
+
+def quaternionic(algebra: LieAlgebra) -> StarAlgebra | None:
+    """The algebra A of a Lie algebra; None where there is none."""
+    m, field = algebra.dimension, algebra.field
+    if m > MOST_QUATERNIONIC:
+        return None
+    ad = [[{k: field.convert(v) for k, v in algebra.bracket(i, j).items()} for j in range(m)] for i in range(m)]
+    maps = _centroid(ad, field)
+    form = _form(ad, maps, field)
+    if form is None:
+        return None
+    scalars = _generated(form, m, field)
+    found = _assembled(ad, form, scalars, field)
+    return _split(found, len(scalars)) if found.sound else None
+
+
+def _centroid(ad: Sequence[Sequence[Vector]], field: Field) -> list[Map]:
+    """A basis of the linear maps φ with φ[a, b] = [φa, b], as entries (row, column), the identity first."""
+    m = len(ad)
+    rows: list[dict[int, Scalar]] = []
+    for i in range(m):
+        for j in range(m):
+            equations: dict[int, dict[int, Scalar]] = {}
+            for k, v in ad[i][j].items():
+                for row in range(m):
+                    add_multiple(equations.setdefault(row, {}), {row * m + k: v}, field.one)
+            for k in range(m):  # [φ e_i, e_j] = Σ_k φ_ki [e_k, e_j]
+                for row, v in ad[k][j].items():
+                    add_multiple(equations.setdefault(row, {}), {k * m + i: v}, -field.one)
+            rows += [e for e in equations.values() if e]
+    found = [{divmod(at, m): v for at, v in vector.items()} for vector in kernel(field, rows, m * m)]
+    identity = {(i, i): field.one for i in range(m)}
+    independent = Span(field, [identity, *found])
+    return [v for k, v in enumerate([identity, *found]) if k not in independent.dependent]
+
+
+def _form(ad: Sequence[Sequence[Vector]], maps: Sequence[Map], field: Field) -> dict[tuple[int, int], Map] | None:
+    """β(e_i, e_j) for all i, j, as maps; None if there is none."""
+    m, count = len(ad), len(maps)
+    places = {(i, j): k for k, (i, j) in enumerate((i, j) for i in range(m) for j in range(i + 1))}
+    four, last = field.number(4), len(places) * count
+
+    def unknowns(i: int, j: int, of: int, sign: Scalar) -> Iterator[tuple[int, dict[int, Scalar]]]:
+        """sign·4·β(e_i, e_j)(e_of) by components, in the unknown coefficients of the maps."""
+        place = places[max(i, j), min(i, j)]
+        for number, phi in enumerate(maps):
+            for (row, column), v in phi.items():
+                if column == of:
+                    yield row, {place * count + number: four * v * sign}
+
+    rows: list[dict[int, Scalar]] = []
+    for a in range(m):
+        for b in range(a):
+            for c in range(m):
+                equations: dict[int, dict[int, Scalar]] = {}
+                for row, term in (*unknowns(b, c, a, field.one), *unknowns(a, c, b, -field.one)):
+                    add_multiple(equations.setdefault(row, {}), term, field.one)
+                for k, v in ad[a][b].items():
+                    for row, w in ad[k][c].items():
+                        add_multiple(equations.setdefault(row, {}), {last: v * w}, -field.one)
+                rows += [e for e in equations.values() if e]
+    solution = next((v for v in kernel(field, rows, last + 1) if last in v), None)
+    if solution is None:
+        return None
+    found: dict[tuple[int, int], Map] = {}
+    for (i, j), place in places.items():
+        value: Map = {}
+        for number, phi in enumerate(maps):
+            if place * count + number in solution:
+                add_multiple(value, phi, solution[place * count + number])
+        found[i, j] = found[j, i] = value
+    return found
+
+
+def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> list[Map]:
+    """A basis of the algebra of maps that the identity and the values of β generate, the identity first."""
+    found: list[Map] = [{(i, i): field.one for i in range(m)}]
+    pending = [value for value in form.values() if value]
+    while pending:
+        value = pending.pop()
+        if Span(field, [*found, value]).dimension == len(found):
+            continue
+        found.append(value)
+        pending += [_composed(a, b) for a in found for b in found]
+    return found
+
+
+def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], Scalar]) -> Map:
+    found: Map = {}
+    for (i, k), v in a.items():
+        add_multiple(found, {(i, j): w for (row, j), w in b.items() if row == k}, v)
+    return found
+
+
+def _assembled(
+    ad: Sequence[Sequence[Vector]], form: Mapping[tuple[int, int], Map], scalars: Sequence[Map], field: Field
+) -> StarAlgebra:
+    """The algebra K ⊕ g, if it is one; its basis holds 2e for the basis elements e of g, with 2a·2b = 4β + 2[a, b]."""
+    m, count, one = len(ad), len(scalars), field.one
+    span, two, half = Span(field, scalars), field.number(2), one / field.number(2)
+    table: dict[tuple[int, int], Vector] = {}
+    for k, phi in enumerate(scalars):
+        for n, psi in enumerate(scalars):
+            table[k, n] = span.coordinates(_composed(phi, psi)) or {}
+        for j in range(m):
+            image = {count + row: v for (row, column), v in sorted(phi.items()) if column == j}
+            table[k, count + j] = table[count + j, k] = image
+    for i in range(m):
+        for j in range(m):
+            value = span.coordinates(form[i, j]) or {}
+            scalar = {k: v * two * two for k, v in value.items()}
+            table[count + i, count + j] = scalar | {count + k: v for k, v in ad[i][j].items()}
+    basis = [{count + j: half} for j in range(m)]
+    star = [{k: one if k < count else -one} for k in range(count + m)]
+    functional: list[Vector] = [{}] * count + [{j: two} for j in range(m)]
+    table = {at: v for at, v in table.items() if v}
+    own = [{j: one} for j in range(m)]
+    return StarAlgebra(field, count + m, table, star, {0: one}, basis, functional, basis, own)
+
+
+def _split(algebra: StarAlgebra, count: int) -> StarAlgebra:
+    """The same as a sum of two algebras, where K is two-dimensional and has an idempotent with rational entries."""
+    field, one = algebra.field, algebra.field.one
+    idempotent = _idempotent(algebra) if count == 2 else None
+    if idempotent is None:
+        return algebra
+    parts: list[Vector] = []
+    for factor in (idempotent, difference(algebra.unit, idempotent, one)):
+        images = [algebra.product(factor, {i: one}) for i in range(algebra.dimension)]
+        dependent = Span(field, images).dependent
+        parts += [image for i, image in enumerate(images) if i not in dependent]
+    found = in_basis(algebra, parts)
+    frame = [{i: one} for i, image in enumerate(found.star) if image == {i: -one}]
+    span = Span(field, frame)
+    return replace(found, frame=frame, combination=[span.coordinates(e) or {} for e in found.basis])
+
+
+def _idempotent(algebra: StarAlgebra) -> Vector | None:
+    """(1 + (k − q/2)/r)/2 for the second element k of the basis of K, where k² = p + qk and r² = p + q²/4."""
+    field = algebra.field
+    if not field.is_rational:
+        return None
+    square = algebra.table.get((1, 1), {})
+    p, q = (rational(square.get(i, field.zero)) for i in (0, 1))
+    discriminant = p + q * q / 4
+    if discriminant <= 0:
+        return None
+    r = Fraction(isqrt(discriminant.numerator), isqrt(discriminant.denominator))
+    if r * r != discriminant:
+        return None
+    return {0: field.number(Fraction(1, 2) - q / (4 * r)), 1: field.number(1 / (2 * r))}

@@ -1,0 +1,148 @@
+"""Which coordinates of a system a Gauss method treats in which way, so that its step is a Poisson map.
+
+Coordinates with constant brackets stand for themselves: Gauss methods are symplectic. Those with the brackets of a Lie
+algebra are x̃(G ξ G*), where G is a group element, 1 at the start of each step, and the method is applied to G
+(`phigen.gauss.star_algebra`). Gauss methods keep quadratic first integrals and constant two-forms, and commute with
+linear maps; so the step of G is presymplectic, and the step of x is a Poisson map, exactly, with all Casimirs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.gauss.quaternionic import quaternionic
+from phigen.gauss.star_algebra import StarAlgebra, Vector
+from phigen.geometry.lie_algebra import LieAlgebra
+from phigen.geometry.linear import kernel
+from phigen.geometry.representations import indecomposable_parts, restricted
+from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson, Shape
+from phigen.geometry.system import System
+from phigen.symbolic.expression import ONE, ZERO, Expression
+
+
+@dataclass(frozen=True)
+class Plain:
+    """Coordinates (indices) that stand for themselves, as their brackets are constant, or any where the step is
+    Poisson to truncation only."""
+
+    indices: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Group:
+    """Coordinates (indices) with the brackets of a Lie algebra: x_i + ``shift`` is a momentum map of a star algebra.
+
+    With ``central`` the last element of the basis of the Lie algebra has no coordinate: its value is 1.
+    """
+
+    indices: tuple[int, ...]
+    algebra: StarAlgebra
+    lie: LieAlgebra
+    shift: tuple[Expression, ...]
+    central: bool = False
+
+
+Part = Plain | Group
+
+
+@dataclass(frozen=True)
+class Realisation:
+    """The parts of a system; the step is ``exact``, a Poisson map, or one to truncation only."""
+
+    parts: tuple[Part, ...]
+    exact: bool
+
+    @property
+    def groups(self) -> tuple[Group, ...]:
+        """The parts with the brackets of a Lie algebra."""
+        return tuple(part for part in self.parts if isinstance(part, Group))
+
+    @property
+    def label(self) -> str:
+        """The kind of the method, for users."""
+        if not self.exact:
+            return "Gauss collocation, Poisson to truncation only"
+        return "Gauss collocation, collective" if self.groups else "Gauss collocation"
+
+
+def direct(system: System) -> Realisation:
+    """Gauss on ẋ = π∇H itself: a Poisson map where π is constant, else to truncation."""
+    constant = isinstance(system.shape, Constant | Canonical)
+    return Realisation((Plain(tuple(range(system.dimension))),), constant)
+
+
+def collective(system: System) -> Realisation | None:
+    """A realisation with which the step is a Poisson map; None where none is known."""
+    found: list[Part] = []
+    for indices, algebra, central in _components(system.shape):
+        part = _part(indices, algebra, central=central)
+        if part is None:
+            return None
+        found.append(part)
+    if not found:
+        return direct(system) if isinstance(system.shape, Constant | Canonical) else None
+    return Realisation(tuple(_joined(found)), True)
+
+
+def _joined(parts: Sequence[Part]) -> Iterator[Part]:
+    """The same with one plain part, the first."""
+    plain = [i for part in parts if isinstance(part, Plain) for i in part.indices]
+    if plain:
+        yield Plain(tuple(sorted(plain)))
+    yield from (part for part in parts if isinstance(part, Group))
+
+
+def _components(shape: Shape) -> Iterator[tuple[list[int], LieAlgebra, bool]]:
+    """Indecomposable parts of a linear or affine structure; whether the last basis element is the constant 1."""
+    if isinstance(shape, LiePoisson):
+        for indices in indecomposable_parts(shape.algebra):
+            yield indices, restricted(shape.algebra, indices), False
+    if isinstance(shape, Affine):
+        whole = shape.extension
+        one = whole.dimension - 1
+        linear = {ij: {k: c for k, c in row.items() if k != one} for ij, row in whole.constants.items()}
+        # Coordinates with a constant bracket belong together too: as if it were a multiple of one of them.
+        joined = {ij: row or {ij[0]: ONE} for ij, row in linear.items()}
+        for indices in indecomposable_parts(LieAlgebra("", one, joined)):
+            pairs = [ij for ij in whole.constants if set(ij) <= set(indices)]
+            if any(one in whole.constants[ij] for ij in pairs):
+                yield indices, restricted(whole, [*indices, one]), True
+            else:
+                yield indices, restricted(whole, indices), False
+
+
+def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | None:
+    last = len(indices)
+    if all(set(row) <= {last} for row in lie.constants.values()):  # all brackets are constant, or zero
+        return Plain(tuple(indices))
+    shift = _shift(lie, last) if central else [ZERO] * last
+    if shift is not None:
+        lie, central = _without_constants(lie, last), False
+    algebra = star_algebra(lie)
+    if algebra is None:
+        return None
+    return Group(tuple(indices), algebra, lie, tuple(shift or [ZERO] * last), central)
+
+
+def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
+    """A star algebra whose skew elements hold the Lie algebra; None where none is known."""
+    return quaternionic(lie)
+
+
+def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:
+    constants = {ij: {k: c for k, c in row.items() if k != last} for ij, row in lie.constants.items() if last not in ij}
+    return LieAlgebra(lie.name, last, {ij: row for ij, row in constants.items() if row}, None, lie.labels[:last])
+
+
+def _shift(lie: LieAlgebra, last: int) -> list[Expression] | None:
+    """s with {x_i, x_j} = Σ_k c_ij^k (x_k + s_k), which makes a constant part of the brackets go away; None if none."""
+    field = lie.field
+    rows: list[Vector] = []
+    for row in lie.constants.values():
+        equation = {k: field.convert(c) for k, c in row.items() if k != last}
+        if last in row:
+            equation[last] = -field.convert(row[last])
+        rows.append(equation)
+    solution = next((v for v in kernel(field, rows, last + 1) if last in v), None)
+    return None if solution is None else [field.expression(solution.get(k, field.zero)) for k in range(last)]

@@ -1,0 +1,162 @@
+"""Associative algebras with an involution, whose skew elements contain a Lie algebra.
+
+Let A be such an algebra, g a Lie subalgebra of its skew elements (a* = −a), and x̃ a functional on A that vanishes on
+symmetric elements. On A, as a vector space with the constant two-form ω(u, v) = x̃(u v*), right multiplication by
+exp(ξ), ξ ∈ g, is linear and symplectic, and its momentum map is quadratic: J_ξ(G) = x̃(G ξ G*). At G = 1 it is x̃ itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.linear import Span, add_multiple, kernel
+
+Vector = dict[int, Scalar]
+
+
+@dataclass(frozen=True)
+class StarAlgebra:
+    """An algebra in a basis: ``table[i, j]`` is the product of two basis elements, ``star[i]`` the image of one under
+    the involution, ``unit`` the unit.
+
+    ``basis`` are the elements E_a of g. ``frame`` are skew elements by which momenta are computed, with E_a =
+    Σ_k frame_k·``combination[a][k]``. The functional x̃ of a point x has the value Σ_a x_a·``functional[i][a]`` at the
+    basis element i.
+    """
+
+    field: Field
+    dimension: int
+    table: Mapping[tuple[int, int], Vector]
+    star: Sequence[Vector]
+    unit: Vector
+    basis: Sequence[Vector]
+    functional: Sequence[Vector]
+    frame: Sequence[Vector]
+    combination: Sequence[Vector]
+
+    def product(self, a: Mapping[int, Scalar], b: Mapping[int, Scalar]) -> Vector:
+        """The product of two elements."""
+        found: Vector = {}
+        for i, v in a.items():
+            for j, w in b.items():
+                if (i, j) in self.table:
+                    add_multiple(found, self.table[i, j], v * w)
+        return found
+
+    def starred(self, a: Mapping[int, Scalar]) -> Vector:
+        """The image of an element under the involution."""
+        return combined(self.star, a)
+
+    def commutator(self, a: Mapping[int, Scalar], b: Mapping[int, Scalar]) -> Vector:
+        """ab − ba."""
+        return difference(self.product(a, b), self.product(b, a), self.field.one)
+
+    def value(self, a: Mapping[int, Scalar]) -> Vector:
+        """x̃(a) as a linear form in x."""
+        return combined(self.functional, a)
+
+    @cached_property
+    def skew(self) -> list[Vector]:
+        """A basis of the skew elements."""
+        one = self.field.one
+        rows: list[Vector] = [{} for _ in range(self.dimension)]
+        for i, image in enumerate(self.star):
+            for k, v in image.items():
+                add_multiple(rows[k], {i: v}, one)
+            add_multiple(rows[i], {i: one}, one)
+        return kernel(self.field, rows, self.dimension)
+
+    @property
+    def sound(self) -> bool:
+        """Whether all `axioms` hold."""
+        return not any(any(residuals) for _, residuals in self.axioms())
+
+    def axioms(self) -> Iterator[tuple[str, Iterator[Vector]]]:
+        """What the momentum map rests on, each with residuals that are empty where it holds."""
+        n, one = range(self.dimension), self.field.one
+        units = [{i: one} for i in n]
+        yield "A is associative", (self._associator(i, j, k) for i in n for j in n for k in n)
+        yield (
+            "A has the unit 1",
+            (difference(p, u, one) for u in units for p in (self.product(self.unit, u), self.product(u, self.unit))),
+        )
+        yield "(ab)* = b*a* and a** = a", self._involution(units)
+        yield "E_a* = −E_a", (difference(self.starred(e), e, -one) for e in self.basis)
+        yield "E_a is a combination of the frame", self._framed()
+        yield "x̃(E_a) = x_a", (difference(self.value(e), {a: one}, one) for a, e in enumerate(self.basis))
+        yield "x̃(a*) = −x̃(a)", (difference(self.value(self.starred(u)), self.value(u), -one) for u in units)
+        yield "functionals x̃ stay such under the skew elements", self._moved()
+
+    def _associator(self, i: int, j: int, k: int) -> Vector:
+        one = self.field.one
+        left = self.product(self.table.get((i, j), {}), {k: one})
+        return difference(left, self.product({i: one}, self.table.get((j, k), {})), one)
+
+    def _involution(self, units: Sequence[Vector]) -> Iterator[Vector]:
+        one = self.field.one
+        for a in units:
+            yield difference(self.starred(self.starred(a)), a, one)
+            for b in units:
+                reverse = self.product(self.starred(b), self.starred(a))
+                yield difference(self.starred(self.product(a, b)), reverse, one)
+
+    def _framed(self) -> Iterator[Vector]:
+        for e, parts in zip(self.basis, self.combination, strict=True):
+            yield difference(combined(self.frame, parts), e, self.field.one)
+        for f in self.frame:
+            yield difference(self.starred(f), f, -self.field.one)
+
+    def _moved(self) -> Iterator[Vector]:
+        """The skew elements on which all x̃ vanish are an ideal of the skew elements: x̃([u, n]) for those n."""
+        rows: list[Vector] = [{} for _ in self.basis]
+        for i, u in enumerate(self.skew):
+            for a, v in self.value(u).items():
+                rows[a][i] = v
+        for null in kernel(self.field, [r for r in rows if r], len(self.skew)):
+            n = combined(self.skew, null)
+            for u in self.skew:
+                yield self.value(self.commutator(u, n))
+
+
+def combined(vectors: Sequence[Mapping[int, Scalar]], factors: Mapping[int, Scalar]) -> Vector:
+    """Σ_k factors[k]·vectors[k]."""
+    found: Vector = {}
+    for k, v in factors.items():
+        add_multiple(found, vectors[k], v)
+    return found
+
+
+def difference(a: Mapping[int, Scalar], b: Mapping[int, Scalar], factor: Scalar) -> Vector:
+    """a − factor·b."""
+    found = dict(a)
+    add_multiple(found, b, -factor)
+    return found
+
+
+def in_basis(algebra: StarAlgebra, vectors: Sequence[Vector]) -> StarAlgebra:
+    """The same algebra in another basis."""
+    span = Span(algebra.field, vectors)
+
+    def converted(a: Mapping[int, Scalar]) -> Vector:
+        return span.coordinates(a) or {}
+
+    table = {
+        (i, j): converted(p)
+        for i, a in enumerate(vectors)
+        for j, b in enumerate(vectors)
+        if (p := algebra.product(a, b))
+    }
+    return StarAlgebra(
+        algebra.field,
+        algebra.dimension,
+        table,
+        [converted(algebra.starred(a)) for a in vectors],
+        converted(algebra.unit),
+        [converted(e) for e in algebra.basis],
+        [algebra.value(a) for a in vectors],
+        [converted(f) for f in algebra.frame],
+        algebra.combination,
+    )

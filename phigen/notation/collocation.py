@@ -1,0 +1,61 @@
+"""Gauss collocation, for reading: the order, the equations of a step, and what its unknowns are."""
+
+from __future__ import annotations
+
+from phigen.compilation import Compilation
+from phigen.gauss.realisation import Plain, Realisation
+from phigen.symbolic.readable import readable
+
+
+def method(compilation: Compilation) -> str:
+    """``order 8, 4 stages, exact``."""
+    stages, note = compilation.order.terms, compilation.order.note
+    said = f"order {compilation.order.order}, {stages} stage{'s' * (stages > 1)}, structure {compilation.structure}"
+    return said + (f" ({note})" if note else "")
+
+
+def realisation_of(compilation: Compilation) -> Realisation:
+    """That of a compilation by Gauss collocation."""
+    if compilation.gauss is None:
+        raise ValueError(f"{compilation.spec.name} is not compiled to Gauss collocation")
+    return compilation.gauss
+
+
+def equations() -> list[tuple[str, str]]:
+    """The equations of a step, as pairs of two sides."""
+    return [
+        ("Z_i", "z + Σ_j μ_ij L_j"),
+        ("L_j", "h b_j f(Z_j)"),
+        ("z′", "z + Σ_j L_j"),
+        ("μ_ij + μ_ji", "1"),
+    ]
+
+
+def lines(compilation: Compilation) -> list[str]:
+    """What the unknowns are, one line for each part, and what the step is."""
+    found, names = [], compilation.system.coordinates
+    for part in realisation_of(compilation).parts:
+        listed = ", ".join(names[i] for i in part.indices)
+        if isinstance(part, Plain):
+            found.append(f"{listed}: themselves")
+            continue
+        shifts = [f"{names[i]} + {readable([s], None)[0]}" for i, s in zip(part.indices, part.shift, strict=True)]
+        shown = listed if all(s.is_zero for s in part.shift) else ", ".join(shifts)
+        found.append(
+            f"{shown}: x̃(G E_a G*) with G in an algebra of dimension {part.algebra.dimension}, G = 1 at the start"
+        )
+    exact = realisation_of(compilation).exact
+    found.append(
+        "the step is a Poisson map" if exact else "the step is a Poisson map to truncation only, that is: none"
+    )
+    return found
+
+
+def described(compilation: Compilation) -> dict[str, object]:
+    """The method for machines."""
+    return {
+        "scheme": "gauss",
+        "structure": compilation.structure,
+        "stages": compilation.order.terms,
+        "unknowns": lines(compilation),
+    }

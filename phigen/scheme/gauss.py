@@ -1,0 +1,175 @@
+"""From a system to a program that steps by Gauss collocation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from phigen.errors import SpecError
+from phigen.gauss.kernels import StageMap, change_kernel, field_kernel, frame_kernel, stage_map
+from phigen.gauss.realisation import Realisation, collective, direct
+from phigen.gauss.tableau import MOST_STAGES, tableau
+from phigen.geometry.system import System
+from phigen.scheme.discretisation import expect_few
+from phigen.scheme.forces import force_facts
+from phigen.scheme.gauge import Gauge
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernels import observables
+from phigen.scheme.lowering import operation_counts
+from phigen.scheme.order import Order
+from phigen.scheme.program import About, Program
+from phigen.scheme.staging import Coefficients
+from phigen.scheme.steps import Gauss, GaussTangent
+from phigen.spec.model import Spec
+from phigen.symbolic.expression import derivatives
+from phigen.symbolic.symbols import STEP
+
+#: Sweeps after which the solve of a step is given up, unless the spec says another number.
+MOST_SWEEPS = 100
+
+#: What to write where a step cannot be made an exact Poisson map.
+TRUNCATED = "structure: to truncation takes every bracket, and is no Poisson map; scheme: series is one"
+
+
+def expect_offered(spec: Spec) -> None:
+    """Raise `SpecError` for what is not offered with Gauss methods."""
+    found = [spec.diagnostic(path, f"scheme gauss: {message}", hint) for path, message, hint in _refused(spec)]
+    if found:
+        raise SpecError(found)
+
+
+def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
+    """What is asked for and not offered: where, what, and what to use."""
+    extras, series = spec.extras, "scheme: series has it"
+    if spec.lattice:
+        yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
+    if spec.noise:
+        yield ("noise",), "not with noise", "scheme: series or splitting"
+    if spec.monitor is not None:
+        yield ("monitor",), "not with a monitor", "scheme: series or splitting"
+    if extras.adjoint:
+        yield ("adjoint",), "its transpose is not offered", "scheme: series or splitting, for gradients"
+    if extras.modified_hamiltonian:
+        yield ("modified_hamiltonian",), "the modified Hamiltonian is not computed", series
+    if spec.reconstruct:
+        yield ("reconstruct",), "attitudes are not offered", "scheme: series or splitting"
+    if extras.real == "float":
+        yield ("real",), "not in single precision", "scheme: series or splitting"
+    if spec.composition not in ("auto", "none"):
+        yield ("composition",), "steps are not composed", f"order: up to {2 * MOST_STAGES}, in one step"
+    if spec.solver.tolerance is not None:
+        yield ("solver", "tolerance"), "it solves to round-off", "remove tolerance"
+
+
+def plan_gauss(spec: Spec) -> Order:
+    """The order of the method, and its stages. Raises `SpecError` for orders that it does not have."""
+    order = spec.wanted_order
+    if order > 2 * MOST_STAGES:
+        hint = f"order: {2 * MOST_STAGES}"
+        raise SpecError([spec.diagnostic(("order",), f"scheme gauss: the order is at most {2 * MOST_STAGES}", hint)])
+    note = f"order {order} was asked for; Gauss methods have even order" if order % 2 else ""
+    return Order(order + order % 2, (order + 1) // 2, note)
+
+
+def realise_gauss(spec: Spec, system: System) -> Realisation:
+    """How the coordinates are treated. Raises `SpecError` where an exact Poisson map is wanted and none is known."""
+    if spec.structure == "to truncation":
+        return direct(system)
+    found = collective(system)
+    if found is None:
+        message = f"scheme gauss: no exact Poisson map is known for this bracket ({system.shape})"
+        place = ("structure",) if ("structure",) in spec.locations else ("scheme",)
+        raise SpecError([spec.diagnostic(place, message, TRUNCATED)])
+    pushed = [system.coordinates[i] for g in found.groups for i in g.indices if _is_pushed(system, i)]
+    if pushed:
+        message = f"scheme gauss: a vector force on {', '.join(pushed)} leaves the coadjoint orbits"
+        raise SpecError([spec.diagnostic(("forces",), message, "structure: to truncation, or scheme: series")])
+    return found
+
+
+def _is_pushed(system: System, i: int) -> bool:
+    return system.forces is not None and not system.forces.vector[i].is_zero
+
+
+def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: Order, spec: Spec) -> Program:
+    """The solver as a program; multiples of Casimirs in the gauge are taken from H. LimitError if it is too large."""
+    discretised = gauge.applied(system)
+    points = stage_map(discretised, realisation)
+    coefficients = Coefficients(system.parameter_names)
+    slope, change = field_kernel(points, coefficients), change_kernel(points, coefficients)
+    frame = frame_kernel(points, coefficients)
+    tangent = _tangent(points, slope, change, coefficients) if spec.extras.tangent else None
+    prepare = Kernel(
+        "prepare",
+        "everything that depends on parameters only",
+        {"params": system.parameter_names, "h": (STEP,)},
+        (Output("coef", tuple(coefficients.values)),),
+    )
+    step = Gauss(
+        prepare,
+        _full(slope, coefficients),
+        _full(change, coefficients),
+        tableau(order.terms),
+        len(points.moved) + len(system.times),
+        _full(frame, coefficients) if frame else None,
+        spec.solver.max_iterations if ("solver", "max_iterations") in spec.locations else MOST_SWEEPS,
+        tangent,
+    )
+    for kernel in step.kernels:
+        expect_few(system, kernel, other="")
+    facts = [fact for fact in _facts(system, realisation, order, gauge, step) if fact]
+    return Program(
+        name=system.name,
+        about=About(spec.title, spec.license, spec.source_sha256, tuple(facts), operation_counts(slope.roots)),
+        coordinates=system.coordinates,
+        time=system.time,
+        forced=system.forces is not None,
+        pushed=system.pushed,
+        parameters=system.parameters,
+        casimirs=tuple(system.casimirs),
+        order=order.order,
+        step=step,
+        observables=observables(system),
+        extras=spec.extras,
+        lanes=spec.solver.lanes,
+        profile=spec.profile,
+        observed=tuple(system.observables),
+        truncated=not realisation.exact,
+    )
+
+
+def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
+    """The kernel, which reads the table of coefficients as it is in the end."""
+    return Kernel(
+        kernel.name, kernel.purpose, {**kernel.inputs, "coef": coefficients.slots}, kernel.outputs, kernel.named
+    )
+
+
+def _tangent(points: StageMap, slope: Kernel, change: Kernel, coefficients: Coefficients) -> GaussTangent:
+    """The Jacobians along coordinates, not the time, then along the unknowns."""
+    names = (*points.system.coordinates, *points.unknowns)
+    kernels = []
+    for kernel, name in ((slope, "slope_jacobian"), (change, "change_jacobian")):
+        columns = [derivatives(kernel.roots, s) for s in names]
+        flat = coefficients.hoist([c[i] for i in range(len(kernel.roots)) for c in columns])
+        inputs = {"coef": coefficients.slots, "x": points.start, "z": points.unknowns}
+        purpose = f"the Jacobian of {'the derivatives of the unknowns' if kernel is slope else 'the change'}"
+        purpose += " along x, and along the unknowns"
+        kernels.append(Kernel(f"stage_{name}", purpose, inputs, (Output("slopes", tuple(flat)),)))
+    return GaussTangent(*(_full(k, coefficients) for k in kernels))
+
+
+def _facts(system: System, realisation: Realisation, order: Order, gauge: Gauge, step: Gauss) -> Iterator[str]:
+    """The lines of the header."""
+    stages = order.terms
+    yield f"scheme: Gauss collocation, {stages} stage{'s' * (stages > 1)}"
+    if not realisation.exact:
+        yield "structure: to truncation; a step is no Poisson map, and keeps Casimirs of degree 1 and 2 only"
+    elif realisation.groups:
+        listed = "; ".join(", ".join(system.coordinates[i] for i in g.indices) for g in realisation.groups)
+        yield f"structure: exact; quadratic momentum maps for {listed}"
+    else:
+        yield "structure: exact, as the brackets are constant"
+    yield from gauge.facts
+    yield from force_facts(system, "pi(grad H + zeta) + f at the stages")
+    yield f"step: {step.manner}"
+    yield order.note

@@ -1,0 +1,66 @@
+"""What is printed of a Gauss method in C: its coefficients, sizes, and the kernels at one stage."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from phigen.lanes.lowering import Lanes, Stages
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Gauss
+from phigen.targets.rendering import render
+
+
+def _width(step: Gauss, lanes: Lanes | None) -> int:
+    """Entries of an array over the stages: lanes, or as many as there are stages."""
+    return lanes.lanes if isinstance(lanes, Stages) else step.tableau.stages
+
+
+def declared(step: Gauss, lanes: Lanes | None) -> list[tuple[str, int, str]]:
+    """The sizes that the struct of the solver needs."""
+    width = _width(step, lanes)
+    return [
+        ("NODES", step.tableau.stages, "stages of a step"),
+        ("WIDTH", width, "of an array over the stages" + ", those that fill a vector" * (width > step.tableau.stages)),
+        ("UNKNOWNS", step.unknowns, "of a stage"),
+    ]
+
+
+def constants(program: Program, step: Gauss) -> list[tuple[str, int, str]]:
+    """The other sizes."""
+    return [
+        ("PLAIN", step.plain, "unknowns that are offsets of coordinates; others are those of group elements"),
+        ("POINT", program.dimension + bool(program.time), "numbers that say where a step starts"),
+        ("MAX_SWEEPS", step.most_sweeps, "over the stages of a step"),
+    ]
+
+
+def scalar_kernels(step: Gauss, *, staged: bool) -> list[Kernel | None]:
+    """The kernels that are evaluated at one stage; with ``staged`` most are evaluated at all stages at once."""
+    at_stages = [] if staged else [step.slope, step.frame]
+    varied = [step.tangent.slope, step.tangent.change] if step.tangent else []
+    return [step.prepare, *at_stages, step.change, *varied]
+
+
+def tables(program: Program, step: Gauss, lanes: Lanes | None) -> str:
+    """The coefficients, and the function that mixes stages by them."""
+    table, width = step.tableau, _width(step, lanes)
+    terms = [f"matrix[{j}][lane] * move[{j}]" for j in range(table.stages)]
+    halves = [" + ".join(terms[k::2]) for k in range(min(2, len(terms)))]
+    values = {
+        "NAME": program.name,
+        "weights": _row(table.weights, width),
+        "matrices": [
+            (name, _columns(rows, width)) for name, rows in (("mixing", table.mixing), ("prediction", table.prediction))
+        ],
+        "terms": " + ".join(f"({half})" for half in halves) if isinstance(lanes, Stages) else "",
+    }
+    return render("c", "gauss.c", values)
+
+
+def _columns(rows: Sequence[Sequence[float]], width: int) -> list[str]:
+    return [_row([row[j] for row in rows], width) for j in range(len(rows))]
+
+
+def _row(values: Sequence[float], width: int) -> str:
+    return ", ".join(map(repr, [*values, *[0.0] * (width - len(values))]))

@@ -1,0 +1,168 @@
+import { advance } from "./algebra.mjs";
+import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
+import { stageChange, stageField } from "./model.mjs";
+// #if FRAMED
+import { nextFrame } from "./model.mjs";
+// #endif
+
+// ---- The implicit step, by Gauss collocation ----
+
+const NODES = WEIGHTS.length;
+
+/** What a next sweep may change; changes below the second that do not shrink are rounding. */
+const SOLVED = 2e-18;
+const ROUNDING = 2e-14;
+/** Changes in the size of rounding that are not less than those before: no more is to be gained. */
+const STALLS = 2;
+/** Sweeps one after the other that change more than those before: the step is too large. */
+const MOST_RISING = 3;
+/** Every so many steps it is tried whether one sweep less will do. */
+const PROBE = 16;
+
+/** An array with the unknowns of each stage. */
+export function stages() {
+  return Array.from({ length: NODES }, () => new Float64Array(UNKNOWNS));
+}
+
+/** What the last step tells of the next one. For speed only. */
+export class History {
+  /** 0 before the first step. */
+  count = 0;
+  /** Sweeps that the last step took, and the rate at which their changes shrink. */
+  sweeps = 2;
+  rate = 0.5;
+  /** The moves of the stages of the last step, as seen from its end. */
+  moves = stages();
+
+  /** Forget everything. */
+  clear() {
+    this.count = 0;
+  }
+  // #if KICKED
+
+  /** The state has been moved: forget everything. */
+  move() {
+    this.clear();
+  }
+  // #endif
+}
+
+const point = new Float64Array(POINT);
+
+/** The start of a step: the coordinates, and the time if H depends on it. */
+export function startOf({ x, t }) {
+  point.set(x);
+  if (POINT > DIM) point[DIM] = t;
+  return point;
+}
+
+/** The unknowns of all stages, each a sum over the moves of all. */
+export function mixed(matrix, moves, z) {
+  for (let i = 0; i < NODES; i++) {
+    z[i].fill(0);
+    for (let j = 0; j < NODES; j++) {
+      const factor = matrix[i][j];
+      for (let k = 0; k < UNKNOWNS; k++) z[i][k] += factor * moves[j][k];
+    }
+  }
+}
+
+/** h b_j times the vector field at all stages. */
+function slopes(solver, stage, start, z, moves) {
+  for (let i = 0; i < NODES; i++) {
+    stageField(solver.coef[stage], start, z[i], moves[i]);
+    for (let k = 0; k < UNKNOWNS; k++) moves[i][k] *= solver.h * WEIGHTS[i];
+  }
+}
+
+/** The largest change at any stage, in sizes of the unknowns: of coordinates the norm of x, of group elements 1. */
+function changeOf(start, before, after) {
+  let norm = 0;
+  for (let i = 0; i < DIM; i++) norm += start[i] * start[i];
+  if (norm === 0) {
+    norm = Number.MIN_VALUE;
+    for (const move of after) for (let k = 0; k < PLAIN; k++) norm += move[k] * move[k];
+  }
+  let largest = 0;
+  for (let i = 0; i < NODES; i++) {
+    let sum = 0;
+    for (let k = 0; k < UNKNOWNS; k++) {
+      const change = after[i][k] - before[i][k];
+      sum += (change * change) / (k < PLAIN ? norm : 1);
+    }
+    if (!(sum <= largest)) largest = sum;
+  }
+  return Math.sqrt(largest);
+}
+
+const predicted = stages();
+const mixedMoves = stages();
+
+/** The moves of all stages, by sweeps from those that the last step predicts: a status. */
+export function collocate(solver, stage, start, history, moves) {
+  let last = Infinity;
+  let rising = 0;
+  let stalls = 0;
+  if (history.count > 0) {
+    mixed(PREDICTION, history.moves, predicted);
+  } else {
+    for (const row of predicted) row.fill(0);
+    history.rate = 0.5;
+    history.sweeps = 2;
+  }
+  slopes(solver, stage, start, predicted, moves.now);
+  for (let sweep = 2; sweep <= MAX_SWEEPS; sweep++) {
+    mixed(MIXING, moves.now, mixedMoves);
+    slopes(solver, stage, start, mixedMoves, moves.next);
+    solver.evaluations++;
+    [moves.now, moves.next] = [moves.next, moves.now];
+    if (sweep < history.sweeps) continue;
+    const change = changeOf(start, moves.next, moves.now);
+    const rate = change / last;
+    if (!Number.isFinite(change)) return "NOT_FINITE";
+    if (rate < 1 && last < Infinity && change > ROUNDING) history.rate = 0.7 * history.rate + 0.3 * rate;
+    if (change * history.rate <= SOLVED || (change <= ROUNDING && change >= last && ++stalls === STALLS)) {
+      history.sweeps = sweep > 2 && history.count % PROBE === 0 ? sweep - 1 : sweep;
+      return "OK";
+    }
+    rising = rate >= 1 ? rising + 1 : 0;
+    if (rising >= MOST_RISING) return "NO_CONVERGENCE";
+    last = change;
+  }
+  return "NO_CONVERGENCE";
+}
+
+/** The sum of the moves of all stages. */
+export function endOf(moves) {
+  const end = new Float64Array(UNKNOWNS);
+  for (const move of moves) for (let k = 0; k < UNKNOWNS; k++) end[k] += move[k];
+  return end;
+}
+
+const work = { now: stages(), next: stages() };
+const change = new Float64Array(DIM);
+
+function attempt(solver, stage) {
+  const history = solver.history[stage];
+  const start = startOf(solver);
+  const status = collocate(solver, stage, start, history, work);
+  if (status !== "OK") return status;
+  const end = endOf(work.now);
+  stageChange(solver.coef[stage], start, end, change);
+  if (!advance(solver, change, solver.carry)) return "NOT_FINITE";
+  // #if FRAMED
+  work.now.forEach((move, i) => nextFrame(solver.coef[stage], end, move, history.moves[i]));
+  // #else
+  work.now.forEach((move, i) => history.moves[i].set(move));
+  // #endif
+  history.count = (history.count % PROBE) + 1;
+  return "OK";
+}
+
+/** One step: a status. What the last step predicts may mislead: then once more without. */
+export function makeStage(solver, stage) {
+  const status = attempt(solver, stage);
+  if (status === "OK" || solver.history[stage].count === 0) return status;
+  solver.history[stage].clear();
+  return attempt(solver, stage);
+}

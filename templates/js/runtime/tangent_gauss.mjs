@@ -1,0 +1,66 @@
+import { collocate, endOf, mixed, stages, startOf } from "./gauss.mjs";
+import { History } from "./gauss.mjs";
+import { DIM, MAX_SWEEPS, MIXING, UNKNOWNS, WEIGHTS } from "./model.mjs";
+import { stageChange, stageChangeJacobian, stageSlopeJacobian } from "./model.mjs";
+
+// ---- The derivative of a step ----
+
+const WIDE = DIM + UNKNOWNS;
+
+/** How the moves vary along coordinate j, by sweeps of their linear equations; null if these do not come to an end. */
+function variedAlong(solver, slopes, j) {
+  const [z, moves] = [stages(), stages()];
+  let previous = Infinity;
+  for (let sweep = 0; sweep <= MAX_SWEEPS; sweep++) {
+    let [change, size] = [0, Number.MIN_VALUE];
+    for (let i = 0; i < moves.length; i++) {
+      for (let k = 0; k < UNKNOWNS; k++) {
+        let sum = slopes[i][k * WIDE + j];
+        for (let l = 0; l < UNKNOWNS; l++) sum += slopes[i][k * WIDE + DIM + l] * z[i][l];
+        sum *= solver.h * WEIGHTS[i];
+        change = Math.max(change, Math.abs(sum - moves[i][k]));
+        size = Math.max(size, Math.abs(sum));
+        moves[i][k] = sum;
+      }
+    }
+    if (!Number.isFinite(size)) return null;
+    mixed(MIXING, moves, z);
+    if (change <= 1e-17 * size) return moves;
+    if (change <= 1e-13 * size && change > 0.4 * previous) return moves;
+    previous = change;
+  }
+  return null;
+}
+
+/** The derivative of the step that the solver has made from a state, and its change. */
+export function differentiateStage(solver, stage, at) {
+  const twin = { ...at, t: at.t, coef: solver.coef, h: solver.h, evaluations: 0 };
+  const start = startOf(twin);
+  const moves = { now: stages(), next: stages() };
+  const status = collocate(twin, stage, start, new History(), moves);
+  if (status !== "OK") return { status };
+  const z = stages();
+  mixed(MIXING, moves.now, z);
+  const slopes = z.map((node) => {
+    const found = new Float64Array(UNKNOWNS * WIDE);
+    stageSlopeJacobian(solver.coef[stage], start, node, found);
+    return found;
+  });
+  const end = endOf(moves.now);
+  const change = new Float64Array(DIM);
+  const outer = new Float64Array(DIM * WIDE);
+  stageChange(solver.coef[stage], start, end, change);
+  stageChangeJacobian(solver.coef[stage], start, end, outer);
+  const derivative = new Float64Array(DIM * DIM);
+  for (let j = 0; j < DIM; j++) {
+    const varied = variedAlong(solver, slopes, j);
+    if (!varied) return { status: "NO_CONVERGENCE" };
+    const along = endOf(varied);
+    for (let i = 0; i < DIM; i++) {
+      let sum = outer[i * WIDE + j] + (i === j ? 1 : 0);
+      for (let k = 0; k < UNKNOWNS; k++) sum += outer[i * WIDE + DIM + k] * along[k];
+      derivative[i * DIM + j] = sum;
+    }
+  }
+  return { status: "OK", change, derivative };
+}

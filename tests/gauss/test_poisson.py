@@ -1,0 +1,176 @@
+"""Gauss steps with exact structure are Poisson maps for steps of any size; those to truncation are not, and say so."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import BODY, SCALED, SPECIES, compile_text, compiled, first_run, slow_but, solver, spec_of
+
+from phigen.compiler import compile_spec, examine
+from phigen.errors import SpecError
+from phigen.spec import loads
+
+#: Each kind of algebra: so(3), se(3), two so(3), so(3) ⋉ 2R³, solvable, nilpotent, affine, direct sums, constant.
+EXACT = (
+    "rigid_body", "kowalevski_gauss", "so4_manakov", "satellite", "toda3", "engel_geodesics", "maxwell_bloch",
+    "spin_chain5", "henon_heiles",
+)  # fmt: skip
+
+MIXED = """coordinates: [x, y, z, q, p]
+poisson: {brackets: {x: {y: z, z: -y}, y: {z: x}, q: {p: 1}}}
+hamiltonian: x**2/2 + y**2/3 + z**2/5 + p**2/2 + q**2/2 + cos(q)*x + sin(q)*y*z/4
+casimirs: {C: x**2 + y**2 + z**2}
+"""
+SHIFTED = """coordinates: [x, y, z]
+poisson: {brackets: {x: {y: z + 2, z: -y}, y: {z: x - 1}}}
+hamiltonian: exp(x/3) + y**2*z/5 + sin(z)
+casimirs: {C: (x - 1)**2 + y**2 + (z + 2)**2}
+"""
+OSCILLATOR = """coordinates: [n, q, p]
+poisson: {brackets: {n: {q: p, p: -q}, q: {p: 1}}}
+hamiltonian: n**2/2 + q**3/5 + n*p/3
+casimirs: {C: n + (q**2 + p**2)/2}
+"""
+STARTS = {
+    "mixed": (MIXED, [0.4, -0.8, 0.5, 0.3, 0.7]),
+    "shifted": (SHIFTED, [0.4, -0.8, 0.5]),
+    "oscillator": (OSCILLATOR, [0.4, -0.8, 0.5]),
+    "scaled": (SCALED, [0.3, -0.2, 0.4]),
+}
+
+
+def of(spec, order, target="numpy", **more):
+    """A Gauss solver with tangents."""
+    given = replace(spec, reconstruct="", composition="auto", **more)
+    return solver(compile_spec(given.overridden(order=order, scheme="gauss", tangent=True)), target)
+
+
+def defect(method, x, h, poisson):
+    """|DΦ π DΦᵀ − π∘Φ| relative to |π∘Φ|, where tangents are exact to round-off."""
+    following, tangent = method.step_tangent(x, h)
+    after = poisson(following)
+    return np.abs(tangent @ poisson(x) @ tangent.T - after).max() / np.abs(after).max()
+
+
+def poisson_of(spec):
+    """π as a function of NumPy, by the entries of the spec's system."""
+    import sympy
+
+    from phigen.geometry.system import system_from_spec
+
+    given = system_from_spec(spec).to_sympy()
+    matrix = given.poisson.subs(given.parameters)
+    f = sympy.lambdify([list(given.coordinates)], matrix, "numpy")
+    return lambda x: np.array(f(x), dtype=float)
+
+
+@pytest.mark.parametrize("name", slow_but(("rigid_body", "so4_manakov", "toda3", "maxwell_bloch"), EXACT))
+def test_step_of_any_size_is_a_poisson_map(name):
+    spec = spec_of(name)
+    run = next(iter(spec.runs.values()))
+    x = np.array([float(v) for v in run.initial]) + 0.1 * np.sin(np.arange(1, spec.dimension + 1))
+    h = float(run.step) * (1 if name == "kowalevski_gauss" else 8)
+    for order in (2, 8):
+        assert defect(of(spec, order), x, h, poisson_of(spec)) <= 2e-13
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_written_systems_step_by_poisson_maps(name):
+    text, start = STARTS[name]
+    spec = loads(f"phigen: 1\nname: t\n{text}scheme: gauss\n")
+    method = of(spec, 2)
+    assert defect(method, np.array(start), 0.5, poisson_of(spec)) <= 2e-14
+    moved = method.integrate(start, 0.25, 80)
+    for values in moved.casimirs.values():
+        assert np.ptp(values) <= 2e-13
+    # energies of a symplectic method of order 2 oscillate: they do not stay, and do not leave
+    assert 1e-6 < np.ptp(moved.energy) < 0.3 * (1 + np.abs(moved.energy).max())
+
+
+def test_direct_step_is_no_poisson_map_and_says_so():
+    """On the rigid body at the same step the defect is far above rounding."""
+    spec = replace(spec_of("rigid_body"), structure="to truncation")
+    compilation = compile_spec(spec.overridden(order=4, scheme="gauss", tangent=True))
+    x = np.array([0.4, -0.8, 0.5])
+    assert defect(solver(compilation, "numpy"), x, 0.8, poisson_of(spec)) > 1e-7
+    assert not compilation.poisson
+    assert "no Poisson map" in compilation.label or "truncation" in compilation.label
+    (text,) = [t for n, t in _emitted(compilation).items() if n.endswith(".c")]
+    assert "A Poisson" not in text
+    assert "no Poisson map" in text
+
+
+def _emitted(compilation):
+    from phigen.compiler import emit
+
+    return emit(compilation.program, "c", "phigen build")
+
+
+def test_direct_step_keeps_quadratic_casimirs():
+    spec = replace(spec_of("rigid_body"), structure="to truncation")
+    run = solver(compile_spec(spec.overridden(order=4, scheme="gauss")), "numpy").integrate([0.4, -0.8, 0.5], 0.5, 100)
+    assert np.ptp(run.casimirs["C"]) <= 5e-15
+
+
+@pytest.mark.parametrize("target", ["numpy", "c"])
+def test_casimirs_do_not_drift(target):
+    """Over many steps that are not small Casimirs wander by rounding only."""
+    steps = 300 if target == "numpy" else 20_000
+    method = solver(compiled("so4_manakov", 8, "gauss"), target)
+    x0 = [float(v) for v in first_run(compiled("so4_manakov", 8, "gauss")).initial]
+    run = method.integrate(x0, 4.0, steps, stride=10)
+    for values in run.casimirs.values():
+        assert np.ptp(values) <= 2e-15 * np.sqrt(steps) * np.abs(values).max()
+
+
+@pytest.mark.parametrize("order", [2, 4, 6, 8])
+def test_order_is_that_of_the_method(order):
+    """Errors on a nonlinear problem shrink by the power 2s, measured where they are far from rounding."""
+    text, start = STARTS["shifted"]
+    compilation = compile_text(f"{text}scheme: gauss\n", order)
+    method = solver(compilation, "c")
+    exact = solver(compile_text(f"{text}scheme: gauss\n", 16), "c").integrate(start, 0.05, 48).x[-1]
+    errors = [np.abs(method.integrate(start, 2.4 / n, n).x[-1] - exact).max() for n in (256 // order, 512 // order)]
+    assert errors[1] > 1e-15
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.25)
+
+
+def test_check_proves_what_a_step_is():
+    statements = examine(spec_of("kowalevski_gauss")).groups["Gauss collocation, collective"]
+    assert {s.verdict for s in statements} == {"proved", "checked numerically"}
+    assert any("quadratic momentum map" in s.name and s.verdict == "proved" for s in statements)
+
+
+REFUSED = {
+    "structure": (f"{SPECIES}scheme: gauss\n", "no exact Poisson map is known", "to truncation"),
+    "noise": (f"{BODY}noise: {{w: {{hamiltonian: x1}}}}\nscheme: gauss\n", "not with noise", "series"),
+    "monitor": (f"{BODY}monitor: 1 + x1**2\nscheme: gauss\n", "not with a monitor", "series"),
+    "adjoint": (f"{BODY}adjoint: true\nscheme: gauss\n", "transpose is not offered", "series"),
+    "modified": (f"{BODY}modified_hamiltonian: 1\nscheme: gauss\n", "belongs to scheme: series", "remove"),
+    "attitude": (f"{BODY}reconstruct: quaternion\nscheme: gauss\n", "attitudes are not offered", "series"),
+    "float": (f"{BODY}real: float\nscheme: gauss\n", "single precision", "series"),
+    "composition": (f"{BODY}composition: suzuki\nscheme: gauss\n", "not composed", "order"),
+    "terms": (f"{BODY}terms: 3\nscheme: gauss\n", "belongs to scheme: series", "remove"),
+    "birealisation": (f"{BODY}birealisation: cayley\nscheme: gauss\n", "belongs to scheme: series", "remove"),
+    "tolerance": (f"{BODY}solver: {{tolerance: 1e-9}}\nscheme: gauss\n", "round-off", "remove"),
+    "force": (f"{BODY}forces: {{vector: {{x1: -x1}}}}\nscheme: gauss\n", "vector force on x1", "to truncation"),
+    "structure of another scheme": (f"{BODY}structure: exact\nscheme: series\n", "belongs to scheme: gauss", "remove"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_not_offered_is_refused_with_its_place_and_a_hint(case):
+    text, message, hint = REFUSED[case]
+    with pytest.raises(SpecError) as refused:
+        compile_spec(loads(f"phigen: 1\nname: t\n{text}"))
+    (diagnostic,) = refused.value.diagnostics
+    assert message in diagnostic.message
+    assert hint in diagnostic.hint
+    assert diagnostic.location is not None
+
+
+def test_lattices_are_refused():
+    text = "coordinates: [q, p]\nlattice: {axes: [i]}\npoisson: {canonical: {q: [q], p: [p]}}\n"
+    text += "hamiltonian: p**2/2 + (q[i+1] - q)**2/2\nscheme: gauss\n"
+    with pytest.raises(SpecError, match="not for lattices"):
+        compile_spec(loads(f"phigen: 1\nname: t\n{text}"))

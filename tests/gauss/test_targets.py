@@ -1,0 +1,142 @@
+"""Gauss steps in all targets and profiles: equal to round-off, tangents and failures included."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from support import SCALED, compile_text, compiled, first_run, javascript, small, solver, spec_of
+
+from phigen.compiler import compile_spec
+from phigen.errors import StepError
+
+FORCED = """coordinates: [q, p]
+time: t
+parameters: {g: 0.3}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 - cos(q) + g*q*sin(2*t)
+forces: {vector: {p: -p/5}}
+scheme: gauss
+"""
+STEPS = 40
+
+
+def methods(compilation):
+    """The solvers of a compilation, by target."""
+    return {
+        "numpy": solver(compilation, "numpy"),
+        "c": solver(compilation, "c"),
+        "small": solver(small(compilation), "c"),
+    }
+
+
+def ends(compilation, x0, h, **more):
+    """Where the solvers end after some steps, JavaScript included."""
+    found = {name: m.integrate(x0, h, STEPS, **more).x[-1] for name, m in methods(compilation).items()}
+    found["js"] = np.array(
+        javascript(compilation, f"x0: {list(map(float, x0))}", f"s.integrate({h}, {STEPS});", "[...s.x]")
+    )
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "order"), [("rigid_body", 6), ("so4_manakov", 16), ("toda3", 2), ("henon_heiles", 10)]
+)
+def test_targets_are_equal_to_rounding(name, order):
+    compilation = compiled(name, order, "gauss")
+    run = first_run(compilation)
+    x0 = [float(v) for v in run.initial]
+    found = ends(compilation, x0, 4 * float(run.step))
+    for other in ("c", "small", "js"):
+        assert found[other] == pytest.approx(found["numpy"], rel=0, abs=1e-13 * np.abs(found["numpy"]).max())
+
+
+def test_time_and_forces_enter_at_the_stages():
+    """A pendulum with friction, driven: all targets are equal, and right to the order of the method."""
+    compilation = compile_text(FORCED, 8)
+    found = ends(compilation, [0.3, 0.4], 0.2)
+    exact = solver(compile_text(FORCED, 16), "c").integrate([0.3, 0.4], 0.1, 2 * STEPS).x[-1]
+    for state in found.values():
+        assert state == pytest.approx(exact, abs=2e-9)
+        assert state == pytest.approx(found["numpy"], abs=1e-13)
+
+
+@pytest.mark.parametrize("name", ["so4_manakov", "henon_heiles"])
+def test_tangents_are_equal_and_those_of_the_step(name):
+    compilation = compile_spec(spec_of(name).overridden(order=8, scheme="gauss", tangent=True))
+    run = first_run(compilation)
+    x0, h = np.array([float(v) for v in run.initial]), 4 * float(run.step)
+    tangents = [m.step_tangent(x0, h)[1] for m in methods(compilation).values()]
+    width, method = 1e-5, solver(compilation, "c")
+    columns = [(method.step(x0 + width * e, h) - method.step(x0 - width * e, h)) / (2 * width) for e in np.eye(len(x0))]
+    shown = javascript(compilation, f"x0: {x0.tolist()}", "", f"[...s.stepTangent({h})]")
+    assert tangents[0] == pytest.approx(np.array(columns).T, abs=1e-8)
+    for other in (*tangents[1:], np.reshape(shown, tangents[0].shape)):
+        assert other == pytest.approx(tangents[0], abs=1e-12)
+
+
+@pytest.mark.parametrize("target", ["numpy", "c", "small"])
+def test_a_step_that_is_too_large_fails_soon(target):
+    """Sweeps that do not contract end the solve long before their number is used up, and leave the state."""
+    method = methods(compiled("henon_heiles", 8, "gauss"))[target]
+    with pytest.raises(StepError) as failed:
+        method.integrate([0.1, 0.3, 0.2, 0.4], 40.0, 5)
+    assert failed.value.status in ("NO_CONVERGENCE", "NOT_FINITE")
+    assert failed.value.step == 0
+
+
+@pytest.mark.parametrize("target", ["c", "small"])
+def test_kicks_and_new_steps_forget_what_was_predicted(target):
+    """After set_state, kick and another h a solver goes on as a fresh one does."""
+    compilation = compiled("so4_manakov", 8, "gauss")
+    method = methods(compilation)[target]
+    x0 = np.array([float(v) for v in first_run(compilation).initial])
+    session = method.session(x0)
+    for _ in range(5):
+        session.step(2.0)
+    session.kick(0.2 * x0[::-1])
+    here = np.array(session.x)
+    for _ in range(3):
+        session.step(1.0)
+    assert session.x == pytest.approx(method.integrate(here, 1.0, 3).x[-1], abs=1e-14)
+
+
+def test_members_are_integrated_each_as_by_itself():
+    compilation = compiled("so4_manakov", 8, "gauss")
+    x0 = np.array([float(v) for v in first_run(compilation).initial])
+    starts = x0 + 0.1 * np.random.default_rng(1).normal(size=(5, 6))
+    for method in methods(compilation).values():
+        together = method.ensemble(starts, 2.0, 5)
+        for start, end in zip(starts, together, strict=True):
+            assert end == pytest.approx(method.integrate(start, 2.0, 5).x[-1], abs=1e-14)
+
+
+def test_steps_back_undo_steps():
+    compilation = compiled("so4_manakov", 8, "gauss")
+    x0 = np.array([float(v) for v in first_run(compilation).initial])
+    for method in methods(compilation).values():
+        there = method.integrate(x0, 4.0, 4).x[-1]
+        assert method.integrate(there, -4.0, 4).x[-1] == pytest.approx(x0, abs=1e-14)
+
+
+def test_gauge_shifts_the_hamiltonian_that_is_discretised():
+    """H and H − λC have the same flow: with the shift the same states to the order, from other stages."""
+    spec = spec_of("rigid_body")
+    from phigen.symbolic.expression import number
+
+    shifted = replace(spec, gauge={"C": number(1) / number(3)})
+    methods_ = [solver(compile_spec(given.overridden(order=8, scheme="gauss")), "c") for given in (spec, shifted)]
+    plain, other = (method.integrate([0.4, -0.8, 0.5], 0.4, 20).x[-1] for method in methods_)
+    assert plain == pytest.approx(other, abs=1e-7)
+    assert np.abs(plain - other).max() > 1e-15
+
+
+def test_structure_constants_may_be_parameters():
+    """Momentum maps whose coefficients depend on parameters: the same in all targets, with parameters other than the
+    defaults."""
+    compilation = compile_text(f"{SCALED}scheme: gauss\n", 6)
+    x0, more = [0.3, -0.2, 0.4], {"r": 1.5, "s": 2.5}
+    states = [m.integrate(x0, 0.3, 20, **more).x[-1] for m in methods(compilation).values()]
+    options = f"x0: {x0}, params: {{ r: 1.5, s: 2.5 }}"
+    states.append(javascript(compilation, options, "s.integrate(0.3, 20);", "[...s.x]"))
+    for state in states[1:]:
+        assert state == pytest.approx(states[0], abs=1e-14)
