@@ -166,8 +166,11 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
         yield float(x_bar @ v), lambda e, v=v: (run.x + e * v, run.parameters)  # type: ignore[misc]
     for name, bar in parameters_bar.items():
         value = np.asarray(run.parameters[name], dtype=np.float64)
-        unit = float(np.max(np.abs(value), initial=0.0)) or 1.0
-        v = unit * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
+        largest = float(np.max(np.abs(value), initial=0.0)) or 1.0
+        units = np.where(
+            value != 0, np.abs(value), largest
+        )  # entries that must be positive may differ by powers of ten
+        v = units * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
         yield (
             float(np.sum(bar * v)),
             lambda e, name=name, value=value, v=v: (run.x, {**run.parameters, name: _plain(value + e * v)}),  # type: ignore[misc]

@@ -120,6 +120,14 @@ def test_gradients_of_lattices_are_checked_on_few_sites_and_on_those_of_the_run(
     }
 
 
+def test_positive_parameters_of_sites_may_differ_by_powers_of_ten():
+    """Masses of a sun and of planets: differences along them must not leave any negative."""
+    masses = "{value: 1, at: sites, positive: true}"
+    text = SPINS.replace("{value: 0.8, at: sites}", masses).replace("B*z**2/2", "log(B)*z/8")
+    text = text.replace("z: cos(2*i)/2}", "z: cos(2*i)/2}, parameters: {B: 10**(-i/2)}")
+    assert set(checked(text).values()) == {True}
+
+
 def test_what_the_spec_does_not_ask_for_is_not_measured():
     compilation = compiled(SWING)
     assert checks(compilation, solver_of(compilation, "numpy"), compilation.spec.runs["swing"]) == []
