@@ -199,7 +199,7 @@ static void phi_put_kinds(const phi_solver *s)
                 colour += (int)(place[a] % PHI_COLOUR_COUNT) * phi_colours[a];
                 window |= (place[a] >= s->seams[a]) << a;
             }
-            row[i] = window * PHI_COLOUR_COUNT + colour % PHI_COLOUR_COUNT;
+            row[i] = (double)(window * PHI_COLOUR_COUNT + colour % PHI_COLOUR_COUNT);
         }
 #if PHI_HALO
         phi_ends(row, s->length, 0, s->length);
