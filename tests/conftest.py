@@ -13,12 +13,16 @@ from phigen.runtime import toolchain
 
 #: Rooms whose files share what takes long to make.
 WHOLE = ("tests/report/",)
+#: Files whose tests share nothing.
+APART = ("tests/random/test_differential.py",)
 
 
 def pytest_addoption(parser):
     parser.addoption(
         "--all", action="store_true", help="the long tests too, and the corpus compiled with the flags users get"
     )
+    parser.addoption("--random", type=int, metavar="N", help="N random systems of each kind, in tests/random")
+    parser.addoption("--seed", type=int, default=0, metavar="S", help="the seed of the first of them")
 
 
 def pytest_configure(config):
@@ -68,6 +72,8 @@ def pytest_xdist_make_scheduler(config, log):
 
     class BySystem(LoadScopeScheduling):
         def _split_scope(self, nodeid):
+            if nodeid.startswith(APART):
+                return nodeid
             systems = {part for part in re.split(r"[-\]\[]", nodeid) if part in NAMES}
             return (
                 min(systems)

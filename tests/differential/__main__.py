@@ -1,0 +1,45 @@
+"""`python -m differential ordinary 0:100`: check the systems of many seeds, and print what fails."""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import os
+import sys
+import tempfile
+import time
+
+from differential.suites import SUITES
+from tools import WARNINGS
+
+from phigen.runtime import toolchain
+
+
+def main() -> int:
+    """Check a range of seeds; 1 if anything fails."""
+    parser = argparse.ArgumentParser(prog="differential")
+    parser.add_argument("kind", choices=SUITES)
+    parser.add_argument("seeds", help="FIRST:END, or one seed")
+    parser.add_argument("--no-shrink", action="store_true")
+    given = parser.parse_args()
+    first, _, end = given.seeds.partition(":")
+    seeds = range(int(first), int(end or int(first) + 1))
+    toolchain.BASE_FLAGS = (*("-O0" if f.startswith("-O") else f for f in toolchain.BASE_FLAGS), *WARNINGS)
+    made, refused, failed, begun = collections.Counter[str](), collections.Counter[str](), 0, time.monotonic()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["PHIGEN_CACHE_DIR"] = folder
+        for seed in seeds:
+            outcome = SUITES[given.kind].outcome(seed, shrink=not given.no_shrink)
+            made.update(outcome.made)
+            refused.update([outcome.refused] if outcome.refused else [])
+            failed += bool(outcome.failures)
+            for failure in outcome.failures:
+                print(f"--- {failure}\n", flush=True)
+    print(f"{len(seeds)} systems in {time.monotonic() - begun:.0f} s: {failed} fail, {sum(refused.values())} refused")
+    for name, count in [*made.most_common(), *refused.most_common(12)]:
+        print(f"{count:6} {name}")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

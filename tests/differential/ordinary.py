@@ -1,0 +1,380 @@
+"""Random ordinary systems: the text of their spec, and their equations of motion without phigen."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy
+from differential.brackets import Structure, draw_structure
+from differential.formulas import TIME, Expr, Symbol, bounded, gradient, linear, monomial, numeric, small, text
+from differential.reference import Floats
+
+#: Names of parameters, some of them words of C or names that code may use itself.
+PARAMETERS = ("a", "mu", "lambda", "k", "c")
+
+
+@dataclass(frozen=True)
+class Ordinary:
+    """A drawn system.
+
+    H is the sum of ``terms``. ``parameters`` have a default, and say whether they are positive. ``covector``,
+    ``vector``, ``damping``, ``monitor`` and ``noise`` (Hamiltonian and amplitude) act as docs/spec.md has it;
+    ``monitor`` may be "log", with ``attraction`` the negative part of H. ``options`` are further keys of the spec,
+    ``asked`` what `phigen.compile` is asked for beside it.
+    """
+
+    seed: int
+    structure: Structure
+    terms: tuple[Expr, ...]
+    start: tuple[float, ...]
+    parameters: Mapping[str, tuple[sympy.Rational, bool]] = field(default_factory=dict)
+    covector: Mapping[str, Expr] = field(default_factory=dict)
+    vector: Mapping[str, Expr] = field(default_factory=dict)
+    damping: Expr | None = None
+    monitor: Expr | str | None = None
+    attraction: Expr | None = None
+    noise: Mapping[str, tuple[Expr, Expr]] = field(default_factory=dict)
+    timed: bool = False
+    options: Mapping[str, Any] = field(default_factory=dict)
+    asked: Mapping[str, Any] = field(default_factory=dict)
+
+    kind = "ordinary"
+
+    # --- the spec
+
+    @property
+    def text(self) -> str:
+        """The spec; every value is JSON, which is YAML too."""
+        return "".join(f"{key}: {json.dumps(value)}\n" for key, value in self.entries())
+
+    def entries(self) -> Iterator[tuple[str, Any]]:
+        """Yield the keys of the spec."""
+        yield from {"phigen": 1, "name": f"o{self.seed}"}.items()
+        yield "coordinates", [str(v) for v in self.structure.coordinates]
+        if self.parameters:
+            given = {n: {"value": text(v), "positive": p} if p else text(v) for n, (v, p) in self.parameters.items()}
+            yield "parameters", given
+        if self.timed:
+            yield "time", str(TIME)
+        yield "poisson", dict(self.structure.form)
+        yield "hamiltonian", " + ".join(f"({text(term)})" for term in self.terms) or "0"
+        if self.structure.casimirs:
+            yield "casimirs", {f"C{k}": text(c) for k, c in enumerate(self.structure.casimirs)}
+        forces = {"covector": self.covector, "vector": self.vector}
+        if any(forces.values()):
+            yield "forces", {kind: {n: text(f) for n, f in by.items()} for kind, by in forces.items() if by}
+        if self.damping is not None:
+            yield "damping", text(self.damping)
+        if self.monitor is not None:
+            yield "monitor", self.monitor if isinstance(self.monitor, str) else text(self.monitor)
+        if self.noise:
+            yield "noise", {n: {"hamiltonian": text(g), "amplitude": text(s)} for n, (g, s) in self.noise.items()}
+        yield from self.options.items()
+
+    # --- the equations of motion
+
+    @property
+    def forced(self) -> bool:
+        """Whether something acts beside H."""
+        return bool(self.covector or self.vector or self.damping is not None)
+
+    @property
+    def hamiltonian(self) -> Expr:
+        """H."""
+        return sympy.Add(*self.terms)
+
+    @property
+    def order(self) -> int:
+        """The order that is asked for."""
+        return int(self.options.get("order", 2 if self.noise else 4))
+
+    @property
+    def arguments(self) -> list[Symbol]:
+        """The symbols of all functions: time, coordinates, parameters."""
+        return [TIME, *self.structure.coordinates, *(Symbol(name) for name in self.parameters)]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """The defaults of the parameters."""
+        return {name: float(value) for name, (value, _) in self.parameters.items()}
+
+    def function(self, expressions: list[Expr]) -> Callable[[float, Floats], Floats]:
+        """Return expressions as a function of time and state (DIM,), with the default parameters."""
+        compiled, values = numeric(expressions, self.arguments), list(self.values.values())
+
+        def at(t: float, x: Floats) -> Floats:
+            return np.array([float(v) for v in compiled(t, *x, *values)])
+
+        return at
+
+    @cached_property
+    def slope(self) -> list[Expr]:
+        """∇H."""
+        return gradient(self.hamiltonian, self.structure.coordinates)
+
+    @cached_property
+    def pace(self) -> Expr:
+        """dt/dτ."""
+        if self.attraction is not None:
+            return -1 / self.attraction
+        return sympy.Integer(1) if self.monitor is None else self.monitor
+
+    @cached_property
+    def field(self) -> Callable[[float, Floats], Floats]:
+        """The right-hand side without noise, for the state and, behind it, the time: d/dτ of both."""
+        whole = self.function([*(self.pace * v for v in self.velocity), self.pace])
+        return lambda s, y: whole(y[-1], y[:-1])
+
+    @cached_property
+    def velocity(self) -> list[Expr]:
+        """π∇H with what forces and damping add."""
+        x, pi, slope = self.structure.coordinates, self.structure.pi, sympy.Matrix(self.slope)
+        pushed = slope + sympy.Matrix([self.covector.get(str(v), 0) for v in x])
+        if self.damping is not None:
+            pushed += self.damping * pi * slope
+        return list(pi * pushed + sympy.Matrix([self.vector.get(str(v), 0) for v in x]))
+
+    @cached_property
+    def sources(self) -> list[Callable[[float, Floats], Floats]]:
+        """σπ∇g of each source of noise."""
+        x, pi = self.structure.coordinates, self.structure.pi
+        return [self.function(list(s * pi * sympy.Matrix(gradient(g, x)))) for g, s in self.noise.values()]
+
+    # --- shrinking
+
+    def simpler(self) -> Iterator[Ordinary]:
+        """Yield systems with a part less."""
+        for k in range(len(self.terms)):
+            if len(self.terms) > 1:
+                yield replace(self, terms=self.terms[:k] + self.terms[k + 1 :])
+        for name in ("covector", "vector", "noise", "options", "asked"):
+            given = getattr(self, name)
+            for key in given:
+                yield replace(self, **{name: {k: v for k, v in given.items() if k != key}})
+        if self.damping is not None:
+            yield replace(self, damping=None)
+        if self.monitor is not None:
+            yield replace(self, monitor=None, attraction=None)
+        if self.structure.casimirs:
+            yield replace(self, structure=replace(self.structure, casimirs=()))
+        used = set().union(*(e.free_symbols for e in self._expressions()))
+        for name, (value, _) in self.parameters.items():
+            rest = {k: v for k, v in self.parameters.items() if k != name}
+            if Symbol(name) not in used:
+                yield replace(self, parameters=rest)
+            else:
+                yield self._with_value(name, value, rest)
+        if self.timed and TIME not in used:
+            yield replace(self, timed=False)
+
+    def _expressions(self) -> list[Expr]:
+        more = [self.damping, None if isinstance(self.monitor, str) else self.monitor]
+        noise = [e for pair in self.noise.values() for e in pair]
+        return [
+            *self.terms,
+            *self.covector.values(),
+            *self.vector.values(),
+            *noise,
+            *(e for e in more if e is not None),
+        ]
+
+    def _with_value(self, name: str, value: sympy.Rational, rest: Mapping[str, Any]) -> Ordinary:
+        """The system with a number in place of a parameter."""
+        put = {Symbol(name): value}
+        new: dict[str, Any] = {
+            "terms": tuple(e.xreplace(put) for e in self.terms),
+            "covector": {k: e.xreplace(put) for k, e in self.covector.items()},
+            "vector": {k: e.xreplace(put) for k, e in self.vector.items()},
+            "noise": {k: (g.xreplace(put), s.xreplace(put)) for k, (g, s) in self.noise.items()},
+        }
+        new["damping"] = None if self.damping is None else self.damping.xreplace(put)
+        new["monitor"] = self.monitor.xreplace(put) if isinstance(self.monitor, sympy.Basic) else self.monitor
+        new["attraction"] = None if self.attraction is None else self.attraction.xreplace(put)
+        return replace(self, parameters=rest, **new)
+
+
+# --- drawing
+
+
+def draw_ordinary(seed: int, attempt: int = 0) -> Ordinary:
+    """Draw a system of a seed, another in each attempt; equal on every machine."""
+    source = random.Random(f"ordinary {seed}" + f" {attempt}" * (attempt > 0))
+    structure = draw_structure(source)
+    scheme = source.choices(["series", "splitting"], [65, 35])[0]
+    names = source.sample(PARAMETERS, source.choice([0, 1, 1, 2, 2]))
+    parameters = {name: (abs(small(source)), source.random() < 0.3) for name in names}
+    weights = [Symbol(name) for name in parameters]
+
+    def weight() -> Expr:
+        """A coefficient: a number, or a parameter times a number."""
+        return small(source) * (source.choice(weights) if weights and source.random() < 0.4 else 1)
+
+    make = _splittable if scheme == "splitting" else _any_terms
+    terms = _coupled(source, structure, weight) if structure.kind == "chain" else make(source, structure, weight)
+    signs = [1] if structure.positive else [1, -1]
+    start = tuple(round(source.uniform(0.4, 1.1) * source.choice(signs), 3) for _ in structure.coordinates)
+    drawn = Ordinary(seed, structure, tuple(terms), start, parameters)
+    drawn = _acted_upon(source, drawn, scheme, weight)
+    drawn = replace(drawn, options=_options(source, drawn, scheme))
+    return _extras(source, drawn)
+
+
+def _any_terms(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
+    """Terms of H of any form, squares among them."""
+    x = structure.coordinates
+    terms = [sympy.Rational(source.randint(1, 4), 4) * v**2 for v in x if source.random() < 0.8]
+    for _ in range(source.randint(1, 3)):
+        if source.random() < 0.5:
+            terms.append(weight() * monomial(source, x, 3) / 4)
+        else:
+            terms.append(weight() * bounded(source, linear(source, x)) / 3)
+    return terms
+
+
+def _splittable(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
+    """Terms of H that have elementary flows, by the kind of the structure."""
+    x = structure.coordinates
+    if structure.pairs:
+        q, p = zip(*structure.pairs, strict=True)
+        kinetic = [sympy.Rational(source.randint(1, 4), 4) * v**2 for v in p]
+        wells = [weight() * bounded(source, linear(source, q)) / 3 for _ in range(source.randint(1, 2))]
+        return [*kinetic, *wells, weight() * monomial(source, q, 4) / 4]
+    if structure.positive:
+        return [weight() * v for v in x]
+    return [weight() * v ** source.choice([1, 2, 2]) / 3 for v in x if source.random() < 0.9] or [x[0]]
+
+
+def _coupled(source: random.Random, structure: Structure, weight: Callable[[], Expr]) -> list[Expr]:
+    """Terms of H of a ring of oscillators."""
+    q, p = zip(*structure.pairs, strict=True)
+    power = source.choice([2, 4])
+    kinetic, well = [v**2 / 2 for v in p], source.choice([0, 1])
+    springs = [(a - b) ** 2 / 2 + (a - b) ** power / 3 for a, b in zip(q, (*q[1:], q[0]), strict=True)]
+    return [*kinetic, *(well * v**4 / 4 for v in q if well), *springs, weight() * q[0] * q[1]]
+
+
+def _acted_upon(source: random.Random, drawn: Ordinary, scheme: str, weight: Callable[[], Expr]) -> Ordinary:
+    """The system with a time, forces, damping, a monitor or noise, or with none of these."""
+    if drawn.structure.kind == "chain":
+        return drawn
+    what = source.choices(["", "time", "forces", "monitor", "noise", "forces, time"], [45, 14, 14, 12, 10, 5])[0]
+    new: dict[str, Any] = {}
+    if "time" in what:
+        wave = source.choice([sympy.cos, sympy.sin])(small(source) * TIME)
+        k = source.randrange(len(drawn.terms))
+        new["terms"] = (*drawn.terms[:k], drawn.terms[k] * (1 + wave / 3), *drawn.terms[k + 1 :])
+        new["timed"] = True
+    if "forces" in what:
+        new |= _forces(source, drawn, weight, timed="time" in what)
+    if what == "noise":
+        x = drawn.structure.coordinates
+        chosen = source.sample(list(x), min(len(x), source.randint(1, 2)))
+        sources = [(v if source.random() < 0.8 else v**2 / 2, abs(small(source)) / 4) for v in chosen]
+        new["noise"] = {f"w{k}": pair for k, pair in enumerate(sources)}
+        new |= {"damping": abs(small(source)) / 9} if source.random() < 0.3 else {}
+    if what == "monitor":
+        new |= _monitored(source, drawn, scheme)
+    return replace(drawn, **new)
+
+
+def _forces(source: random.Random, drawn: Ordinary, weight: Callable[[], Expr], *, timed: bool) -> dict[str, Any]:
+    """Forces on one coordinate, or damping."""
+    x = drawn.structure.coordinates
+    acting = source.choice(["covector", "vector", "damping", "vector", "covector, vector"])
+    new: dict[str, Any] = {}
+    for way in ("covector", "vector"):
+        if way in acting:
+            v = source.choice(list(x))
+            strength = weight() * (source.choice([v, linear(source, x)]) if source.random() < 0.8 else 1) / 5
+            new[way] = {str(v): strength * (sympy.cos(TIME) if timed and source.random() < 0.5 else 1)}
+    if acting == "damping":
+        positive = [Symbol(n) / 9 for n, (_, p) in drawn.parameters.items() if p]
+        new["damping"] = source.choice([abs(small(source)) / 9, *positive])
+    return new
+
+
+def _monitored(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str, Any]:
+    """A monitor; of a splitting in two the logarithmic one, with a negative potential."""
+    x, pairs = drawn.structure.coordinates, drawn.structure.pairs
+    if scheme == "series":
+        v, w = source.choice(list(x)), source.choice(list(x))
+        paces = [1 + v**2, 1 / (1 + v**2 + w**2), sympy.sqrt(1 + v**2), sympy.exp(-(v**2)) + 1]
+        return {"monitor": source.choice(paces)}
+    if not pairs:
+        return {}
+    q, p = zip(*pairs, strict=True)
+    well = -source.choice([1 / sympy.sqrt(1 + sum(v**2 for v in q)), sympy.exp(-sum(v**2 for v in q) / 4) + 1])
+    return {"monitor": "log", "attraction": well, "terms": (sum(v**2 for v in p) / 2, well)}
+
+
+#: Orders with their weights, for the series and for splittings.
+_ORDERS = {"series": ([1, 2, 3, 4, 6, 8], [4, 44, 4, 30, 12, 6]), "splitting": ([2, 4, 6, 8], [35, 35, 20, 10])}
+
+_COMPOSITIONS = {4: ["suzuki", "triple-jump"], 6: ["kahan-li", "yoshida"], 8: ["kahan-li", "yoshida"]}
+_PARTS = ("by-hand", "ensemble", "kicks", "lanes", "members", "recurrences")
+
+
+def _options(source: random.Random, drawn: Ordinary, scheme: str) -> dict[str, Any]:
+    """Further keys of the spec."""
+    chain, costly = drawn.structure.kind == "chain", drawn.structure.kind in ("nambu3", "nambu4", "pull-back")
+    heavy = costly or drawn.forced or drawn.monitor is not None or len(drawn.structure.coordinates) > 4
+    options: dict[str, Any] = {}
+    if scheme == "splitting" or source.random() < 0.3:
+        options["scheme"] = scheme
+    orders, weights = _ORDERS[scheme]
+    order = source.choices(orders, weights)[0]
+    if scheme == "series" and heavy:
+        order = 2 if chain else source.choice([2, 2, 4])
+    options["order"] = 2 if drawn.noise and scheme == "series" else order
+    options["profile"] = source.choice(["fast", "small"])
+    if source.random() < 0.3:
+        options["solver"] = source.choice([{"lanes": False}, {"lanes": False}, {"method": "newton"}])
+    if scheme == "series":
+        options |= _realised(source, drawn)
+    if options["order"] in _COMPOSITIONS and source.random() < 0.3 and not drawn.noise:
+        options["composition"] = source.choice(_COMPOSITIONS[options["order"]])
+    if source.random() < 0.04:
+        options |= {"real": "float", "profile": "small"}
+    if source.random() < 0.12:
+        options["without"] = source.sample(_PARTS, source.randint(1, 2))
+    if drawn.structure.body and source.random() < 0.4:
+        options["reconstruct"] = source.choice(["quaternion", "matrix"])
+    return options
+
+
+def _realised(source: random.Random, drawn: Ordinary) -> dict[str, Any]:
+    """The gauge and the bi-realisation of a series."""
+    chosen: dict[str, Any] = {}
+    if source.random() < 0.5:
+        chosen["gauge"] = "none"
+    elif drawn.structure.casimirs and source.random() < 0.3 and not drawn.forced:
+        chosen["gauge"] = {"C0": "1/3"}
+    linear_one = drawn.structure.kind.startswith("algebra")
+    if linear_one and source.random() < 0.2:
+        chosen["birealisation"] = source.choice(["exponential", "cayley", "karasev"])
+    elif drawn.structure.pairs and source.random() < 0.12 and drawn.structure.kind == "canonical":
+        chosen["birealisation"] = {"kind": "canonical-euler", "side": source.choice(["q", "p"])}
+        chosen["order"] = source.choice([1, 2])
+    elif source.random() < 0.06 and drawn.structure.kind != "chain":
+        chosen["birealisation"] = "karasev"
+    return chosen
+
+
+def _extras(source: random.Random, drawn: Ordinary) -> Ordinary:
+    """The system with derivatives asked for, in the spec, of `phigen.compile`, or one in each."""
+    options, asked = dict(drawn.options), {}
+    for name, chance in (("adjoint", 0.75), ("tangent", 0.4)):
+        if name == "adjoint" and drawn.noise:
+            continue
+        if source.random() < chance:
+            if source.random() < 0.5:
+                options[name] = True
+            else:
+                asked[name] = True
+    return replace(drawn, options=options, asked=asked)

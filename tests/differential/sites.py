@@ -1,0 +1,330 @@
+"""Random lattices: the text of their spec, and their equations of motion on a few sites, without phigen."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy
+from differential.formulas import TIME, Expr, gradient, numeric, symbols, text
+from differential.reference import Floats
+from numpy.typing import NDArray
+
+Places = NDArray[np.int64]
+_INDEXED = re.compile(r"(\w+)(\[[^\]]*\])?$")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter: where it has values of its own (``all``, ``sites``, ``bonds``), and its value as a spec has it."""
+
+    at: str
+    value: Any
+    positive: bool = False
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """A drawn lattice.
+
+    ``boundary`` is that of each of the ``axes``; without axes it is a graph, or ``pairs``. ``pi`` has the brackets of
+    a site, ``across`` the brackets (f, g, place of g, value) with others, or along bonds. H is the sum of ``sites``
+    over all sites, and of ``ends`` over bonds or pairs. ``vector``, ``covector``, ``damping`` and ``noise`` act as
+    docs/lattices.md has it.
+    """
+
+    seed: int
+    fields: tuple[str, ...]
+    poisson: Mapping[str, Any]
+    pi: sympy.Matrix
+    sites: tuple[Expr, ...]
+    sizes: tuple[int, ...]
+    axes: tuple[str, ...] = ()
+    boundary: tuple[str, ...] = ()
+    pairs: bool = False
+    bonds: tuple[tuple[int, int], ...] = ()
+    across: tuple[tuple[str, str, str, Expr], ...] = ()
+    ends: tuple[Expr, ...] = ()
+    parameters: Mapping[str, Parameter] = field(default_factory=dict)
+    covector: Mapping[str, Expr] = field(default_factory=dict)
+    vector: Mapping[str, Expr] = field(default_factory=dict)
+    damping: Expr | None = None
+    noise: Mapping[str, tuple[Expr, Expr]] = field(default_factory=dict)
+    timed: bool = False
+    casimir: Expr | None = None
+    positive: bool = False
+    initial: Any = None
+    options: Mapping[str, Any] = field(default_factory=dict)
+    asked: Mapping[str, Any] = field(default_factory=dict)
+
+    kind = "lattice"
+
+    @property
+    def graph(self) -> bool:
+        """Whether bonds relate the sites."""
+        return not (self.axes or self.pairs)
+
+    @property
+    def forced(self) -> bool:
+        """Whether something acts beside H."""
+        return bool(self.covector or self.vector or self.damping is not None)
+
+    # --- the spec
+
+    @property
+    def text(self) -> str:
+        """The spec; every value is JSON, which is YAML too."""
+        return "".join(f"{key}: {json.dumps(value)}\n" for key, value in self.entries())
+
+    def entries(self) -> Iterator[tuple[str, Any]]:
+        """Yield the keys of the spec."""
+        yield from {"phigen": 1, "name": f"l{self.seed}", "lattice": self._relation()}.items()
+        yield "coordinates", list(self.fields)
+        if self.parameters:
+            yield (
+                "parameters",
+                {n: {"value": p.value, "at": p.at, "positive": p.positive} for n, p in self.parameters.items()},
+            )
+        if self.timed:
+            yield "time", str(TIME)
+        yield "poisson", dict(self.poisson)
+        sites, ends = (" + ".join(f"({text(e)})" for e in terms) for terms in (self.sites, self.ends))
+        parts = {k: v for k, v in (("sites", sites), ("pairs" if self.pairs else "bonds", ends)) if v}
+        yield "hamiltonian", sites if self.axes else parts or {"sites": "0"}
+        if self.casimir is not None:
+            yield "casimirs", {"C": text(self.casimir)}
+        forces = {"covector": self.covector, "vector": self.vector}
+        if any(forces.values()):
+            yield "forces", {kind: {n: text(f) for n, f in by.items()} for kind, by in forces.items() if by}
+        if self.damping is not None:
+            yield "damping", text(self.damping)
+        if self.noise:
+            yield "noise", {n: {"hamiltonian": text(g), "amplitude": text(s)} for n, (g, s) in self.noise.items()}
+        yield from self.options.items()
+        run = {"sizes": list(self.sizes), "initial": self.initial, "step": 0.1, "steps": 4}
+        yield "runs", {"r": run | ({"bonds": [list(b) for b in self.bonds]} if self.graph else {})}
+
+    def _relation(self) -> dict[str, Any]:
+        if self.axes:
+            return {"axes": list(self.axes), "boundary": list(self.boundary)}
+        return {"pairs": "all"} if self.pairs else {"graph": "bonds"}
+
+    # --- where things are
+
+    @property
+    def count(self) -> int:
+        """The number of sites."""
+        return int(np.prod(self.sizes))
+
+    @property
+    def edges(self) -> Places:
+        """The bonds of a graph, or all pairs, (edges, 2)."""
+        listed = list(itertools.combinations(range(self.count), 2)) if self.pairs else list(self.bonds)
+        return np.array(listed, dtype=np.int64).reshape(-1, 2)
+
+    def places(self, suffix: str, edges: bool) -> Places:
+        """The sites that an index such as ``[i+1]`` or ``[a]`` names, from every site or edge; −1 beyond open ends."""
+        if edges:
+            return self.edges[:, "ab".index(suffix[1])]
+        grid = np.indices(self.sizes)
+        inside = np.ones(self.sizes, dtype=bool)
+        for part in filter(None, suffix[1:-1].split(",")):
+            match = re.fullmatch(r"\s*(\w+?)\s*([+-]\s*\d+)?\s*", part)
+            assert match
+            k = self.axes.index(match[1])
+            moved = grid[k] + int((match[2] or "0").replace(" ", ""))
+            if self.boundary[k] == "open":
+                inside &= (moved >= 0) & (moved < self.sizes[k])
+            grid[k] = moved % self.sizes[k]
+        return np.where(inside, np.ravel_multi_index(tuple(grid), self.sizes), -1).ravel()
+
+    # --- the equations of motion
+
+    def rates(self, values: Mapping[str, Any]) -> Callable[[float, Floats], Floats]:
+        """Return the right-hand side without noise as a function of time and state (fields, sites)."""
+        slopes = self._slopes
+        pushes = {
+            k: [self._term(e, self.fields.index(n)) for n, e in by.items()]
+            for k, by in (("covector", self.covector), ("vector", self.vector))
+        }
+        entries = [(i, j, self._term(e)) for i, row in enumerate(self.pi.tolist()) for j, e in enumerate(row) if e != 0]
+        across = [
+            (self.fields.index(f), self.fields.index(g), p, self._term(e, edges=self.graph))
+            for f, g, p, e in self.across
+        ]
+        damping = None if self.damping is None else self._term(self.damping)
+
+        def turned(t: float, x: Floats, slope: Floats) -> Floats:
+            """π times a covector."""
+            found = np.zeros_like(x)
+            for i, j, term in entries:
+                found[i] += term.at(t, x, values) * slope[j]
+            for f, g, place, term in across:
+                base = self.places("[a]", True) if self.graph else np.arange(self.count)
+                other = self.places(place, self.graph)
+                inside = other >= 0
+                value = term.at(t, x, values)[inside]
+                np.add.at(found[f], base[inside], value * slope[g][other[inside]])
+                np.add.at(found[g], other[inside], -value * slope[f][base[inside]])
+            return found
+
+        def rate(t: float, x: Floats) -> Floats:
+            slope = np.zeros_like(x)
+            for term in slopes:
+                term.add(t, x, values, slope)
+            pushed = slope.copy()
+            for term in pushes["covector"]:
+                pushed[term.target] += term.at(t, x, values)
+            if damping is not None:
+                pushed += damping.at(t, x, values) * turned(t, x, slope)
+            found = turned(t, x, pushed)
+            for term in pushes["vector"]:
+                found[term.target] += term.at(t, x, values)
+            return found
+
+        return rate
+
+    @cached_property
+    def _slopes(self) -> list[_Slope]:
+        return [_Slope(self, e, False) for e in self.sites] + [_Slope(self, e, True) for e in self.ends]
+
+    def _term(self, expression: Expr, target: int = -1, edges: bool = False) -> _Term:
+        return _Term(self, [sympy.sympify(expression)], edges, target)
+
+    def densities(self, values: Mapping[str, Any], t: float, x: Floats) -> float:
+        """The value of H."""
+        terms = [self._term(e) for e in self.sites] + [self._term(e, edges=True) for e in self.ends]
+        return float(sum(np.sum(term.at(t, x, values)) for term in terms))
+
+    def matrix(self, values: Mapping[str, Any], x: Floats) -> Floats:
+        """π of the whole lattice, (fields · sites) squared."""
+        n = self.count
+        found = np.zeros((len(x) * n, len(x) * n))
+        for i, row in enumerate(self.pi.tolist()):
+            for j, e in enumerate(row):
+                if e != 0:
+                    found[i * n : (i + 1) * n, j * n : (j + 1) * n] += np.diag(self._term(e).at(0.0, x, values))
+        for f, g, place, e in self.across:
+            base = self.places("[a]", True) if self.graph else np.arange(n)
+            other, value = self.places(place, self.graph), self._term(e, edges=self.graph).at(0.0, x, values)
+            for a, b, v in zip(base, other, value, strict=True):
+                if b >= 0:
+                    i, j = self.fields.index(f) * n + a, self.fields.index(g) * n + b
+                    found[i, j] += v
+                    found[j, i] -= v
+        return found
+
+    # --- shrinking
+
+    def simpler(self) -> Iterator[Lattice]:
+        """Yield lattices with a part less."""
+        for name in ("sites", "ends", "across"):
+            parts = getattr(self, name)
+            for k in range(len(parts)):
+                if name != "across" and len(self.sites) + len(self.ends) > 1:
+                    yield replace(self, **{name: parts[:k] + parts[k + 1 :]})
+        for name in ("covector", "vector", "noise", "options", "asked"):
+            parts = getattr(self, name)
+            for key in parts:
+                yield replace(self, **{name: {k: v for k, v in parts.items() if k != key}})
+        if self.damping is not None:
+            yield replace(self, damping=None)
+        if self.casimir is not None:
+            yield replace(self, casimir=None)
+        if self.bonds:
+            for k in range(len(self.bonds)):
+                yield replace(self, bonds=self.bonds[:k] + self.bonds[k + 1 :], parameters=_shortened(self.parameters))
+        used = " ".join(text(e) for e in self._expressions())
+        for name in self.parameters:
+            if not re.search(rf"\b{name}\b", used):
+                yield replace(self, parameters={k: v for k, v in self.parameters.items() if k != name})
+        if self.timed and not re.search(r"\bt\b", used):
+            yield replace(self, timed=False)
+        for k, size in enumerate(self.sizes):
+            if size > 1 and not self.bonds:
+                sizes = (*self.sizes[:k], size - 1, *self.sizes[k + 1 :])
+                yield replace(self, sizes=sizes, parameters=_shortened(self.parameters), initial={"random": "uniform"})
+
+    def _expressions(self) -> list[Expr]:
+        noise = [e for pair in self.noise.values() for e in pair]
+        damping = [] if self.damping is None else [self.damping]
+        forces = [*self.covector.values(), *self.vector.values()]
+        return [*self.sites, *self.ends, *(e for *_, e in self.across), *self.pi, *forces, *noise, *damping]
+
+
+def _shortened(parameters: Mapping[str, Parameter]) -> dict[str, Parameter]:
+    """Parameters whose lists, which fit one size only, are numbers."""
+    return {n: replace(p, value=1) if isinstance(p.value, list) else p for n, p in parameters.items()}
+
+
+class _Term:
+    """Expressions at every site or edge, 0 where they reach beyond an open end."""
+
+    def __init__(self, lattice: Lattice, expressions: Sequence[Expr], edges: bool, target: int = -1) -> None:
+        self.lattice, self.edges, self.target = lattice, edges, target
+        reach = set().union(*(e.free_symbols for e in expressions))
+        self.names = sorted(str(s) for s in reach)
+        self.compiled = numeric(expressions, symbols(self.names))
+        self.read: dict[str, tuple[str, Places | None]] = {}
+        self.inside = np.ones(len(lattice.edges) if edges else lattice.count, dtype=bool)
+        for name in self.names:
+            match = _INDEXED.match(name)
+            assert match
+            base, suffix = match[1], match[2] or ""
+            array = base in lattice.fields or (base in lattice.parameters and lattice.parameters[base].at == "sites")
+            places = lattice.places(suffix or "[]", edges) if array else None
+            self.read[name] = (base, places)
+            if places is not None:
+                self.inside &= places >= 0
+
+    def values(self, t: float, x: Floats, values: Mapping[str, Any]) -> list[Floats]:
+        """The value of each expression."""
+        numbers = []
+        for name in self.names:
+            base, places = self.read[name]
+            if base in self.lattice.fields:
+                numbers.append(x[self.lattice.fields.index(base)][places])
+            elif base in values:
+                array = np.asarray(values[base], dtype=float).ravel()
+                numbers.append(
+                    array[places]
+                    if places is not None and array.size > 1
+                    else array
+                    if array.size != 1
+                    else float(array[0])
+                )
+            else:
+                numbers.append(t)
+        shape = self.inside.shape
+        return [
+            np.where(self.inside, np.broadcast_to(np.asarray(v, dtype=float), shape), 0.0)
+            for v in self.compiled(*numbers)
+        ]
+
+    def at(self, t: float, x: Floats, values: Mapping[str, Any]) -> Floats:
+        """The value of the only expression."""
+        return self.values(t, x, values)[0]
+
+
+class _Slope:
+    """The gradient of a term of H, which is added to the sites that the term reads."""
+
+    def __init__(self, lattice: Lattice, expression: Expr, edges: bool) -> None:
+        names = sorted(str(s) for s in sympy.sympify(expression).free_symbols)
+        self.reads = [n for n in names if _INDEXED.match(n)[1] in lattice.fields]  # type: ignore[index]
+        self.term = _Term(lattice, [*gradient(expression, symbols(self.reads)), sympy.sympify(expression)], edges)
+
+    def add(self, t: float, x: Floats, values: Mapping[str, Any], slope: Floats) -> None:
+        """Add ∇ of the sum of the term."""
+        *found, _ = self.term.values(t, x, values)
+        for name, value in zip(self.reads, found, strict=True):
+            base, places = self.term.read[name]
+            assert places is not None
+            inside = self.term.inside
+            np.add.at(slope[self.term.lattice.fields.index(base)], places[inside], value[inside])
