@@ -5,7 +5,6 @@ from support import WARNINGS, run, tool, write
 
 from phigen import spec
 from phigen.compiler import compile_spec, emit
-from phigen.spec.model import Extras
 
 pytestmark = pytest.mark.usefixtures("as_users_compile")
 
@@ -37,9 +36,9 @@ FEW = [
 ]
 
 
-def expect_clean(name, extras, profile, folder, *compilers):
+def expect_clean(name, folder, compilers, **options):
     """Compile the C with all warnings as C, or as C++."""
-    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{SYSTEMS[name]}"), extras=extras, profile=profile)
+    made = compile_spec(spec.loads(f"phigen: 1\nname: t\n{SYSTEMS[name]}"), **options)
     write(folder, emit(made.program, "c", "phigen build"))
     for compiler in compilers:
         language = ["-x", "c++", "-std=c++17"] if compiler.endswith("++") else ["-std=c99"]
@@ -48,14 +47,14 @@ def expect_clean(name, extras, profile, folder, *compilers):
 
 @pytest.mark.parametrize(("name", "without", "profile"), FEW)
 def test_gradients_compile_whatever_is_left_out(name, without, profile, tmp_path):
-    expect_clean(name, Extras(adjoint=True, without=without), profile, tmp_path, "gcc", "clang")
+    expect_clean(name, tmp_path, ("gcc", "clang"), adjoint=True, without=without, profile=profile)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_code_compiles_with_and_without_each_part(name, tmp_path):
-    for tangent, adjoint in ((False, True), (True, True), (True, False)):
+    every = ("gcc", "clang", "g++")
+    for asked in ({"adjoint": True}, {"adjoint": True, "tangent": True}, {"tangent": True}):
         for without in WITHOUT:
-            extras = Extras(tangent=tangent, adjoint=adjoint, without=without)
-            expect_clean(name, extras, "fast", tmp_path, "gcc", "clang")
-        expect_clean(name, Extras(tangent=tangent, adjoint=adjoint), "small", tmp_path, "gcc", "clang", "g++")
+            expect_clean(name, tmp_path, every[:2], without=without, profile="fast", **asked)
+        expect_clean(name, tmp_path, every, profile="small", **asked)

@@ -5,7 +5,6 @@ from support import WARNINGS, run, tool, write
 
 from phigen import spec
 from phigen.compiler import compile_spec, emit
-from phigen.spec.model import Extras
 
 pytestmark = pytest.mark.usefixtures("as_users_compile")
 
@@ -31,7 +30,7 @@ LATTICES = {
     + OSCILLATORS
     + "time: t\nhamiltonian: p**2/2 + cos(3*t)*(q[i+1] - q)**2/2\n",
 }
-OF_EXTRAS = (Extras(adjoint=True), Extras(tangent=True, adjoint=True), Extras(tangent=True), Extras())
+EXTRAS = ({"adjoint": True}, {"tangent": True, "adjoint": True}, {"tangent": True}, {})
 
 
 def text_of(lattice):
@@ -48,16 +47,16 @@ def expect_clean(compilation, folder, *compilers):
 
 @pytest.mark.parametrize("lattice", LATTICES)
 def test_lattices_with_parts_that_have_no_use_compile(lattice, tmp_path):
-    made = compile_spec(spec.loads(text_of(lattice)), extras=Extras(adjoint=True), profile="fast")
+    made = compile_spec(spec.loads(text_of(lattice)), adjoint=True, profile="fast")
     expect_clean(made, tmp_path, "clang")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lattice", LATTICES)
 def test_lattices_with_parts_that_have_no_use_compile_with_all_extras(lattice, tmp_path):
-    for extras in OF_EXTRAS:
+    for extras in EXTRAS:
         for profile in ("fast", "small"):
-            made = compile_spec(spec.loads(text_of(lattice)), extras=extras, profile=profile)
+            made = compile_spec(spec.loads(text_of(lattice)), **extras, profile=profile)
             expect_clean(made, tmp_path, "gcc", "clang", "g++")
 
 
@@ -74,7 +73,7 @@ int main(void)
 def test_lattices_in_cpp_link_with_openmp_and_take_no_solver_for_a_bad_argument(tmp_path):
     """All functions with a status as their value, of a lattice that splits, which has most of them."""
     text = text_of("neighbours are read in reverse alone") + "without: []\n"
-    made = compile_spec(spec.loads(text), extras=Extras(tangent=True, adjoint=True), profile="fast")
+    made = compile_spec(spec.loads(text), tangent=True, adjoint=True, profile="fast")
     files = emit(made.program, "c", "phigen build")
     tests = [
         f"    bad += t_{name}({', '.join(['0'] * count)}) != t_BAD_ARGUMENT;"
