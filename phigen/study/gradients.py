@@ -167,9 +167,8 @@ def _derivatives(run: GradedRun, x_bar: Floats, parameters_bar: Mapping[str, Any
     for name, bar in parameters_bar.items():
         value = np.asarray(run.parameters[name], dtype=np.float64)
         largest = float(np.max(np.abs(value), initial=0.0)) or 1.0
-        units = np.where(
-            value != 0, np.abs(value), largest
-        )  # entries that must be positive may differ by powers of ten
+        # Entries that must be positive may differ by powers of ten: each is moved by its own size.
+        units = np.where(value != 0, np.abs(value), largest)
         v = units * (_directions(value.size, 1).reshape(value.shape) if value.ndim else np.ones(()))
         yield (
             float(np.sum(bar * v)),
