@@ -151,7 +151,7 @@ def sites(session: Session) -> list[str]:
 
 
 def orbit(session: Session) -> list[str]:
-    periods = 50 if session.effort.quick else 1000
+    periods = 20 if session.effort.quick else 500
     rows = eccentric.measured(periods)
     session.save("eccentric", [asdict(r) for r in rows], eccentric.shown(rows, periods))
     return []
