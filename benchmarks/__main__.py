@@ -151,8 +151,8 @@ def sites(session: Session) -> list[str]:
 
 
 def orbit(session: Session) -> list[str]:
-    periods = 20 if session.effort.quick else 500
-    rows = eccentric.measured(periods)
+    periods = 20 if session.effort.quick else 200
+    rows = eccentric.measured(periods, session.say)
     session.save("eccentric", [asdict(r) for r in rows], eccentric.shown(rows, periods))
     return []
 

@@ -253,9 +253,13 @@ def best(rows: Sequence[Row], target: float) -> Row | None:
     return min((r for r in rows if r.worst <= target), key=lambda r: r.seconds, default=None)
 
 
-def measured(periods: int) -> list[Row]:
+def measured(periods: int, say: Callable[[str], None]) -> list[Row]:
     """All rows of all methods."""
-    return [r for contestant in contestants(periods) for r in rows_of(contestant, TARGETS)]
+    rows: list[Row] = []
+    for contestant in contestants(periods):
+        rows += rows_of(contestant, TARGETS)
+        say(f"{contestant.name}: {len(rows)} rows")
+    return rows
 
 
 def shown(rows: Sequence[Row], periods: int) -> str:
