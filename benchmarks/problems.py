@@ -8,6 +8,9 @@ from functools import cached_property
 
 import sympy
 
+#: Orders of phigen's methods; those of the series are told by each problem.
+ORDERS = {"splitting": (2, 4, 6, 8, 10), "gauss": (4, 8, 12, 16), "gauss to truncation": (4, 8, 12, 16)}
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -32,12 +35,12 @@ class Problem:
     kind: str = "auto"
     splitting: str = ""
     quadratic: bool = True
-    methods: tuple[str, ...] = ("gauge none", "gauge auto", "splitting")
+    methods: tuple[str, ...] = ("gauge none", "gauge auto", "splitting", "gauss")
     constants: Mapping[str, float] = field(default_factory=dict)
 
     def orders_of(self, method: str) -> tuple[int, ...]:
         """The orders that a method of phigen is tried at."""
-        return (2, 4, 6, 8, 10) if method == "splitting" else self.orders
+        return ORDERS.get(method, self.orders)
 
     @property
     def dimension(self) -> int:
@@ -61,15 +64,20 @@ class Problem:
 
     def spec(self, order: int, method: str = "gauge none") -> str:
         """A spec of the system, named ``bench``. ``method`` is ``gauge none`` or ``gauge auto``, by the series to the
-        order itself, or ``splitting``, which is composed."""
-        series = f"birealisation: {self.kind}\ncomposition: none\ngauge: {method.removeprefix('gauge ')}\n"
+        order itself, ``splitting``, which is composed, ``gauss``, exactly Poisson, or ``gauss to truncation``."""
+        schemes = {
+            "splitting": "scheme: splitting",
+            "gauss": "scheme: gauss",
+            "gauss to truncation": "scheme: gauss\nstructure: to truncation",
+        }
+        series = f"birealisation: {self.kind}\ncomposition: none\ngauge: {method.removeprefix('gauge ')}"
         rows = "\n".join(f"    - [{', '.join(row)}]" for row in self.poisson)
         casimirs = "".join(f"  {name}: {text}\n" for name, text in self.casimirs.items())
         return (
             f"phigen: 1\nname: bench\ncoordinates: [{', '.join(self.coordinates)}]\n"
             f"poisson:\n  matrix:\n{rows}\nhamiltonian: {self.hamiltonian}\n"
             f"{'casimirs:' if casimirs else ''}\n{casimirs}"
-            f"order: {order}\n{'scheme: splitting' if method == 'splitting' else series}\n"
+            f"order: {order}\n{schemes.get(method, series)}\n"
         )
 
 
@@ -169,7 +177,7 @@ PROBLEMS = (
         (4, 6, 8, 10, 12, 14),
         first=1.0,
         splitting="lotka_volterra",
-        methods=("gauge none", "splitting"),
+        methods=("gauge none", "splitting", "gauss to truncation"),
         constants={"A12": 1.0, "A13": -0.7, "A23": 1.3},
     ),
     Problem(
@@ -212,6 +220,6 @@ PROBLEMS = (
         splitting="pendulum",
         quadratic=False,
         constants={"CASIMIR": 1.0},
-        methods=("gauge none", "splitting"),
+        methods=("gauge none", "splitting", "gauss to truncation"),
     ),
 )

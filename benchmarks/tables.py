@@ -11,7 +11,6 @@ from typing import Any
 from benchmarks.measure import ENERGY, ORBIT, Cell, Study, Target, ratios
 from phigen.runtime import toolchain
 
-
 #: What processors say of their vectors: solvers that keep eight numbers side by side are faster with wider ones.
 VECTORS = (("avx512f", ", AVX-512"), ("avx2", ", AVX2"))
 
