@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from phigen.errors import Diagnostic
+
 _PACKAGE = Path(__file__).resolve().parent
 
 
@@ -43,6 +45,28 @@ def file_of(given: str) -> str:
     except OSError:  # too long for a name
         there = False
     return given if there else str(bundled().get(given, given))
+
+
+def missing(given: str) -> Diagnostic:
+    """The error for a text that names neither a file nor a bundled spec, with what may have been meant."""
+    also = "" if set(given) & {"/", "."} else ", and no bundled spec has that name"
+    return Diagnostic(f"there is no file {given!r}{also}", hint=suggestion(given))
+
+
+def suggestion(given: str) -> str:
+    """The hint for a spec that was not found: a bundled one or a file of nearly that name, or how to find one."""
+    from difflib import get_close_matches
+
+    path, names = Path(given), bundled()
+    if path.stem in names:
+        return f"did you mean {path.stem!r}? The bundled spec of that name needs neither folder nor suffix"
+    beside = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
+    if near := get_close_matches(path.name, beside, n=1) or [p for p in beside if Path(p).stem == path.name]:
+        return f"did you mean {str(path.with_name(near[0]))!r}?"
+    if near := get_close_matches(path.stem, names, n=3):
+        specs = "bundled specs" if len(near) > 1 else "a bundled spec"
+        return f"did you mean {' or '.join(map(repr, near))}? {'These are' if len(near) > 1 else 'It is'} {specs}"
+    return "phigen list shows the bundled specs; phigen new NAME writes a spec to start from"
 
 
 def _find(name: str) -> Path:

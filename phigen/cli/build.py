@@ -32,13 +32,13 @@ STRICT = ("-Wall", "-Wextra", "-Werror")
 @many_specs
 @click.option("-o", "--output", metavar="DIR", default=DIRECTORY, show_default=True, help="Files go to DIR/NAME/.")
 @output_options
-@click.option("--compile", "compiling", is_flag=True, help="Compile the C too, to DIR/NAME/libNAME.so.")
-@click.option("--certify", is_flag=True, help="Verify too, and write DIR/NAME/NAME.certificate.json.")
+@click.option("--compile", "compiling", is_flag=True, help="Compile the C as well, to DIR/NAME/libNAME.so.")
+@click.option("--certify", is_flag=True, help="Verify the solvers as well, and write DIR/NAME/NAME.certificate.json.")
 @click.option(
-    "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what belongs there."
+    "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what would be written."
 )
-@click.option("--diff", is_flag=True, help="As --check, and print the differences.")
-@click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or are not phigen's.")
+@click.option("--diff", is_flag=True, help="Like --check, and print the differences.")
+@click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or were not written by phigen.")
 @verbosity
 @pass_console
 def command(

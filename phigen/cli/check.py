@@ -28,14 +28,19 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
 @order_option
 @scheme_option
 @click.option("--independent", is_flag=True, help="Derive the S_i, α and β a second time, by sympy, and compare.")
-@click.option("--terms", metavar="K", type=ORDER, help="With --independent: S_1 … S_K, instead of those of the method.")
+@click.option(
+    "--terms",
+    metavar="K",
+    type=ORDER,
+    help="With --independent: derive S_1 … S_K, whatever the method has.",
+)
 @click.option(
     "--seconds",
     metavar="T",
     type=click.FloatRange(0, min_open=True),
-    help="With --independent: time for one spec (60).",
+    help="With --independent: time limit for each spec.  [default: 60]",
 )
-@click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object for each spec.")
 @verbosity
 @pass_console
 def command(
@@ -51,26 +56,27 @@ def command(
     """Prove the mathematics of specs, or refute it.
 
     π is skew and satisfies the Jacobi identity; Casimirs and invariants are what they claim to be; α and β satisfy
-    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; of a splitting, each flow solves its
-    own equation. Each statement is proved in exact
-    arithmetic, refuted with a residual, or checked at points. Exit code 5 if anything is refuted.
+    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; each flow of a splitting solves its
+    own equation. Each statement is proved in exact arithmetic, refuted with a residual, or checked at points. Exit
+    code 5 if anything is refuted. With -q only statements that do not hold are printed; with -v all triples that
+    fail the Jacobi identity.
 
-    With --independent sympy derives the S_i a second time, in another way, and looks at α and β; what it says of each
-    term is shown as it comes. Exit code 3 when its time is up.
+    With --independent sympy derives the S_i a second time, by another method, and checks α and β. Results are printed
+    term by term. Exit code 3 if the time limit is reached.
     """
     from phigen.compiler import examine
 
     if not independent and (terms or seconds):
-        raise click.UsageError("--terms and --seconds are for --independent")
+        raise click.UsageError("--terms and --seconds have a meaning only with --independent")
     collector, found = Collector(), list[dict[str, object]]()
     for spec in load_all(spec_files, collector):
         with collector.collecting():
             examination = examine(spec, order=order, scheme=scheme)
             described = _described(examination)
             if not as_json:
-                if found:
+                if found and not console.quiet:
                     out("")
-                _print(examination, verbose=console.verbose)
+                _print(examination, console)
             _collect(examination, collector, console)
             if independent:
                 compared = _compared(examination, terms, seconds, console, collector, shown=not as_json)
@@ -145,17 +151,22 @@ def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) 
             collector.errors.append(SpecError(hints))
 
 
-def _print(examination: Examination, *, verbose: bool) -> None:
+def _print(examination: Examination, console: Console) -> None:
     from phigen.proofs.statements import GAUSS, METHOD, SPLITTING
 
     spec = examination.spec
+    if console.quiet and all(s.holds for s in examination.statements):
+        return
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
     compilation = examination.compilation
     for group, statements in examination.groups.items():
-        out(f"  {compilation.told(group) if compilation and group.startswith((METHOD, SPLITTING, GAUSS)) else group}")
-        for statement in statements:
+        shown = [s for s in statements if not (console.quiet and s.holds)]
+        if shown:
+            named = group.startswith((METHOD, SPLITTING, GAUSS))
+            out(f"  {compilation.told(group) if compilation and named else group}")
+        for statement in shown:
             out("\n".join(_lines(statement)))
-            for part, residual in statement.failing if verbose else ():
+            for part, residual in statement.failing if console.verbose else ():
                 out(f"    {'':<19}  {part}: {residual}")
     if examination.unexamined:
         out(f"  Not examined, since they rest on it: {examination.unexamined}")

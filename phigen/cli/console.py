@@ -106,8 +106,8 @@ def verbosity(command: F) -> F:
         return callback
 
     for short, name, text in (
-        ("-v", "verbose", "Say more: each stage and its seconds, tracebacks."),
-        ("-q", "quiet", "Say nothing but data and errors."),
+        ("-v", "verbose", "Print more: the stages and their seconds, tracebacks of internal errors."),
+        ("-q", "quiet", "Print data and errors only."),
     ):
         command = click.option(short, f"--{name}", is_flag=True, expose_value=False, callback=store(name), help=text)(
             command

@@ -150,7 +150,7 @@ def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:
     if seed is None:
         return run
     if not spec.noise:
-        raise click.BadParameter(f"{spec.name} has no noise", param_hint="--seed")
+        raise click.BadParameter(f"{spec.name} has no noise, hence no random numbers", param_hint="--seed")
     return replace(run, seed=seed)
 
 

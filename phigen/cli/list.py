@@ -16,8 +16,10 @@ if TYPE_CHECKING:
 
 
 @click.command("list")
-@click.option("--path", "name", metavar="NAME", shell_complete=bundled_names, help="Print only the path of this one.")
-@click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
+@click.option(
+    "--path", "name", metavar="NAME", shell_complete=bundled_names, help="Print only the path of the bundled spec NAME."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object for each spec.")
 @verbosity
 def command(name: str | None, as_json: bool) -> None:
     """List the bundled specs: name, dimension, kind of π, title.

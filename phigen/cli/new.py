@@ -12,8 +12,8 @@ from phigen.writing import write
 
 @click.command("new")
 @click.argument("name")
-@click.option("--lattice", is_flag=True, help="A lattice of like sites, instead of one system.")
-@click.option("-o", "--output", metavar="FILE", help="Where to write it; - is stdout.  [default: NAME.yaml]")
+@click.option("--lattice", is_flag=True, help="A lattice of identical sites, instead of one system.")
+@click.option("-o", "--output", metavar="FILE", help="The file to write; - is stdout.  [default: NAME.yaml]")
 @verbosity
 @pass_console
 def command(console: Console, name: str, lattice: bool, output: str | None) -> None:

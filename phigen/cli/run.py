@@ -44,18 +44,25 @@ _TABLES = (".csv", ".npz")
 @order_option
 @scheme_option
 @profile_option
-@click.option("--step", metavar="H", type=float, help="Step size, instead of the run's; a duration stays.")
+@click.option(
+    "--step",
+    metavar="H",
+    type=float,
+    help="Step size, instead of the run's; a duration of the run stays.",
+)
 @click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
 @sizes_option
-@click.option("--until", metavar="T", type=float, help="The time where the run ends, by a part of a step if need be.")
 @click.option(
-    "--every", metavar="DT", type=float, help="Store states at times so far apart, instead of every stride-th."
+    "--until", metavar="T", type=float, help="Time at which the run ends, by a shorter last step if necessary."
 )
-@click.option("--at", metavar="T,…", help="Store states at these times, or at those in a file.")
-@click.option("--seed", metavar="N", type=SEED, help="Which random numbers the noise takes, instead of the run's.")
+@click.option(
+    "--every", metavar="DT", type=float, help="Store states at intervals DT of time, instead of every stride-th step."
+)
+@click.option("--at", metavar="T,…", help="Store states at these times, or at the times listed in a file.")
+@click.option("--seed", metavar="N", type=SEED, help="Seed of the random numbers of the noise, instead of the run's.")
 @click.option("--from", "source", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Start at the last state of another run: FILE.csv or FILE.npz.")  # fmt: skip
-@click.option("--extend", is_flag=True, help="Go on beyond the end of the finished run in the file of --output.")
+@click.option("--extend", is_flag=True, help="Continue the finished run in the file of --output beyond its end.")
 @settings_option
 @click.option(
     "-o", "--output", metavar="FILE", callback=file_ending(*_TABLES), help="Store the trajectory: FILE.csv or FILE.npz."
@@ -71,10 +78,10 @@ _TABLES = (".csv", ".npz")
 @click.option(
     "--lyapunov",
     is_flag=True,
-    help="Lyapunov exponents, through the exact derivative of each step; of a lattice the largest.",
+    help="Compute Lyapunov exponents from the exact derivative of each step; for a lattice the largest.",
 )
-@click.option("--resume", is_flag=True, help="Go on with an interrupted run that was writing the same files.")
-@click.option("--json", "as_json", is_flag=True, help="The summary for machines.")
+@click.option("--resume", is_flag=True, help="Continue an interrupted run that was writing the same files.")
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @verbosity
 @pass_console
 def command(
@@ -102,11 +109,11 @@ def command(
     resume: bool,
     as_json: bool,
 ) -> None:
-    """Integrate a run of a spec, and sum up the errors of energy, Casimirs, invariants and solution.
+    """Integrate a run of a spec, and summarise the errors of energy, Casimirs, invariants and solution.
 
     The code is that of the profile fast unless --profile names another; the spec's is that of code that is built.
-    The classical methods that the run names under compare: are run beside it, with the same step size. Files are
-    written while the run goes on; one that is interrupted keeps what it has, and goes on with --resume.
+    The classical methods that the run names under "compare:" are run as well, with the same step size. Files are
+    written during the run; an interrupted run keeps its results so far, and --resume continues it.
     """
     from phigen.api import compilation_of
     from phigen.cli.endings import ended, timed

@@ -27,14 +27,22 @@ if TYPE_CHECKING:
 @scheme_option
 @click.option("--full", is_flag=True, help="All terms of long formulas.")
 @click.option(
-    "--modified", metavar="N", type=CORRECTIONS, default=0, help="So many corrections of the modified Hamiltonian."
+    "--modified", metavar="N", type=CORRECTIONS, default=0, help="Show N corrections of the modified Hamiltonian."
 )
 @click.option(
-    "--expand", "sizes", metavar="SIZES", help="Of a lattice: the ordinary spec of a small one; 3x3, or a run's name."
+    "--expand",
+    "sizes",
+    metavar="SIZES",
+    help="For a lattice: a small one, of sizes 3x3 or of a named run, as an ordinary spec.",
 )
-@click.option("--lattice", "as_lattice", is_flag=True, help="Of like sites written out: a spec of one, for any number.")
+@click.option(
+    "--lattice",
+    "as_lattice",
+    is_flag=True,
+    help="For identical sites written out: the spec of a lattice of any size.",
+)
 @click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
-@click.option("--json", "as_json", is_flag=True, help="For machines: one object of texts.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object of texts.")
 @verbosity
 def command(
     spec_file: str,
@@ -49,14 +57,14 @@ def command(
 ) -> None:
     """Show the formulas of a spec: π, Casimirs, α, β, S_1 … S_k, the modified Hamiltonian, operation counts.
 
-    Of a lattice it shows the cell; with --expand a small lattice as an ordinary spec, a coordinate for each field of
-    each site.
+    For a lattice the formulas are those of one site. --expand prints a small lattice as an ordinary spec, with one
+    coordinate for each field of each site.
     """
     from phigen.compiler import compile_proved
     from phigen.symbolic.readable import SHOWN
 
     if as_latex and as_json:
-        raise click.UsageError("--latex and --json exclude one another")
+        raise click.UsageError("give either --latex or --json, not both")
     spec = load_one(spec_file)
     if sizes is not None:
         from phigen.cli.expanding import expanded_text

@@ -38,8 +38,7 @@ def found(given: str) -> str:
         return str(resources.bundled()[given])
     if path.exists():
         return given
-    also = "" if set(given) & {"/", "."} else " and no bundled spec"
-    raise SpecError([Diagnostic(f"there is no file{also} {given!r}", hint=_near(given))])
+    raise SpecError([resources.missing(given)])
 
 
 def as_given(spec: Spec) -> str:
@@ -88,18 +87,3 @@ def _below(path: str) -> Iterator[str]:
         for file in sorted(files, key=natural_key):
             if file.endswith(SUFFIXES) and not file.startswith("."):
                 yield os.path.join(folder, file)  # noqa: PTH118  (as the user wrote it: "./specs" stays "./specs")
-
-
-def _near(given: str) -> str:
-    """What may have been meant: the bundled spec, a file beside it of nearly that name, a bundled one, or nothing."""
-    from difflib import get_close_matches
-
-    path, bundled = Path(given), resources.bundled()
-    if path.stem in bundled:
-        return f"{path.stem} is a bundled spec, and its name alone means that"
-    beside = [p.name for p in path.parent.glob("*.y*ml")] if path.parent.is_dir() else []
-    if near := get_close_matches(path.name, beside, n=1) or [p for p in beside if Path(p).stem == path.name]:
-        return f"did you mean {str(path.with_name(near[0]))!r}?"
-    if near := get_close_matches(path.stem, bundled, n=3):
-        return f"did you mean the bundled spec {' or '.join(near)}?"
-    return "phigen new NAME writes a spec to start from; phigen list shows the bundled ones"

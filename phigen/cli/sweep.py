@@ -29,9 +29,13 @@ if TYPE_CHECKING:
 @click.option(
     "-o", "--output", metavar="FOLDER", type=click.Path(path_type=Path), help="The Zarr store.  [default: NAME.zarr]"
 )
-@click.option("--scheduler", metavar="ADDRESS", help="A Dask cluster, tcp://…, in place of processes of this machine.")
 @click.option(
-    "--workers", metavar="N", type=click.IntRange(min=1), help="So many processes.  [default: one on each core]"
+    "--scheduler",
+    metavar="ADDRESS",
+    help="Address of a Dask cluster, tcp://…, to use instead of this machine.",
+)
+@click.option(
+    "--workers", metavar="N", type=click.IntRange(min=1), help="Number of processes.  [default: one for each core]"
 )
 @target_option
 @order_option
@@ -40,8 +44,10 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the map: FILE.png, FILE.svg or FILE.pdf."
 )
-@click.option("--show", "shown", metavar="VARIABLE", help="What is drawn.  [default: the first number that is kept]")
-@click.option("--json", "as_json", is_flag=True, help="The summary for machines.")
+@click.option(
+    "--show", "shown", metavar="VARIABLE", help="The variable to draw.  [default: the first of those that are kept]"
+)
+@click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @verbosity
 @pass_console
 def command(
@@ -59,22 +65,22 @@ def command(
     shown: str | None,
     as_json: bool,
 ) -> None:
-    """Make a run for many parameters, initial values or steps, and store what is kept of each as a Zarr store.
+    """Make a run for many parameters, initial values or steps, and store the results in a Zarr store.
 
-    A store that is there already is gone on with: what it lacks is made. xarray opens it (xarray.open_zarr).
+    If the store exists, only the members that it lacks are made. xarray opens it (xarray.open_zarr).
     """
     from phigen.cli.energy_warning import sweep_warning
     from phigen.progress import stage
     from phigen.sweeping.sweep import Setting, made
 
     if scheduler and workers:
-        raise click.UsageError("--workers is about processes of this machine; a cluster has its own")
+        raise click.UsageError("--workers counts processes of this machine: it does not go with --scheduler")
     if plot:
         from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
     elif shown:
-        raise click.UsageError("--show says what --plot FILE draws")
+        raise click.UsageError("--show chooses what --plot draws: add --plot FILE")
     spec = load_one(spec_file)
     sweep = _sweep_of(spec, name)
     if shown and shown not in sweep.keep:

@@ -65,8 +65,10 @@ class Made:
 @click.option("--cmake", is_flag=True, help="Write a CMakeLists.txt for the folder, too.")
 @click.option("--meson", is_flag=True, help="Write a meson.build for the folder, too.")
 @click.option("--python", is_flag=True, help="Write an __init__.py, which makes the folder a package, too.")
-@click.option("--check", "checking", is_flag=True, help="Write nothing; fail if a file is not as it should be.")
-@click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or are not phigen's.")
+@click.option(
+    "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what would be written."
+)
+@click.option("--force", is_flag=True, help="Overwrite files that were edited by hand or were not written by phigen.")
 @verbosity
 @pass_console
 def command(

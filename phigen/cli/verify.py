@@ -46,7 +46,7 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @click.option("--quick", is_flag=True, help="Fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="For machines: one object per spec.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object for each spec.")
 @verbosity
 @pass_console
 def command(

@@ -17,6 +17,9 @@ from phigen.symbolic.taylor import Taylor, closure
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import UNDECIDED, Statement, decide_elements
 
+#: The reason why no statement about higher degrees is needed where steps follow paths.
+EXACT_PATH = "steps follow the exact path, for which Karasev's theorem is the proof"
+
 
 class _Parts:
     """The homogeneous parts in p, up to a degree, of expressions in x and p; and brackets of them."""
@@ -64,11 +67,11 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
         for e in substitute([system.poisson[i][j] for i, j in pairs], dict(zip(system.coordinates, m, strict=True)))
     ]
     titles = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
-    suffix = f", up to degree {degree - 1} in p"
+    suffix = f": all terms up to degree {degree - 1} in p"
     try:
         parts = _Parts(system, [*maps, *pulled], degree)
     except OverflowError:
-        beyond = "exact by Karasev's theorem" if realisation.path else "not checked"
+        beyond = EXACT_PATH if realisation.path else "not checked"
         for title in titles:
             yield Statement(f"bi-realisation: {title}{suffix}", UNDECIDED, f"too many terms to expand; {beyond}")
         return
@@ -76,12 +79,11 @@ def brackets(system: System, realisation: BiRealisation, degree: int) -> Iterato
     def label(i: int, j: int, m: int) -> str:
         return f"({system.coordinates[i]}, {system.coordinates[j]}) in degree {m}"
 
-    # A path is followed itself, and is a bi-realisation by Karasev's theorem; a truncation is cut off.
-    beyond = "followed as a path, exact by Karasev's theorem" if realisation.path else "approximate beyond"
+    beyond = EXACT_PATH if realisation.path else "α and β have no terms of higher degree, so the axiom is approximate"
 
     def decided(name: str, residuals: Iterator[tuple[str, Poly]]) -> Statement:
         title = f"bi-realisation: {name}{suffix}"
-        return decide_elements(title, parts.tower, residuals, system.positive, f"degree by degree; {beyond}")
+        return decide_elements(title, parts.tower, residuals, system.positive, f"each degree by itself; {beyond}")
 
     def own(first: int, sign: int) -> Iterator[tuple[str, Poly]]:
         for m in range(degree):

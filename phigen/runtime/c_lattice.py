@@ -324,7 +324,8 @@ class CLattice:
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(
-                f"{self.interface.name} has no steps by hand: it is no grid that is split, has a seam, or profile small"
+                f"{self.interface.name} offers no stepping driven by the caller: that needs a split lattice on a grid, "
+                "without a seam, compiled with profile fast"
             )
         found = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]
         for k, stage in enumerate(found):

@@ -124,8 +124,10 @@ class Solver(Named[Backend, Interface]):
             marks = Marks(tau, np.array(list(passed.values())), turned, done, tuple(course.retried))
             return self._trajectory(states, marks, at)
 
-        if (steps is None) == (until is None):
-            raise TypeError("integrate takes either steps or until")
+        if steps is None and until is None:
+            raise TypeError("integrate needs the number of steps, or the time until which to integrate")
+        if steps is not None and until is not None:
+            raise TypeError("integrate takes either steps or until, not both")
         if until is not None:
             return self._until(course, arguments.end(until, at.t0, at.h), stride, at)
         steps = arguments.count(steps if steps is not None else 0, "steps", 0)

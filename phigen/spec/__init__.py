@@ -22,6 +22,7 @@ def load(path: str | PathLike[str]) -> Spec:
 
     Raises `SpecError` with all errors found, in the order of the file, or `LimitError` if a limit is exceeded.
     """
+    from phigen import resources
     from phigen.errors import Diagnostic, SpecError
     from phigen.reading import opened
     from phigen.spec import limits
@@ -35,6 +36,8 @@ def load(path: str | PathLike[str]) -> Spec:
         if "\n" in file:
             message = "the name of a spec file was expected, and this is a text of several lines"
             raise SpecError([Diagnostic(message, hint="phigen.spec.loads(text) reads it")]) from error
+        if isinstance(error, FileNotFoundError):
+            raise SpecError([resources.missing(file)]) from error
         reason = getattr(error, "strerror", None) or str(error)
         raise SpecError([Diagnostic(f"cannot read {file!r}: {reason}")]) from error
     return validate(data, file)

@@ -12,6 +12,7 @@ from systems import slow_but
 
 from phigen import resources, spec
 from phigen.api import compilation_of
+from phigen.errors import SpecError
 from phigen.report.method import method_section
 from phigen.scheme import discretisation
 
@@ -373,3 +374,17 @@ def test_all_triples_that_fail_the_jacobi_identity_are_listed_on_request(phigen,
     assert not any(line in phigen("check", path).stdout for line in listed)
     (jacobi,) = (s for s in json.loads(phigen("check", "--json", path).stdout)[0]["statements"] if "failing" in s)
     assert jacobi["failing"] == sums
+
+
+def test_quiet_checks_print_what_does_not_hold(phigen, write):
+    good = phigen("check", "-q", write("good.yaml"), "harmonic_oscillator")
+    assert (good.exit_code, good.stdout, good.stderr) == (0, "", "")
+    refuted = phigen("check", "-q", write("bad.yaml", NOT_POISSON))
+    assert refuted.exit_code == 5
+    assert "refuted              Jacobi identity" in refuted.stdout
+    assert "  proved " not in refuted.stdout
+
+
+def test_python_suggests_names_that_are_near():
+    with pytest.raises(SpecError, match=r"there is no file 'keplr', and .*\n  hint: did you mean 'kepler'\?"):
+        spec.load("keplr")

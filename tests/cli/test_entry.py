@@ -151,8 +151,8 @@ def test_command_with_typing_error_gets_a_suggestion(phigen):
 @pytest.mark.parametrize(
     ("given", "hint"),
     [
-        ("rigid_body.yaml", "rigid_body is a bundled spec, and its name alone means that"),
-        ("keplr", "did you mean the bundled spec kepler?"),
+        ("rigid_body.yaml", "did you mean 'rigid_body'? The bundled spec of that name needs neither folder nor suffix"),
+        ("keplr", "did you mean 'kepler'? It is a bundled spec"),
         ("tumbler", "did you mean 'tumbler.yaml'?"),
         ("sub/henon", "phigen new NAME"),
     ],

@@ -268,4 +268,7 @@ def test_a_path_whose_series_is_too_large_to_expand_is_undecided_and_not_refused
     monkeypatch.setattr(budgets, "TAYLOR_BYTES", 1000)
     found = check(s, realise(s))
     assert verdicts(found[ALPHA:FORMS]) == [UNDECIDED] * 3
-    assert found[ALPHA].detail == "too many terms to expand; exact by Karasev's theorem"
+    assert (
+        found[ALPHA].detail
+        == "too many terms to expand; steps follow the exact path, for which Karasev's theorem is the proof"
+    )

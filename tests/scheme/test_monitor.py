@@ -163,8 +163,10 @@ def test_until_and_at_without_a_monitor(target):
     np.testing.assert_allclose(whole.at([0.31])[0], part.at([0.31])[0], rtol=0, atol=1e-10)
     with pytest.raises(ValueError, match="never reached"):
         made.integrate(BODY_START, -0.01, until=0.5)
-    with pytest.raises(TypeError, match="either steps or until"):
+    with pytest.raises(TypeError, match="needs the number of steps, or the time"):
         made.integrate(BODY_START, 0.01)
+    with pytest.raises(TypeError, match="either steps or until, not both"):
+        made.integrate(BODY_START, 0.01, 3, until=0.5)
     with pytest.raises(ValueError, match="between"):
         part.at([0.6])
 
