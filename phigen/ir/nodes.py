@@ -13,8 +13,9 @@ from enum import Enum, auto
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: The kind of symbols that are printed as they are, since the printed function reserves them.
-FIXED = "fixed"
+#: The kinds of symbols that are printed as they are, since the printed function reserves them; and of those that are
+#: printed by their text, unless a name of the user is the same.
+FIXED, LABEL = "fixed", "label"
 
 
 class Type(Enum):
@@ -169,6 +170,21 @@ class Binary:
 
 
 @dataclass(frozen=True)
+class Accumulated:
+    """A value to which the terms of another one are added one by one, from the left."""
+
+    start: Value
+    terms: Value
+
+
+@dataclass(frozen=True)
+class Cast:
+    """A value as an index."""
+
+    value: Value
+
+
+@dataclass(frozen=True)
 class Select:
     """One of two values by a condition."""
 
@@ -178,10 +194,11 @@ class Select:
 
 
 @dataclass(frozen=True)
-class Not:
-    """The opposite of a condition."""
+class Prefix:
+    """A prefix operator, ``not`` or ``-``, on a value."""
 
-    condition: Value
+    operator: str
+    value: Value
 
 
 @dataclass(frozen=True)
@@ -216,7 +233,7 @@ class Called:
 
 Value = (
     Expression | Name | Constant | Load | Coefficient | SystemParameter | BondParameter | Time | Inside | HasColour
-    | OnSeam | Member | Entry | Binary | Select | Not | Grouped | Listed | Several | Called
+    | OnSeam | Member | Entry | Binary | Accumulated | Cast | Select | Prefix | Grouped | Listed | Several | Called
 )  # fmt: skip
 
 
@@ -277,11 +294,12 @@ class GatherSums:
 
 @dataclass(frozen=True)
 class Assign:
-    """A place in memory becomes a value, or grows by it."""
+    """A place in memory, and others ``too``, becomes a value, or grows by it."""
 
     target: Value
     value: Value
     adds: bool = False
+    too: tuple[Value, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -311,6 +329,18 @@ class Loop:
     selection: Selection = ALL_SITES
     end: str = ""
     chosen: str = ""
+    step: Value | None = None
+    limit: str = ""  # the name of a variable that holds ``high``
+    condition: Value | None = None  # under which the loop goes on
+    independent: str = ""  # what the compiler may vectorise over: SITE or LANE
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Discard:
+    """A parameter that is not read, for the compiler."""
+
+    name: str
 
 
 @dataclass(frozen=True)
@@ -350,7 +380,9 @@ class Return:
     value: Value | None = None
 
 
-Statement = Declare | Unpack | Store | Reduce | GatherSums | Assign | Loop | If | Within | Continue | Call | Return
+Statement = (
+    Declare | Unpack | Store | Reduce | GatherSums | Assign | Loop | Discard | If | Within | Continue | Call | Return
+)
 Block = tuple[Statement, ...]
 
 
@@ -389,6 +421,16 @@ class Function:
 def fixed(name: str) -> Name:
     """Return a name that is printed as it is."""
     return Name(Symbol(FIXED, name))
+
+
+def label(text: str) -> Name:
+    """Return a name that is printed by its text, unless a name of the user is the same."""
+    return Name(Symbol(LABEL, text))
+
+
+def in_place(name: str, value: Value) -> Declare:
+    """Return the declaration of a symbol whose value is printed wherever it is used."""
+    return Declare(Type.REAL, ((name, value),), in_place=True)
 
 
 def real(name: str, value: Value) -> Declare:

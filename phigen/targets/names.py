@@ -42,13 +42,16 @@ class Scope:
 
     def __getitem__(self, name: str) -> str:
         """The identifier of a symbol; temporary 12 becomes ``t12``."""
+        if name not in self._given and isinstance(name, Symbol) and name.kind == TEMPORARY:
+            self._given[name] = name.replace(":", "")
+            self._taken.add(self._given[name])
+        return self.request(name, name)
+
+    def request(self, name: str, wanted: str) -> str:
+        """Return the identifier of a symbol, which is ``wanted`` where that is free."""
         if name not in self._given:
-            if isinstance(name, Symbol) and name.kind == TEMPORARY:
-                given = name.replace(":", "")
-            else:
-                given = _free(re.sub(r"\W", "_", name, flags=re.ASCII), self._reserved, self._taken)
-            self._taken.add(given)
-            self._given[name] = given
+            self._given[name] = _free(re.sub(r"\W", "_", wanted, flags=re.ASCII), self._reserved, self._taken)
+            self._taken.add(self._given[name])
         return self._given[name]
 
     def bind(self, name: str, code: str) -> None:

@@ -29,7 +29,11 @@ class Printer:
 
     def __call__(self, e: Expression) -> str:
         """The tree as text."""
-        return fold([e], self._visit)[0][0]
+        return self.bound(e)[0]
+
+    def bound(self, e: Expression) -> Printed:
+        """The tree as text, and how strongly it binds."""
+        return fold([e], self._visit)[0]
 
     def literal(self, value: Fraction) -> Printed:
         """A rational number: exact where it is, else a quotient or the nearest double, shortest form."""

@@ -11,10 +11,12 @@ from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 from phigen.targets.language import Language
 from phigen.targets.names import Scope
+from phigen.targets.printer import ATOM, PRODUCT, SUM
 
 #: Binding strength of operators, as in `phigen.targets.printer`, and of what needs no parentheses.
 _STRENGTH = {"and": 1, "==": 2, "!=": 2, "<": 2, ">=": 2, "+": 3, "-": 3, "*": 4, "/": 4, "%": 4}
 _ATOM = 9
+_OF_ARITHMETIC = {SUM: 3, PRODUCT: 4, ATOM: _ATOM}
 
 
 @dataclass(frozen=True)
@@ -25,18 +27,18 @@ class Dialect:
     operators: Mapping[str, str] = field(default_factory=dict)
     functions: Mapping[str, str] = field(default_factory=dict)
     select: str = "{0} ? {1} : {2}"
-    pointers: frozenset[str] = frozenset()  # names whose members are behind an arrow
+    pointers: frozenset[str] = frozenset()  # records whose members are behind an arrow
     quote: str = '"{0}"'
 
 
 class Spelling:
     """The identifiers of one function, and its values as text."""
 
-    def __init__(self, dialect: Dialect, reserved: Iterable[str], function: ir.Function) -> None:
+    def __init__(self, dialect: Dialect, reserved: Iterable[str], body: ir.Block) -> None:
         """Names of the spec come first, so that they are changed only where they are ``reserved``."""
         self.dialect = dialect
         self.scope = Scope(dialect.language.reserved | reserved)
-        declared = (s.items for s in statements(function.body) if isinstance(s, ir.Declare) and not s.in_place)
+        declared = (s.items for s in statements(body) if isinstance(s, ir.Declare) and not s.in_place)
         for name in (name for items in declared for name, _ in items if not isinstance(name, Symbol)):
             self.scope[name]
         self._arithmetic = dialect.language.printer(self.scope)
@@ -45,6 +47,8 @@ class Spelling:
         """Return the identifier of a symbol."""
         if isinstance(symbol, Symbol) and symbol.kind == ir.FIXED:
             return str(symbol.key[0])
+        if isinstance(symbol, Symbol) and symbol.kind == ir.LABEL:
+            return self.scope.request(symbol, str(symbol.key[0]))
         return self.scope[symbol]
 
     def substitute(self, declaration: ir.Declare) -> None:
@@ -61,7 +65,8 @@ class Spelling:
     def _spelt(self, value: ir.Value) -> tuple[str, int]:
         match value:
             case Expression():
-                return self._arithmetic(value), 1 if value.args else _ATOM
+                text, level = self._arithmetic.bound(value)
+                return text, _OF_ARITHMETIC[level]
             case ir.Name(symbol):
                 return self.name(symbol), _ATOM
             case ir.Constant(str() as text):
@@ -69,17 +74,21 @@ class Spelling:
             case ir.Constant(number):
                 return repr(number), _ATOM
             case ir.Member(record, name):
-                arrow = isinstance(record, ir.Name) and self.name(record.symbol) in self.dialect.pointers
-                return f"{self(record, _ATOM)}{'->' if arrow else '.'}{name}", _ATOM
+                text, last = self(record, _ATOM), record.name if isinstance(record, ir.Member) else self(record)
+                return f"{text}{'->' if last in self.dialect.pointers else '.'}{name}", _ATOM
             case ir.Entry(array, index):
                 return f"{self(array, _ATOM)}[{self(index)}]", _ATOM
             case ir.Binary(operator, left, right):
                 own, spelt = _STRENGTH[operator], self.dialect.operators.get(operator, operator)
                 return f"{self(left, own)} {spelt} {self(right, own + (operator != 'and'))}", own
+            case ir.Accumulated(start, terms):
+                return f"{self(start, 3)} + {self(terms)}", 3
+            case ir.Cast(inner):
+                return f"({self.dialect.operators['index']}){self(inner, _ATOM)}", _ATOM
             case ir.Select(condition, then, otherwise):
                 return self.dialect.select.format(self(condition), self(then), self(otherwise)), 0
-            case ir.Not(condition):
-                return f"{self.dialect.operators.get('not', '!')}{self(condition, _ATOM)}", _ATOM
+            case ir.Prefix(operator, inner):
+                return f"{self.dialect.operators.get(operator, operator)}{self(inner, _ATOM)}", _ATOM
             case ir.Grouped(inner):
                 return f"({self(inner)})", _ATOM
             case ir.Several(values):

@@ -285,7 +285,7 @@ def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]
     """Yield the statement that leaves out a sweep on boundary seams where colours fit the sizes."""
     if loop.selection.window is not None:
         beside = ir.Called("any", (), ir.Member(SITES, "beside"))
-        yield ir.If(ir.Not(beside), (ir.Return(unchanged),))
+        yield ir.If(ir.Prefix("not", beside), (ir.Return(unchanged),))
 
 
 def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:

@@ -18,7 +18,7 @@ DIALECT = Dialect(LANGUAGE, operators={"==": "===", "and": "&&"})
 
 def function(lowered: ir.Function, names: Iterable[str] = ()) -> str:
     """Return the text of a function on memory; ``names`` are those of other functions in the file."""
-    spelling = Spelling(DIALECT, _RESERVED | {*names}, lowered)
+    spelling = Spelling(DIALECT, _RESERVED | {*names}, lowered.body)
     head = f"function {camel(lowered.name)}({', '.join(lowered.parameters)}) {{"
     if not lowered.body:
         return "\n".join([*comment(lowered.doc), f"{head}}}"])

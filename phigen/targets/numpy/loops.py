@@ -30,7 +30,7 @@ DIALECT = Dialect(LANGUAGE, operators={"not": "not "}, select="np.where({0}, {1}
 
 def function(lowered: ir.Function) -> str:
     """Return the text of a function on whole arrays."""
-    spelling = Spelling(DIALECT, _ALWAYS | _RESERVED[lowered.role] | {*lowered.parameters}, lowered)
+    spelling = Spelling(DIALECT, _ALWAYS | _RESERVED[lowered.role] | {*lowered.parameters}, lowered.body)
     lines = [line for s in lowered.body for line in _statement(s, spelling, "    ")]
     return "\n".join([f"def _{lowered.name}({', '.join(lowered.parameters)}):", *lines, ""])
 

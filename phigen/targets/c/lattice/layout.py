@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from phigen.ir.lattice import begins, weights
+from phigen.ir.lattice import LatticeLoops, begins, weights
+from phigen.ir.passes.by_rows import RowLayout
 from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
@@ -14,6 +15,7 @@ from phigen.scheme.steps import BACK, Gather, Partners, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets import lattice
+from phigen.targets.c.kernels import members
 
 #: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
 MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
@@ -35,6 +37,20 @@ class Layout:
     weights: tuple[Symbol, ...]
     arrays: tuple[str, ...]
     slopes: bool = True  # whether code has how sweeps follow variations, or takes differences of them
+
+    def loops(self, program: Program) -> LatticeLoops:
+        """Return the builder of the loops."""
+        return LatticeLoops(program, self.step)
+
+    def rows(self, program: Program) -> RowLayout:
+        """Return the rows that loops read."""
+        return RowLayout(self.loops(program), self.lines, members(program))
+
+    def reserved(self, program: Program, stores: int) -> set[str]:
+        """Return the numbered identifiers that a loop with some stores uses."""
+        shares = {f"share{k}" for k in range(self.step.row + len(program.parameters))}
+        shares |= {f"{word}{k}" for word in ("add", "own") for k in range(stores)}
+        return shares | {f"there{k}" for k in range(len(self.weights))}
 
     def line(self, offset: Sequence[int]) -> int:
         """The line of a neighbour."""

@@ -6,6 +6,11 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from phigen.ir import nodes as ir
+from phigen.ir.passes import row_loops
+from phigen.ir.passes.by_rows import ROW
+from phigen.ir.passes.simultaneous import simultaneous
+from phigen.ir.passes.temporaries import temporaries
 from phigen.lanes.functions import REACHING
 from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.program import Program
@@ -13,12 +18,12 @@ from phigen.scheme.steps import Sweep
 from phigen.symbolic import functions as elementary
 from phigen.symbolic.expression import ONE, ZERO, gradient, substitute
 from phigen.symbolic.special import SPECIAL
-from phigen.symbolic.symbols import COEFFICIENT, PRESENT, Symbol, kind_of
+from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 from phigen.targets.c.kernels import FUNCTIONS, lane_calls
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
+from phigen.targets.c.lattice.names import told
 from phigen.targets.c.layout import comment
-from phigen.targets.code import Code, lower
+from phigen.targets.c.loops import statements
 from phigen.targets.header import plain, sentence
 
 #: The name of a part of H.
@@ -129,41 +134,16 @@ def _inside(kernel: Kernel) -> Kernel:
 
 
 def sweep_loop(program: Program, layout: Layout, sweep: Sweep, form: str, calls: Mapping[str, str]) -> Loop:
-    """A kernel as a loop that changes some fields of the sites of a row."""
-    kernel, name = sweep.kernel, program.name
-    code = lower(kernel)
-    moved, sums = {program.coordinates[i] for i in sweep.moved}, sweep.gather.names if sweep.gather else ()
-    names = SiteNames(program, layout, kernel, code, set() if sweep.is_tangent else moved, calls, sums)
-    body = names.loaded()
-    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    stores = [(program.coordinates[sweep.moved[s.index]], names.show(s.value)) for s in code.stores]
-    changes = [f"const double change{k} = {value};" for k, (_, value) in enumerate(stores)]
-    if len(stores) > 1:
-        body += changes
-        stores = [(f, f"change{k}") for k, (f, _) in enumerate(stores)]
-    head, here = _unused(code), layout.at(0)
-    if sweep.is_tangent:
-        out = {f: names.scope[Symbol("out", f)] for f in sorted(moved)}
-        arrays = {f: f"row->varied[{program.coordinates.index(f)}]" for f in out}
-        head += [f"    {line}" for line in pointers([("double *", f"{p} = {arrays[f]}{here}") for f, p in out.items()])]
-        body += [f"{out[f]}[i] += {value};" for f, value in stores]
-    elif program.compensated:
-        for k, (f, value) in enumerate(stores):
-            carry, field = names.scope[Symbol("carry", f)], f"{names.pointer(f, 0)}[i]"
-            head.append(f"    double *{carry} = row->s->carry[{program.coordinates.index(f)}]{here};")
-            body += [f"const double add{k} = {carry}[i] + {value}, sum{k} = {field} + add{k};"]
-            body += [f"{carry}[i] = add{k} - (sum{k} - {field});", f"{field} = sum{k};"]
-    else:
-        body += [f"{names.pointer(f, 0)}[i] {_added(names.scope[f], f in code.used, value)};" for f, value in stores]
-    coloured = layout.leaves_out(sweep.colour)
-    swept = sweep.colour if program.profile == "fast" or sweep.is_tangent else "row->swept"
-    first = f"{name}_first(row, {swept}, row->from)"
-    over = f"for (ptrdiff_t i = {first}, to = row->to; i < to; i += {layout.colour_step})" if coloured else OVER_SITES
-    text = looped(head, names, body, name, over)
-    shared = (
-        "_".join(["tangent" if sweep.is_tangent else "sweep", *(program.coordinates[i] for i in sweep.moved)]) + form
-    )
-    return Loop(kernel.name + form, _purpose(kernel, form), told(program), text, shared)
+    """Return the loop that updates some fields of the sites of a row, or their variation."""
+    built = simultaneous(temporaries(layout.loops(program).sweep(sweep)))
+    known = program.profile == "fast" or sweep.is_tangent
+    swept: ir.Value | None = ir.Constant(sweep.colour) if known else ir.Member(ROW, "swept")
+    swept = swept if layout.leaves_out(sweep.colour) else None
+    body = row_loops.sweep(built, layout.rows(program), swept, compensated=program.compensated)
+    fields = [program.coordinates[i] for i in sweep.moved]
+    shared = "_".join(["tangent" if sweep.is_tangent else "sweep", *fields]) + form
+    text = statements(body, program.name, calls, layout.reserved(program, len(sweep.kernel.roots)))
+    return Loop(sweep.kernel.name + form, _purpose(sweep.kernel, form), told(program), text, shared)
 
 
 def _purpose(kernel: Kernel, form: str) -> str:
@@ -171,39 +151,15 @@ def _purpose(kernel: Kernel, form: str) -> str:
     return next((text for key, text in other.items() if form.endswith(key)), kernel.purpose)
 
 
-def _unused(code: Code) -> list[str]:
-    return [] if any(kind_of(s) == COEFFICIENT for s in code.used) else ["    (void)coef;"]
-
-
 def middle_loop(
     program: Program, layout: Layout, kernel: Kernel, form: str, calls: Mapping[str, str], assign: str
 ) -> Loop:
     """A kernel as a loop from y, of which rows are told, into or onto what they call out."""
-    code = lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), calls, layout.gathered(kernel).names)
-    fields = program.coordinates
-    outputs = (
-        [Symbol("out", f, g) for f in fields for g in fields]
-        if kernel.role is Role.OWN_SLOPE
-        else [Symbol("out", f) for f in fields]
-    )
-    out = [names.scope[s] for s in outputs]
-    places = [("double *restrict ", f"{p} = row->out[{k}]{layout.at(0)}") for k, p in enumerate(out)]
-    head = [*_unused(code), *(f"    {line}" for line in pointers(places))]
-    body = names.loaded()
-    body += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    body += [f"{out[s.index]}[i] {assign} {names.show(s.value)};" for s in code.stores]
-    text = looped(head, names, body, program.name)
+    built, fields = temporaries(layout.loops(program).stage(kernel)), program.coordinates
+    if kernel.role is Role.OWN_SLOPE:
+        outputs = [Symbol("out", f, g) for f in fields for g in fields]
+    else:
+        outputs = [Symbol("out", f) for f in fields]
+    body = row_loops.stage(built, layout.rows(program), outputs, adds=assign == "+=")
+    text = statements(body, program.name, calls, layout.reserved(program, len(kernel.roots)))
     return Loop(kernel.name + form, _purpose(kernel, form), told(program), text)
-
-
-def _added(name: str, read: bool, value: str) -> str:
-    """What is added to a field, which may have been read before."""
-    return f"= {name} + {value}" if read else f"+= {value}"
-
-
-def looped(head: list[str], names: SiteNames, body: list[str], name: str, over: str = OVER_SITES) -> str:
-    """The declarations of what is read before a loop over sites, and that loop."""
-    lines = [*head, *(f"    {line}" for line in names.pointers())]
-    lines += [f"    {name}_EACH_SITE", f"    {over} {{", *(f"        {line}" for line in body), "    }"]
-    return "\n".join(lines) + "\n"

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Set
 
-from phigen.scheme.kernel import Kernel
+from phigen.ir import nodes as ir
+from phigen.ir.passes import row_loops
+from phigen.ir.passes.by_rows import AT_BONDS
+from phigen.ir.passes.temporaries import temporaries
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, chosen_ends
 from phigen.targets.c.lattice.loops import Loop, in_loops, seen_calls
-from phigen.targets.c.lattice.names import OVER_SITES, SiteNames, pointers, told
-from phigen.targets.code import Code, lower
+from phigen.targets.c.lattice.names import told
+from phigen.targets.c.loops import statements
 
 
 def partners(program: Program, layout: Layout) -> Iterator[str]:
@@ -26,16 +29,11 @@ def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> 
     seen = source == "params" and gather in (layout.partners.energy, layout.partners.field)
     calls = seen_calls(program) if seen else in_loops(program)
     for number, (ends, opposite) in enumerate(over_ends(gather)):
-        unused = ["(void)coef;"] * (source == "coef" and lower(ends.kernel).used.isdisjoint(ends.kernel.inputs["coef"]))
         more = told_of_bonds(program, layout, ends, opposite) if source == "coef" else {}
-        if layout.graph:
-            text = _over_bonds(program, layout, ends, calls, unused, more, first=number == 0, opposite=opposite)
-        else:
-            targets = [f"g{k}" for k in range(len(gather.names))]
-            sums = pointers([("double *restrict ", f"{t} = row->s->gathered[{k}]") for k, t in enumerate(targets)])
-            body = [f"{t}[i] += i == j ? 0.0 : {{{k}}};" for k, t in enumerate(targets)]
-            begin = [f"{OVER_SITES} {' = '.join(f'{t}[i]' for t in targets)} = 0.0;"]
-            text = _over_pairs(program, layout, ends.kernel, calls, [*unused, *sums, *begin], body)
+        one = bond_loop(program, layout, ends, opposite, more)
+        rows = layout.rows(program)
+        body = row_loops.over_bonds(one, rows, first=number == 0) if layout.graph else row_loops.over_pairs(one, rows)
+        text = statements(body, program.name, calls, layout.reserved(program, len(ends.kernel.roots)))
         arguments = ", ".join([told(program, source), *(f"{kind}{name}" for name, kind in more.items())])
         yield Loop(ends.kernel.name, ends.kernel.purpose, arguments, text)
 
@@ -70,78 +68,10 @@ def told_of_bonds(program: Program, layout: Layout, ends: Ends, opposite: Set[st
     return told | ({"across": "int "} if both else {})
 
 
-def _over_bonds(
-    program: Program,
-    layout: Layout,
-    ends: Ends,
-    calls: Mapping[str, str],
-    begin: Sequence[str],
-    more: Collection[str],
-    *,
-    first: bool,
-    opposite: Set[str],
-) -> str:
-    """A loop over sites a, in it one over the bonds that they have to sites b, of which it may be told ``more``;
-    parameters that are ``opposite`` have the other sign where the site is the end of the bond."""
-    code = lower(ends.kernel)
-    place, one = ("at_bonds", "sign") if "sign" in more else ("row->s->at_bonds", "1.0")
-    names = SiteNames(program, layout, ends.kernel, code, set(), calls, opposite=opposite, at_bonds=place)
-    count = len(code.stores)
-    added = [*added_up(ends, code, names, told="across" in more, one=one, opposite=opposite)]
-    out = [f"row->s->gathered[{k}][i] {'' if first else '+'}= sum{k};" for k in range(count)]
-    return "\n".join(
-        [
-            *(f"    {line}" for line in [*begin, *names.pointers()]),
-            f"    {OVER_SITES} {{",
-            *(f"        {line}" for line in [*names.of_pair(code)[1], sums_of(count), *added, *out]),
-            "    }\n",
-        ]
-    )
-
-
-def sums_of(count: int) -> str:
-    """The declaration of what is added up at a site."""
-    return f"double {', '.join(f'sum{k} = 0.0' for k in range(count))};"
-
-
-def added_up(
-    ends: Ends, code: Code, names: SiteNames, *, opposite: Set[str], told: bool = False, one: str = "1.0"
-) -> Iterator[str]:
-    """The loop over the bonds of a site i that adds up what they add there; ``one`` is the side that they are seen
-    from."""
-    loop, passed = bonds_of(ends, told=told)
-    other = names.of_pair(code)[0]
-    inner = [*passed, *["const ptrdiff_t j = row->s->other[k];"] * bool(other)]
-    inner += [f"const double side = k < row->s->middle[i] ? {one} : -{one};"] * bool(opposite)
-    inner += other
-    inner += [f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments]
-    inner += [f"sum{s.index} += {names.show(s.value)};" for s in code.stores]
-    yield from (loop, *(f"    {line}" for line in inner), "}")
-
-
-def _over_pairs(
-    program: Program,
-    layout: Layout,
-    kernel: Kernel,
-    calls: Mapping[str, str],
-    begin: Sequence[str],
-    body: Sequence[str],
-) -> str:
-    """A loop over all sites b, in it one over the sites a of a piece; statements with the values of the kernel."""
-    name, code = program.name, lower(kernel)
-    names = SiteNames(program, layout, kernel, code, set(), calls)
-    other, own = names.of_pair(code)
-    lines = [*own, *(f"const double {names.scope[a.target]} = {names.show(a.value)};" for a in code.assignments)]
-    lines += [text.format(*(names.show(s.value) for s in code.stores)) for text in body]
-    return "\n".join(
-        [
-            *(f"    {line}" for line in [*names.pointers(), *begin]),
-            "    for (ptrdiff_t j = 0; j < row->s->length; ++j) {",
-            *(f"        {line}" for line in other),
-            f"        {name}_EACH_SITE",
-            f"        {OVER_SITES} {{",
-            *(f"            {line}" for line in lines),
-            "        }",
-            "    }\n",
-        ]
-    )
+def bond_loop(
+    program: Program, layout: Layout, ends: Ends, oriented: Set[str], told: Collection[str] = ()
+) -> row_loops.BondLoop:
+    """Return the function of one loop over bonds or pairs, which is ``told`` some of `told_of_bonds`."""
+    built = temporaries(layout.loops(program).sums(ends))
+    at_bonds: ir.Value = ir.fixed("at_bonds") if "at_bonds" in told else AT_BONDS
+    return row_loops.BondLoop(built, frozenset(oriented), at_bonds, "sign" in told, "across" in told)

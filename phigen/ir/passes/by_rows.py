@@ -1,0 +1,264 @@
+"""Lowering by rows: loops over a piece of a row, with pointers to that row of each array and to the rows beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from phigen.ir import nodes as ir
+from phigen.ir.lattice import LatticeLoops
+from phigen.ir.nodes import Storage
+from phigen.symbolic.symbols import Symbol
+
+SITE, OTHER, BOND, ROW = (ir.fixed(name) for name in ("i", "j", "k", "row"))
+SOLVER, AT_BONDS = ir.Member(ROW, "s"), ir.Member(ir.Member(ROW, "s"), "at_bonds")
+FROM, TO, LENGTH = ir.Member(ROW, "from"), ir.Member(ROW, "to"), ir.Member(SOLVER, "length")
+
+READ, WRITTEN = ir.Pointer(constant=True, restricted=True), ir.Pointer(constant=False, restricted=True)
+#: The member of a row that holds the arrays of each kind of storage.
+_MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "start", Storage.OUTPUT: "out"}
+
+
+@dataclass(frozen=True)
+class RowLayout:
+    """The rows that functions read, by their offsets beside the row of the loop, and the members of ``params``."""
+
+    lattice: LatticeLoops
+    lines: tuple[tuple[int, ...], ...]
+    members: Mapping[str, str]
+
+    @property
+    def single_row(self) -> bool:
+        """Whether the lattice has one axis, and so one row."""
+        return len(self.lattice.step.sites.axes) == 1
+
+    @property
+    def colour_step(self) -> int:
+        """The distance in a row from a site to the next of its colour."""
+        sites = self.lattice.step.sites
+        return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
+
+    def line(self, offset: Sequence[int]) -> int:
+        """Return the number of the row at an offset."""
+        return self.lines.index(tuple(offset[:-1])) if any(offset) else 0
+
+    def place(self, line: int) -> str:
+        """Return where a row is, beside that of the loop, for readers."""
+        axes = zip(self.lattice.step.sites.axes, self.lines[line], strict=False)
+        return ", ".join(f"{axis} {'+' if o > 0 else '-'} {abs(o)}" for axis, o in axes if o)
+
+    def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
+        """Return the address of a row of an array, by the member that holds the ``rows``."""
+        return arrays if self.single_row else ir.Binary("+", arrays, ir.Entry(ir.Member(ROW, rows), ir.Constant(line)))
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a function reads: ``updated`` fields are written too; ``seeds`` are the arrays of cotangents of each kind.
+
+    Functions that sum over bonds at each site have the sums in ``local`` variables. The site of the loop is the end
+    ``here`` of a bond or pair; parameters at bonds are in ``at_bonds``, of which ``oriented`` ones have the opposite
+    sign seen from the end b.
+    """
+
+    updated: frozenset[str] = frozenset()
+    seeds: Mapping[str, Sequence[ir.Value]] = field(default_factory=dict)
+    local: bool = False
+    here: str = "a"
+    oriented: frozenset[str] = frozenset()
+    at_bonds: ir.Value = AT_BONDS
+
+
+@dataclass
+class Rows:
+    """The declarations that a function needs: those before its loop, and those at the site and at the other one."""
+
+    layout: RowLayout
+    how: Reading = field(default_factory=Reading)
+    once: list[tuple[str, ir.Value]] = field(default_factory=list)
+    substituted: list[ir.Statement] = field(default_factory=list)
+    starts: dict[str, tuple[ir.Pointer, ir.Value]] = field(default_factory=dict)
+    rows: dict[tuple[str, int], ir.Name] = field(default_factory=dict)
+    loaded: dict[str, ir.Value] = field(default_factory=dict)
+    weights: list[ir.Statement] = field(default_factory=list)
+    own: list[tuple[str, ir.Value]] = field(default_factory=list)
+    other: dict[str, ir.Value] = field(default_factory=dict)
+    computed: list[ir.Statement] = field(default_factory=list)
+
+    def read(self, body: Iterable[ir.Statement]) -> Rows:
+        """Take the declarations of some statements; those of temporaries are ``computed``."""
+        for s in body:
+            match s:
+                case ir.Declare(items=((name, value),)):
+                    self._declare(s, name, value)
+        return self
+
+    def _declare(self, s: ir.Declare, name: str, value: ir.Value) -> None:
+        match value:
+            case ir.Coefficient(k):
+                self._once(name, ir.fixed(f"c{k}"), ir.Entry(ir.fixed("coef"), ir.Constant(k)))
+            case ir.Time():
+                self.once.append((name, ir.Member(SOLVER, "now")))
+            case ir.SystemParameter(parameter):
+                self.once.append((name, ir.Member(ir.Member(SOLVER, "params"), self.layout.members[parameter])))
+            case ir.BondParameter(number, parameter):
+                at_bond = ir.Entry(ir.Entry(self.how.at_bonds, ir.Constant(number)), BOND)
+                oriented = parameter in self.how.oriented
+                self.other[name] = ir.Binary("*", ir.fixed("side"), at_bond) if oriented else at_bond
+            case ir.HasColour():
+                chosen = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
+                self._substitute(name, ir.Select(chosen, ir.Constant(1.0), ir.Constant(0.0)))
+            case ir.Inside():
+                self._inside(name, value)
+            case ir.OnSeam():
+                self._on_seam(name, value)
+            case ir.Load():
+                self._load(name, value)
+            case _:
+                self.computed.append(s)
+
+    def _once(self, name: str, called: ir.Name, value: ir.Value) -> None:
+        self.once.append((called.symbol, value))
+        self._substitute(name, called)
+
+    def _substitute(self, name: str, value: ir.Value) -> None:
+        self.substituted.append(ir.in_place(name, value))
+
+    def _load(self, name: str, load: ir.Load) -> None:
+        array, beside = load.array, any(load.offset)
+        match array.storage:
+            case Storage.SUM if self.how.local:
+                self._substitute(name, ir.fixed(f"sum{array.number}"))
+            case Storage.SUM:
+                self._substitute(name, ir.Entry(_gathered(array.number), SITE))
+            case Storage.SEED if load.offset:
+                line = self.layout.line(load.offset)
+                pointer = ir.Name(Symbol("around", array.number, line))
+                self._start(pointer, READ, self.layout.row(self.how.seeds["around"][array.number], line))
+                self._substitute(name, _beside(pointer, load))
+            case Storage.SEED:
+                self._at_end(name, self.how.seeds[array.name][array.number], load)
+            case Storage.START:
+                pointer = ir.Name(Symbol("start", array.name))
+                self._start(pointer, READ, self.layout.row(_member(array)))
+                self._substitute(name, ir.Entry(pointer, SITE))
+            case Storage.VARIATION:
+                line = self.layout.line(load.offset)
+                pointer = ir.Name(Symbol("varied", array.name, line))
+                self._start(pointer, ir.Pointer(), self.layout.row(_member(array), line))
+                if load.end:
+                    self._at_end(name, pointer, load)
+                else:
+                    self._substitute(name, _beside(pointer, load))
+            case _:
+                pointer = self.pointer(array.name, self.layout.line(load.offset))
+                if load.end == self.how.here and self.how.local:
+                    self._substitute(name, ir.Name(array.name))
+                    self.loaded[array.name] = ir.Entry(pointer, SITE)
+                elif beside:
+                    self._substitute(name, _beside(pointer, load))
+                else:
+                    self._at_end(name, pointer, load)
+
+    def _at_end(self, name: str, pointer: ir.Value, load: ir.Load) -> None:
+        """Declare a value at the site of the loop, or at the other end of a bond or pair."""
+        if not load.end:
+            self.loaded[name] = ir.Entry(pointer, SITE)
+        elif load.end == self.how.here:
+            self.own.append((name, ir.Entry(pointer, SITE)))
+        else:
+            self.other[name] = ir.Entry(pointer, OTHER)
+
+    def _inside(self, name: str, value: ir.Inside) -> None:
+        called, number = ir.fixed(f"w{value.number}"), ir.Constant(value.number)
+        in_row: ir.Value = ir.Entry(ir.Member(ROW, "present"), number)
+        low, high = value.bounds[-1]
+        tests = [ir.Binary(">=", ir.plus(SITE, low), ir.Constant(0))] * (low < 0)
+        tests += [ir.Binary("<", ir.plus(SITE, high), LENGTH)] * (high > 0)
+        if not tests:
+            self._once(name, called, in_row)
+            return
+        there: ir.Value = ir.Constant(1.0)
+        if not self.layout.single_row:  # read before the loop, or gcc would not vectorise that
+            there = ir.fixed(f"there{value.number}")
+            self.once.append((there.symbol, in_row))
+        condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)
+        self._weight(name, called, ir.Select(condition, there, ir.Constant(0.0)))
+
+    def _on_seam(self, name: str, value: ir.OnSeam) -> None:
+        line = self.layout.line(value.offset)
+        kinds, window = ir.Name(Symbol("kinds", line)), ir.Name(Symbol("window"))
+        self._start(kinds, READ, self.layout.row(ir.Member(SOLVER, "kinds"), line))
+        if (window.symbol, ir.Member(ROW, "window")) not in self.once:
+            self.once.append((window.symbol, ir.Member(ROW, "window")))
+        wanted = ir.Binary("+", window, ir.Constant(float(value.colour)))
+        own = ir.Binary("==", ir.Entry(kinds, ir.plus(SITE, value.offset[-1])), wanted)
+        self._weight(name, ir.fixed(f"w{value.number}"), ir.Select(own, ir.Constant(1.0), ir.Constant(0.0)))
+
+    def _weight(self, name: str, called: ir.Name, value: ir.Value) -> None:
+        self.weights.append(ir.real(called.symbol, value))
+        self._substitute(name, called)
+
+    def _start(self, pointer: ir.Name, kind: ir.Pointer, row: ir.Value) -> None:
+        self.starts.setdefault(pointer.symbol, (kind, row))
+
+    def pointer(self, base: str, line: int = 0) -> ir.Name:
+        """Return the pointer to a row of an array of the state."""
+        return self.rows.setdefault((base, line), ir.label(f"{base}_row{line or ''}"))
+
+    def before(self) -> Iterator[ir.Statement]:
+        """Yield the declarations before the loop."""
+        for updated in sorted(self.how.updated):
+            self.pointer(updated)
+        first, beside = dict(self.starts), list[ir.Statement]()
+        for (base, line), name in self.rows.items():
+            written = base in self.how.updated
+            kind = ir.Pointer(constant=not (written and line == 0), restricted=not written)
+            number = self.layout.lattice.arrays.index(base)
+            row = self.layout.row(ir.Entry(ir.Member(ROW, "x"), ir.Constant(number)), line)
+            if line:
+                beside.append(ir.Declare(kind, ((name.symbol, row),), note=self.layout.place(line)))
+            else:
+                first[name.symbol] = kind, row
+        yield from (*self.substituted, *together(self.once), *grouped(first), *beside)
+
+    def at_site(self) -> list[ir.Statement]:
+        """Return the declarations at the beginning of the loop over sites."""
+        return [*together(self.loaded.items()), *self.weights]
+
+
+def lowered(function: ir.Function) -> ir.Loop:
+    """Return the loop of a function on the level of sites."""
+    loop = function.body[-1]
+    assert isinstance(loop, ir.Loop)
+    return loop
+
+
+def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **more: object) -> ir.Loop:
+    """Return the loop over the sites of a piece of a row."""
+    loop = ir.Loop("row", tuple(body), low=FROM, high=TO, limit="to", independent=independent)
+    return replace(loop, **more)  # type: ignore[arg-type]
+
+
+def together(values: Iterable[tuple[str, ir.Value]]) -> list[ir.Statement]:
+    """Return one declaration of several reals."""
+    items = tuple(values)
+    return [ir.Declare(ir.Type.REAL, items)] if items else []
+
+
+def grouped(pointers: Mapping[str, tuple[ir.Pointer, ir.Value]]) -> Iterator[ir.Statement]:
+    """Yield the declarations of pointers, one for each type."""
+    for kind in dict.fromkeys(kind for kind, _ in pointers.values()):
+        yield ir.Declare(kind, tuple((name, row) for name, (own, row) in pointers.items() if own == kind))
+
+
+def _member(array: ir.Array) -> ir.Value:
+    return ir.Entry(ir.Member(ROW, _MEMBERS[array.storage]), ir.Constant(array.number))
+
+
+def _gathered(number: int) -> ir.Value:
+    return ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(number))
+
+
+def _beside(pointer: ir.Name, load: ir.Load) -> ir.Value:
+    return ir.Entry(pointer, ir.plus(SITE, load.offset[-1] if load.offset else 0))

@@ -1,0 +1,256 @@
+"""Lowering by rows of sweeps, stages, observables and sums over bonds or pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.ir import nodes as ir
+from phigen.ir.nodes import Role
+from phigen.ir.passes.by_rows import (
+    AT_BONDS,
+    BOND,
+    FROM,
+    LENGTH,
+    OTHER,
+    ROW,
+    SITE,
+    SOLVER,
+    WRITTEN,
+    Reading,
+    RowLayout,
+    Rows,
+    grouped,
+    lowered,
+    over_sites,
+    together,
+)  # fmt: skip
+from phigen.symbolic.expression import ZERO as NOTHING
+from phigen.symbolic.expression import Expression
+from phigen.symbolic.symbols import Symbol
+
+COEF, OUT = ir.fixed("coef"), ir.fixed("out")
+OTHER_SITE = ir.Entry(ir.Member(SOLVER, "other"), BOND)
+ZERO, ONE = ir.Constant(0.0), ir.Constant(1.0)
+
+
+def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, compensated: bool = False) -> ir.Block:
+    """Return the statements of a sweep; of one colour it updates the sites that have the colour ``swept``."""
+    loop, tangent = lowered(function), function.role is Role.TANGENT_SWEEP
+    stores = [s for s in loop.body if isinstance(s, ir.Store)]
+    updated = frozenset(s.array.name for s in stores) if not tangent else frozenset[str]()
+    rows = Rows(layout, Reading(updated)).read((*function.body, *loop.body))
+    head, body = unread_coefficients(rows), [*rows.at_site(), *rows.computed]
+    if tangent:
+        head += grouped({Symbol("out", s.array.name): (ir.Pointer(constant=False), layout.row(_varied(s.array.number)))
+                         for s in sorted(stores, key=lambda s: s.array.name)})  # fmt: skip
+        body += [ir.Assign(_at_site(Symbol("out", s.array.name)), s.value, adds=True) for s in stores]
+    for k, s in enumerate(stores if not tangent else ()):
+        field = ir.Entry(rows.pointer(s.array.name), SITE)
+        if compensated:
+            carry = ir.Name(Symbol("carry", s.array.name))
+            memory = ir.Entry(ir.Member(SOLVER, "carry"), ir.Constant(s.array.number))
+            head.append(ir.Declare(ir.Pointer(constant=False), ((carry.symbol, layout.row(memory)),)))
+            body += _compensated(k, field, ir.Entry(carry, SITE), s.value)
+        elif s.array.name in rows.loaded:
+            body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
+        else:
+            body.append(ir.Assign(field, s.value, adds=True))
+    if swept is None:
+        return (*head, *rows.before(), over_sites(body))
+    first = ir.Called("first", (ROW, swept, FROM))
+    return (*head, *rows.before(), over_sites(body, low=first, step=ir.Constant(layout.colour_step)))
+
+
+def _compensated(k: int, field: ir.Value, carry: ir.Value, change: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statements of a compensated sum: what rounding leaves out is carried to the next one."""
+    add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
+    items = ((add.symbol, ir.Accumulated(carry, change)), (total.symbol, ir.Binary("+", field, add)))
+    yield ir.Declare(ir.Type.REAL, items)
+    yield ir.Assign(carry, ir.Binary("-", add, ir.Binary("-", total, field)))
+    yield ir.Assign(field, total)
+
+
+def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Block:
+    """Return the statements of a kernel of the equation of a stage, which assigns or adds to its outputs."""
+    loop = lowered(function)
+    rows = Rows(layout).read((*function.body, *loop.body))
+    arrays = {name: layout.row(ir.Entry(ir.Member(ROW, "out"), ir.Constant(k))) for k, name in enumerate(outputs)}
+    head = [*unread_coefficients(rows), *grouped({name: (WRITTEN, array) for name, array in arrays.items()})]
+    stores = (s for s in loop.body if isinstance(s, ir.Store))
+    updates = (ir.Assign(_at_site(outputs[s.array.number]), s.value, adds) for s in stores)
+    body = (*rows.at_site(), *rows.computed, *updates)
+    return (*head, *rows.before(), over_sites(body))
+
+
+@dataclass(frozen=True)
+class BondLoop:
+    """A function that sums over bonds or pairs, on the level of sites; see `Reading` for ``oriented`` and ``at_bonds``.
+
+    Its callers may say the ``sign`` of the direction of bonds, and whether the sites of the colour of the sweep lie
+    ``across`` the bonds.
+    """
+
+    function: ir.Function
+    oriented: frozenset[str] = frozenset()
+    at_bonds: ir.Value = AT_BONDS
+    sign: bool = False
+    across: bool = False
+
+    @property
+    def loop(self) -> ir.Loop:
+        """The loop over bonds or pairs."""
+        return lowered(self.function)
+
+    @property
+    def stores(self) -> list[ir.Store]:
+        """The values that are summed."""
+        return [s for s in self.loop.body if isinstance(s, ir.Store)]
+
+
+def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str]) -> ir.Block:
+    """Return the statements of a density, an energy or the vector field, after ``calls`` that sum over bonds."""
+    loop = lowered(function)
+    rows = Rows(layout).read((*function.body, *loop.body))
+    early = [ir.Call(name, (ROW,)) for name in calls]
+    body = (*rows.at_site(), *rows.computed, *_observed(loop))
+    return (*early, *_apart(loop), *rows.before(), over_sites(body))
+
+
+def observable_with_bonds(function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop]) -> ir.Block:
+    """Return the same where each site sums over its bonds itself."""
+    loop = lowered(function)
+    oriented = frozenset[str]().union(*(s.oriented for s in sums))
+    own = [*function.body, *(s for one in sums for s in one.function.body)]
+    once = sorted((s for s in own if isinstance(s, ir.Declare)), key=lambda s: isinstance(s.items[0][1], ir.Time))
+    rows = Rows(layout, Reading(local=True, oriented=oriented)).read(dict.fromkeys(once)).read(loop.body)
+    computed, inner = rows.computed, []
+    rows.read(sorted((s for one in sums for s in one.loop.body if not _is_computed(s)), key=_at_bond))
+    for one in sums:
+        rows.computed = [s for s in one.loop.body if _is_computed(s)]
+        inner.append(_summed_over_bonds(one, rows))
+    count = max((s.array.number for one in sums for s in one.stores), default=0) + 1
+    body = (*rows.at_site(), _zeros(count), *inner, *computed, *_observed(loop))
+    return (*_apart(loop), *rows.before(), over_sites(body, ""))
+
+
+def _is_computed(s: ir.Statement) -> bool:
+    return isinstance(s, ir.Declare) and isinstance(s.items[0][1], Expression)
+
+
+def _at_bond(s: ir.Statement) -> bool:
+    return isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.BondParameter)
+
+
+def _apart(loop: ir.Loop) -> list[ir.Statement]:
+    """Return the declaration of the distance between outputs, where there are several."""
+    several = any(isinstance(s, ir.Store) and s.array.number for s in loop.body)
+    return [ir.index(ir.fixed("apart"), ir.Cast(ir.Member(SOLVER, "sites")))] * several
+
+
+def _observed(loop: ir.Loop) -> Iterator[ir.Statement]:
+    """Yield the stores of what callers see; a share that is added to the first value is a term of it."""
+    stores = [s for s in loop.body if isinstance(s, ir.Store)]
+    shares = [s.value for s in stores if s.adds]
+    for s in stores:
+        if not s.adds:
+            k = s.array.number
+            place: ir.Value = SITE
+            if k:
+                apart = ir.fixed("apart")
+                place = ir.Binary("+", apart if k == 1 else ir.Binary("*", ir.Constant(k), apart), SITE)
+            value = s.value
+            for share in shares:
+                value = share if value is NOTHING else ir.Binary("+", value, share)
+            yield ir.Assign(ir.Entry(OUT, ir.Binary("-", place, FROM)), value)
+
+
+def over_bonds(one: BondLoop, layout: RowLayout, *, first: bool) -> ir.Block:
+    """Return the statements that sum over the bonds of each site; those that are not ``first`` add to the sums."""
+    rows = Rows(layout, Reading(oriented=one.oriented, at_bonds=one.at_bonds))
+    rows.read((*one.function.body, *one.loop.body))
+    count = len(one.stores)
+    sums = (ir.Entry(ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k)), SITE) for k in range(count))
+    out = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
+    body = (*together(rows.own), _zeros(count), _summed_over_bonds(one, rows), *out)
+    return (*_unread_source(one.function, rows), *rows.before(), over_sites(body, ""))
+
+
+def _zeros(count: int) -> ir.Declare:
+    items = tuple((ir.fixed(f"sum{k}").symbol, ZERO) for k in range(count))
+    return ir.Declare(ir.Type.REAL, items, mutable=True)
+
+
+def _summed_over_bonds(one: BondLoop, rows: Rows) -> ir.Loop:
+    """Return the loop over the bonds of a site."""
+    sign = ir.fixed("sign") if one.sign else ONE
+    body = [*bond_reads(one.loop, rows, told=one.across, oriented=bool(one.oriented), sign=sign), *rows.computed]
+    body += [ir.Assign(ir.fixed(f"sum{s.array.number}"), s.value, adds=True) for s in one.stores]
+    return bonds_of(one.loop, body, told=one.across)
+
+
+def bond_reads(
+    loop: ir.Loop, rows: Rows, *, oriented: bool, sign: ir.Value, told: bool = False
+) -> Iterator[ir.Statement]:
+    """Yield the statements that pass over bonds without a site of the chosen colour, and that read at their ends."""
+    names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
+    other = [(name, rows.other[name]) for name in rows.other if name in names]
+    across = ir.Select(ir.fixed("across"), OTHER_SITE, SITE) if told else OTHER_SITE
+    if told or loop.chosen == "there":
+        colour = ir.Entry(ir.Member(SOLVER, "colours"), across)
+        yield ir.If(ir.Binary("!=", colour, ir.Member(ROW, "chosen")), (ir.Continue(),))
+    if other:
+        yield ir.index(OTHER, OTHER_SITE)
+    if oriented:
+        yield ir.real(ir.fixed("side").symbol, side(sign))
+    yield from together(other)
+
+
+def side(sign: ir.Value) -> ir.Value:
+    """Return the sign of the direction of a bond, seen from the site."""
+    middle = ir.Entry(ir.Member(SOLVER, "middle"), SITE)
+    minus = ir.Constant(-sign.value) if isinstance(sign, ir.Constant) else ir.Prefix("-", sign)  # type: ignore[operator]
+    return ir.Select(ir.Binary("<", BOND, middle), sign, minus)
+
+
+def bonds_of(loop: ir.Loop, body: Iterable[ir.Statement], *, told: bool = False) -> ir.Loop:
+    """Return the loop over the bonds of a site i, those that it begins or ends or both."""
+    first, middle = (ir.Entry(ir.Member(SOLVER, name), SITE) for name in ("bonds", "middle"))
+    end = ir.Entry(ir.Member(SOLVER, "bonds"), ir.plus(SITE, 1))
+    low, high = {"": (first, end), "a": (first, middle), "b": (middle, end)}[loop.end]
+    here = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
+    condition = here if loop.chosen == "here" and not told else None
+    return ir.Loop("plain", tuple(body), "k", low, high, condition=condition)
+
+
+def over_pairs(one: BondLoop, layout: RowLayout) -> ir.Block:
+    """Return the statements that sum over all other sites, for the sites of a piece of a row."""
+    rows = Rows(layout).read((*one.function.body, *one.loop.body))
+    sums = [ir.fixed(f"g{s.array.number}") for s in one.stores]
+    arrays = {g.symbol: (WRITTEN, ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k))) for k, g in enumerate(sums)}
+    places = [ir.Entry(g, SITE) for g in sums]
+    clear = over_sites((ir.Assign(places[0], ZERO, too=tuple(places[1:])),), "", kind="line")
+    same = ir.Binary("==", SITE, OTHER)
+    values = [ir.Select(same, ZERO, s.value) for s in one.stores]
+    updates = (ir.Assign(place, value, adds=True) for place, value in zip(places, values, strict=True))
+    inner = over_sites((*together(rows.own), *rows.computed, *updates))
+    outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
+    return (*rows.before(), *_unread_source(one.function, rows), *grouped(arrays), clear, outer)
+
+
+def unread_coefficients(rows: Rows) -> list[ir.Statement]:
+    """Return the statement that the argument for coefficients is not read, where that is so."""
+    read = any(isinstance(value, ir.Entry) and value.array == COEF for _, value in rows.once)
+    return [] if read else [ir.Discard("coef")]
+
+
+def _unread_source(function: ir.Function, rows: Rows) -> list[ir.Statement]:
+    return unread_coefficients(rows) if "coef" in function.parameters else []
+
+
+def _varied(number: int) -> ir.Value:
+    return ir.Entry(ir.Member(ROW, "varied"), ir.Constant(number))
+
+
+def _at_site(name: str) -> ir.Value:
+    return ir.Entry(ir.Name(name), SITE)
