@@ -14,6 +14,7 @@ from functools import cached_property
 from phigen.ir import nodes as ir
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
+from phigen.scheme.reversal import UNDONE
 from phigen.scheme.steps import Ends, Gather, Sweep, Sweeps
 from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
@@ -78,8 +79,7 @@ class LatticeLoops:
 
     def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
         """Return the transpose of a sweep, whose kernel is ``kernel``."""
-        fields = [self.program.coordinates[k] for k in sweep.moved]
-        stores = self._cotangents(kernel, sweep.gather.names if sweep.gather else (), fields)
+        stores = self._cotangents(kernel, sweep.gather.names if sweep.gather else ())
         role = ir.Role.TRANSPOSED_SWEEP
         return self._over_sites(kernel, role, ("coef",), stores, sweep.gather, self._selection(sweep))
 
@@ -87,6 +87,12 @@ class LatticeLoops:
         """Return the transpose of a kernel of the equation of a stage, which reads sums over bonds or pairs or not."""
         stores = self._cotangents(kernel, gather.names if gather else ())
         return self._over_sites(kernel, ir.Role.TRANSPOSED_STAGE, ("coef",), stores, gather)
+
+    def recomputing(self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str]) -> ir.Function:
+        """Return either, which reads ``sums`` that are there already and recomputes ``fields`` before a sweep."""
+        once, reads = self._reads(kernel, sums)
+        loop = ir.Loop("sites", (*reads, *self._cotangents(kernel, sums, fields)))
+        return ir.Function(kernel.name, kernel.purpose, ir.Role.TRANSPOSED_SWEEP, ("coef",), (*once, loop))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
         """Return the transpose of the function that sums over bonds or pairs, by their transposed kernel."""
@@ -100,10 +106,10 @@ class LatticeLoops:
         """Yield what a transposed kernel stores, zeros left out; ``fields`` are those that it recomputes."""
         for output in kernel.outputs:
             array = output.name.removesuffix("_bar")
+            names = fields if array == UNDONE else kernel.inputs.get(array, [""] * len(output.values))
             for k, e in enumerate(output.values):
                 if not e.is_zero:
-                    name = kernel.inputs[array][k] if array in kernel.inputs else fields[k]
-                    yield self._cotangent(array, k, name, e, sums)
+                    yield self._cotangent(array, k, names[k], e, sums)
 
     def _cotangent(self, array: str, k: int, name: str, value: Expression, sums: Sequence[str]) -> ir.Update:
         storage, fields, key = ir.Storage.COTANGENT, self.program.coordinates, getattr(name, "key", ("",))
@@ -115,6 +121,8 @@ class LatticeLoops:
                 return ir.Store(ir.Array(ir.Storage.START_COTANGENT, number, str(key[0])), value)
             case "gathered":
                 return ir.Store(ir.Array(ir.Storage.SUM_COTANGENT, [*sums].index(name)), value, adds=False)
+            case "sums":
+                return ir.Store(ir.Array(ir.Storage.SUM, k), value, adds=False)
             case "bonds":
                 number = len(self.arrays) + self.step.sites.at_bonds.index(name)
                 return ir.Store(ir.Array(storage, number, name), value, end="bond")

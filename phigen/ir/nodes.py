@@ -38,7 +38,7 @@ class Pointer:
 class Vector:
     """Local array of reals."""
 
-    length: int
+    length: Value
 
 
 class Storage(Enum):
@@ -179,9 +179,10 @@ class Accumulated:
 
 @dataclass(frozen=True)
 class Cast:
-    """A value as an index."""
+    """A value as an index, or as a size."""
 
     value: Value
+    kind: str = "index"
 
 
 @dataclass(frozen=True)
@@ -303,6 +304,15 @@ class Assign:
 
 
 @dataclass(frozen=True)
+class Clear:
+    """The first elements of an array, or those from an index on, become zero."""
+
+    array: Name
+    first: Value | None
+    count: Value
+
+
+@dataclass(frozen=True)
 class Selection:
     """The sites that a sweep updates: of one ``colour``, away from boundary seams, or on those of a ``window``."""
 
@@ -381,7 +391,20 @@ class Return:
 
 
 Statement = (
-    Declare | Unpack | Store | Reduce | GatherSums | Assign | Loop | Discard | If | Within | Continue | Call | Return
+    Declare
+    | Unpack
+    | Store
+    | Reduce
+    | GatherSums
+    | Assign
+    | Clear
+    | Loop
+    | Discard
+    | If
+    | Within
+    | Continue
+    | Call
+    | Return
 )
 Block = tuple[Statement, ...]
 

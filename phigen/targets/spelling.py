@@ -46,7 +46,8 @@ class Spelling:
     def name(self, symbol: str) -> str:
         """Return the identifier of a symbol."""
         if isinstance(symbol, Symbol) and symbol.kind == ir.FIXED:
-            return str(symbol.key[0])
+            text = str(symbol.key[0])
+            return self.dialect.functions.get(text, text) if text.isupper() else text
         if isinstance(symbol, Symbol) and symbol.kind == ir.LABEL:
             return self.scope.request(symbol, str(symbol.key[0]))
         return self.scope[symbol]
@@ -83,8 +84,8 @@ class Spelling:
                 return f"{self(left, own)} {spelt} {self(right, own + (operator != 'and'))}", own
             case ir.Accumulated(start, terms):
                 return f"{self(start, 3)} + {self(terms)}", 3
-            case ir.Cast(inner):
-                return f"({self.dialect.operators['index']}){self(inner, _ATOM)}", _ATOM
+            case ir.Cast(inner, kind):
+                return f"({self.dialect.operators[kind]}){self(inner, _ATOM)}", _ATOM
             case ir.Select(condition, then, otherwise):
                 return self.dialect.select.format(self(condition), self(then), self(otherwise)), 0
             case ir.Prefix(operator, inner):

@@ -26,8 +26,13 @@ def _lines(body: ir.Block, indent: str) -> Iterator[str]:
                 yield f"{indent}{_array(array)} {'+=' if adds else '<-'} {_value(value)}"
             case ir.Assign(target, value, adds):
                 yield f"{indent}{_value(target)} {'+=' if adds else '<-'} {_value(value)}"
+            case ir.Reduce(source, number, _, value):
+                yield f"{indent}sum of {source}[{number}] += {_value(value)}"
+            case ir.Clear(array, first, count):
+                yield f"{indent}clear {_value(count)} of {_value(array)}{f' from {_value(first)}' if first else ''}"
             case ir.Loop():
                 bounds = f" {s.variable} in {_value(s.low)}..{_value(s.high)}" if s.low else ""
+                bounds += f" by {_value(s.step)}" if s.step else ""
                 chosen = "" if s.selection == ir.ALL_SITES else f" of colour {s.selection.colour}"
                 yield f"{indent}{s.kind}{bounds}{chosen}:"
                 yield from _lines(s.body, f"{indent}  ")
@@ -52,10 +57,12 @@ def _kind(kind: Any) -> str:
 
 
 def _symbol(name: str) -> str:
-    return str(name.key[0]) if isinstance(name, Symbol) and name.kind == ir.FIXED else str(name)
+    return str(name.key[0]) if isinstance(name, Symbol) and name.kind in (ir.FIXED, ir.LABEL) else str(name)
 
 
 def _array(array: ir.Array) -> str:
+    if array.storage is ir.Storage.SEED:
+        return f"{array.name}[{array.number}]"
     return f"{array.storage.value}[{array.name or array.number}]"
 
 
@@ -79,6 +86,10 @@ def _value(value: Any) -> str:
             return f"({_value(left)} {operator} {_value(right)})"
         case ir.Select(condition, then, otherwise):
             return f"({_value(then)} if {_value(condition)} else {_value(otherwise)})"
+        case ir.Accumulated(start, terms):
+            return f"({_value(start)} + ... {_value(terms)})"
+        case ir.Cast(inner):
+            return _value(inner)
         case ir.Grouped(inner):
             return f"({_value(inner)})"
         case ir.Listed(values):

@@ -122,7 +122,13 @@ def observable_with_bonds(function: ir.Function, layout: RowLayout, sums: Sequen
     loop = lowered(function)
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
     own = [*function.body, *(s for one in sums for s in one.function.body)]
-    once = sorted((s for s in own if isinstance(s, ir.Declare)), key=lambda s: isinstance(s.items[0][1], ir.Time))
+    members = [*layout.members]
+    once = sorted(
+        (s for s in own if isinstance(s, ir.Declare)),
+        key=lambda s: (
+            members.index(s.items[0][1].name) if isinstance(s.items[0][1], ir.SystemParameter) else len(members)
+        ),
+    )
     rows = Rows(layout, Reading(local=True, oriented=oriented)).read(dict.fromkeys(once)).read(loop.body)
     computed, inner = rows.computed, []
     rows.read(sorted((s for one in sums for s in one.loop.body if not _is_computed(s)), key=_at_bond))

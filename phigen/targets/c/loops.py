@@ -18,14 +18,14 @@ _RESERVED = frozenset(
 _NUMBERED = ("change", "add", "sum")
 
 #: Functions of the runtime whose names begin with that of the solver.
-_RUNTIME = ("first", "LANES", "total", "added")
+_RUNTIME = ("first", "LANES", "total", "added", "ADDED")
 
 
 def statements(body: ir.Block, name: str, calls: Mapping[str, str], reserved: Iterable[str] = ()) -> str:
     """Return the body of a function of a solver as text; ``calls`` are the names of elementary functions."""
     dialect = Dialect(
         replace(LANGUAGE, functions=calls),
-        operators={"and": "&&", "index": "ptrdiff_t"},
+        operators={"and": "&&", "index": "ptrdiff_t", "size": "size_t"},
         functions={function: f"{name}_{function}" for function in _RUNTIME},
         pointers=frozenset({"row", "s"}),
     )
@@ -50,6 +50,9 @@ def _statement(s: ir.Statement, spelling: Spelling, name: str) -> Iterator[str]:
             yield f"{' = '.join(map(spelling, (target, *too)))} {'+=' if adds else '='} {spelling(value)};"
         case ir.Call(function, arguments):
             yield f"{name}_{function}({', '.join(map(spelling, arguments))}){';' * (not function.isupper())}"
+        case ir.Clear(array, first, count):
+            start = spelling(ir.Binary("+", array, first) if first else array)
+            yield f"memset({start}, 0, {spelling(ir.Cast(count, 'size'))} * sizeof *{spelling(array)});"
         case ir.Discard(parameter):
             yield f"(void){parameter};"
         case ir.If(condition, (ir.Continue(),)):
@@ -66,7 +69,7 @@ def _declaration(s: ir.Declare, spelling: Spelling) -> str:
         case ir.Pointer(constant, restricted):
             kind, star = f"{'const ' * constant}double", "*restrict " if restricted else "*"
         case ir.Vector(size):
-            kind, length = "double", f"[{size}]"
+            kind, length = "double", f"[{spelling(size)}]"
         case kind_of_number:
             kind = f"{'const ' * (not s.mutable)}{'double' if kind_of_number is ir.Type.REAL else 'ptrdiff_t'}"
     items = (f"{star}{spelling.name(name)}{length}{_initial(value, spelling)}" for name, value in s.items)

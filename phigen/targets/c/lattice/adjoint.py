@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
+from phigen.ir.passes.row_transposes import Handed
 from phigen.lanes.lowering import Rows
 from phigen.lattice.undoing import apart, can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
@@ -20,7 +21,7 @@ from phigen.scheme.steps import BACK, Adjoint, Ends, Gather, Sweep, Sweeps
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets.c.kernels import function, members
-from phigen.targets.c.lattice.adjoint_loops import Handed, Seeds, copied_ends, first_loop, handed_by, handing
+from phigen.targets.c.lattice.adjoint_loops import Seeds, copied_ends, first_loop, handed_by, handing
 from phigen.targets.c.lattice.adjoint_stages import KERNELS, restricted
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, givers, handed_apart, layout_of, starts_are_read, takes, ways
@@ -134,7 +135,7 @@ def _of_parts(program: Program, layout: Layout, rows: Rows, kernels: Mapping[str
         taken = tuple(h for kernel in back[after] for h in handed_by(layout, kernel, 0)) if taking else ()
         for sweep, kernel in zip(layout.step.parts[k], back[k], strict=True):
             bars = tuple(layout.bar(program.coordinates[i]) for i in sweep.moved)
-            seeds = Seeds("change_bar", tuple(f"bar_{k}" for k in bars), bars, sweep.colour)
+            seeds = Seeds("change_bar", bars, sweep.colour)
             ends = tuple(_ends_back(sweep.gather, kernels))
             moved = sweep.moved if undone else ()
             alike = len(ends) == 1 and ends[0][0].of_all
@@ -160,7 +161,7 @@ def _of_equation(program: Program, layout: Layout, rows: Rows, kernels: Mapping[
     summed = any(map(_reads_sums, found))
     for number, (kernel, (name, _, wanted)) in enumerate(zip(found, KERNELS, strict=True)):
         seed = next(array for array in kernel.inputs if array.endswith("_bar"))
-        seeds = Seeds(seed, tuple(f"v_{k}" for k in range(len(fields))))
+        seeds = Seeds(seed)
         read = gather if kernel.inputs["gathered"] else None
         ends = tuple(
             (e, opposite, restricted(layout, fields, back, wanted, f"{e.kernel.name}_{name}"))

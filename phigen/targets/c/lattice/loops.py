@@ -21,7 +21,6 @@ from phigen.symbolic.special import SPECIAL
 from phigen.symbolic.symbols import PRESENT, Symbol, kind_of
 from phigen.targets.c.kernels import FUNCTIONS, lane_calls
 from phigen.targets.c.lattice.layout import Layout
-from phigen.targets.c.lattice.names import told
 from phigen.targets.c.layout import comment
 from phigen.targets.c.loops import statements
 from phigen.targets.header import plain, sentence
@@ -45,6 +44,11 @@ def site_block(program: Program, layout: Layout, relax: Kernel) -> Kernel:
         outputs=(Output(BLOCK, tuple(slopes)),),
         role=Role.OWN_SLOPE,
     )
+
+
+def told(program: Program, source: str = "coef") -> str:
+    """The arguments of a loop over sites: coefficients, unless it goes by the parameters of the solver; and the row."""
+    return "const double *coef, " * (source == "coef") + f"const {program.name}_row *row"
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends, Gather
 from phigen.targets.c.lattice.ends import over_ends
 from phigen.targets.c.lattice.layout import Layout, chosen_ends
-from phigen.targets.c.lattice.loops import Loop, in_loops, seen_calls
-from phigen.targets.c.lattice.names import told
+from phigen.targets.c.lattice.loops import Loop, in_loops, seen_calls, told
 from phigen.targets.c.loops import statements
 
 
@@ -36,23 +35,6 @@ def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> 
         text = statements(body, program.name, calls, layout.reserved(program, len(ends.kernel.roots)))
         arguments = ", ".join([told(program, source), *(f"{kind}{name}" for name, kind in more.items())])
         yield Loop(ends.kernel.name, ends.kernel.purpose, arguments, text)
-
-
-#: The bonds of a site i, by the end that it has; and which of them are passed over.
-_BONDS = {"": "row->s->bonds[i]; k < row->s->bonds[i + 1]", "a": "row->s->bonds[i]; k < row->s->middle[i]",
-          "b": "row->s->middle[i]; k < row->s->bonds[i + 1]"}  # fmt: skip
-_PASSED = {"there": "row->s->colours[row->s->other[k]] != row->chosen"}
-_TOLD = "row->s->colours[across ? row->s->other[k] : i] != row->chosen"
-
-
-def bonds_of(ends: Ends, *, told: bool = False) -> tuple[str, list[str]]:
-    """The loop over the bonds of a site i that are meant, and the statement that passes some of them over; it may be
-    ``told`` at which of their ends there are sites of the colour that is chosen."""
-    wanted = "row->s->colours[i] == row->chosen && " if ends.chosen == "here" and not told else ""
-    bounds = _BONDS[ends.end].replace("; ", f"; {wanted}", 1)
-    meant = _TOLD if told else _PASSED.get(ends.chosen)
-    passed = [f"if ({meant}) continue;"] if meant else []
-    return f"for (ptrdiff_t k = {bounds}; ++k) {{", passed
 
 
 def told_of_bonds(program: Program, layout: Layout, ends: Ends, opposite: Set[str]) -> dict[str, str]:

@@ -1,0 +1,357 @@
+"""Lowering by rows of transposes: every site is written by itself alone, whatever the threads.
+
+A site adds its own cotangents at once. Those of other sites it hands over in arrays, one for each value, and in a
+second loop each site adds what the sites around have handed to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from phigen.ir import nodes as ir
+from phigen.ir.nodes import Storage
+from phigen.ir.passes.by_rows import (
+    BOND,
+    FROM,
+    LENGTH,
+    OTHER,
+    READ,
+    ROW,
+    SITE,
+    SOLVER,
+    TO,
+    WRITTEN,
+    Reading,
+    RowLayout,
+    Rows,
+    lowered,
+    over_sites,
+    together,
+)  # fmt: skip
+from phigen.ir.passes.row_loops import ONE, ZERO, bonds_of, side, unread_coefficients
+from phigen.symbolic.symbols import HERE
+
+BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
+    ir.fixed(name) for name in ("begin", "end", "apart", "whole", "lanes", "l", "to")
+)
+#: Sites whose shares in a sum the runtime adds at once.
+BATCH, SUMS = ir.fixed("ADDED"), ir.fixed("sums")
+
+#: Sites that receive at once what pairs give them: as many as make the additions to their sums independent.
+PAIR_BATCH = 32
+
+
+@dataclass(frozen=True)
+class Handed:
+    """A cotangent that sites hand to the site at an offset: its array, and the number of the field it belongs to."""
+
+    array: int
+    base: int
+    offset: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Transpose:
+    """A transposed function on the level of sites, and where it reads and stores cotangents.
+
+    The cotangents of what the function has computed, of the kind ``seed``, are those of the fields with the numbers
+    ``fields``, or else the variation of the row. It hands over the values ``handed``, and the cotangents of sums over
+    bonds or pairs in arrays from ``sums_from`` on; ``summed`` is their number if it computes any. It first adds what
+    the loop before it has handed over: ``taken``. The fields ``recomputed`` are written too. A sweep of one ``colour``
+    updates the sites of this colour alone.
+    """
+
+    function: ir.Function
+    seed: str
+    fields: tuple[int, ...] = ()
+    handed: tuple[Handed, ...] = ()
+    sums_from: int = 0
+    summed: int = 0
+    taken: tuple[Handed, ...] = ()
+    recomputed: frozenset[str] = frozenset()
+    colour: int | None = None
+
+
+def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.Block:
+    """Return the statements of the first loop of a transpose; with ``vectors`` sums over sites stay in registers."""
+    loop, fields = lowered(transpose.function), transpose.fields
+    row = layout.row
+    pointers = [ir.fixed(f"bar_{k}") for k in fields] or [
+        ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)
+    ]
+    around = [ir.Entry(ir.Member(ROW, "bar"), ir.Constant(k)) for k in fields]
+    rows = Rows(layout, Reading(transpose.recomputed, {transpose.seed: pointers, "around": around}))
+    rows.read((*transpose.function.body, *loop.body))
+    seeds = {d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED and not d.offset}
+    given, stores = _stores(transpose, loop, rows)
+    own = {s.array.number for s in _updates(loop) if s.array.storage in _COTANGENTS and not any(s.offset)}
+    own |= {h.base for h in transpose.taken} | {fields[k] for k in seeds if fields}
+    head = unread_coefficients(rows)
+    if not fields:
+        head += [_pointer(f"v_{k}", READ, row(_entry("varied", k))) for k in sorted(seeds)]
+    head += [_pointer(f"bar_{k}", WRITTEN, row(_entry("bar", k))) for k in sorted(own)]
+    for array in given:
+        head.append(_pointer(f"handed_{array}", WRITTEN, row(_entry("handed", array))))
+        if transpose.colour is not None:
+            head.append(ir.Clear(ir.fixed(f"handed_{array}"), FROM, ir.Binary("-", TO, FROM)))
+    from_others, added = _added_up("given", transpose.taken, layout)
+    body = (*added, *rows.at_site(), *rows.computed, *stores)
+    shares = [s for s in loop.body if isinstance(s, ir.Reduce)]
+    colour = transpose.colour
+    loops = (
+        in_vectors(body, shares) if vectors and shares and colour is None else in_batches(body, shares, layout, colour)
+    )
+    return (*head, *from_others, *rows.before(), *loops)
+
+
+_COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
+
+
+def _stores(transpose: Transpose, loop: ir.Loop, rows: Rows) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
+    """Return the values that are handed over, by their arrays, and the statements that store all values of a site."""
+    places = {(h.base, h.offset): h.array for h in transpose.handed}
+    given: dict[int, ir.Value] = {}
+    stores: list[ir.Statement] = []
+    for s in _updates(loop):
+        number = s.array.number
+        if s.array.storage is Storage.SUM_COTANGENT:
+            given[transpose.sums_from + number] = s.value
+        elif s.array.storage is Storage.STATE:
+            stores.append(ir.Assign(ir.Entry(rows.pointer(s.array.name), SITE), s.value))
+        elif any(s.offset):
+            given.setdefault(places[number, s.offset], s.value)
+        else:
+            stores.append(ir.Assign(ir.Entry(ir.fixed(f"bar_{number}"), SITE), s.value, adds=True))
+    arrays = [*(h.array for h in transpose.handed)]
+    arrays += range(transpose.sums_from, transpose.sums_from + transpose.summed)
+    given |= {array: ZERO for array in arrays if array not in given}
+    stores += [ir.Assign(ir.Entry(ir.fixed(f"handed_{array}"), SITE), value) for array, value in given.items()]
+    return given, stores
+
+
+def handing(handed: Sequence[Handed], layout: RowLayout) -> ir.Block:
+    """Return the statements of the second loop: each site adds what the sites around have handed to it."""
+    pointers, added = _added_up("handed", handed, layout)
+    bars = dict.fromkeys(h.base for h in handed)
+    head = [_pointer(f"bar_{k}", WRITTEN, layout.row(_entry("bar", k))) for k in bars]
+    return (*pointers, *head, over_sites(added))
+
+
+def _added_up(
+    called: str, handed: Sequence[Handed], layout: RowLayout
+) -> tuple[list[ir.Statement], list[ir.Statement]]:
+    """Return the pointers to what sites around hand to a site, and the additions to its cotangents."""
+    sums: dict[int, ir.Value] = {}
+    pointers: dict[str, ir.Statement] = {}
+    open_rows = called == "given" and any(layout.lattice.step.sites.open[:-1])
+    for h in handed:
+        back = tuple(-o for o in h.offset)
+        line = layout.line(back)
+        name = f"{called}_{h.array}" + (f"_{line}" if line else "")
+        place = layout.row(_entry(called, h.array), line, "givers" if open_rows else "at")
+        pointers[name] = _pointer(name, READ, place)
+        value = ir.Entry(ir.fixed(name), ir.plus(SITE, back[-1]))
+        sums[h.base] = ir.Binary("+", sums[h.base], value) if h.base in sums else value
+    added = (ir.Assign(ir.Entry(ir.fixed(f"bar_{k}"), SITE), value, adds=True) for k, value in sums.items())
+    return [*pointers.values()], [*added]
+
+
+# ---- sums over sites
+
+
+def in_batches(
+    body: ir.Block, shares: Sequence[ir.Reduce], layout: RowLayout, colour: int | None
+) -> Iterator[ir.Statement]:
+    """Yield the loop over sites; shares in sums are kept apart for as many sites as the runtime adds at once."""
+    step = None if colour is None else ir.Constant(layout.colour_step)
+    low = BEGIN if shares else FROM
+    first = low if colour is None else ir.Called("first", (ROW, ir.Constant(colour), low))
+    if not shares:
+        yield ir.Discard("sums")
+        yield over_sites(body, low=first, limit="end", step=step)
+        return
+    names = [ir.fixed(f"share{k}") for k in range(len(shares))]
+    at_site = ir.Binary("-", SITE, BEGIN)
+    added = (ir.Assign(ir.Entry(n, at_site), s.value, adds=True) for n, s in zip(names, shares, strict=True))
+    count, left = ir.Binary("-", TO, FROM), ir.Binary("-", TO, BEGIN)
+    yield ir.index(APART, ir.Select(ir.Binary("<", count, BATCH), count, ir.Cast(BATCH)))
+    yield ir.Declare(ir.Vector(BATCH), tuple((n.symbol, ir.Constant(None)) for n in names), mutable=True)
+    yield from (ir.Clear(n, None, APART) for n in names)
+    end = ir.index(END, ir.Select(ir.Binary("<", left, BATCH), TO, ir.Binary("+", BEGIN, BATCH)))
+    inner = over_sites((*body, *added), low=first, high=END, limit="", step=step)
+    yield ir.Loop("plain", (end, inner), "begin", FROM, TO, step=BATCH)
+    yield from _totals(shares, "added", APART)
+
+
+def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.Statement]:
+    """Yield the same with shares in registers: loops over vectors of 8 sites, then over the sites that are left."""
+    names = [ir.fixed(f"share{k}") for k in range(len(shares))]
+    yield ir.Declare(ir.Vector(ir.Constant(8)), tuple((n.symbol, ir.Listed((ZERO,))) for n in names), mutable=True)
+    rest = ir.Binary("%", ir.Binary("-", INDEX_TO, FROM), ir.Constant(8))
+    yield ir.Declare(ir.Type.INDEX, ((INDEX_TO.symbol, TO), (WHOLE.symbol, ir.Binary("-", INDEX_TO, rest))))
+    yield ir.index(LANES, ir.Called("LANES", (ir.Binary("-", WHOLE, FROM),)))
+    adds = (ir.Call("ADD", (n, LANE, s.value)) for n, s in zip(names, shares, strict=True))
+    lanes = (ir.index(SITE, ir.Binary("+", OTHER, LANE)), *body, *adds)
+    inner = ir.Loop("plain", lanes, "l", ir.Constant(0), LANES, independent="LANE")
+    yield ir.Loop("plain", (inner,), "j", FROM, WHOLE, step=LANES)
+    single = (ir.Assign(ir.Entry(n, ir.Constant(0)), s.value, adds=True) for n, s in zip(names, shares, strict=True))
+    yield ir.Loop("plain", (*body, *single), "i", WHOLE, INDEX_TO)
+    yield from _totals(shares, "total")
+
+
+def _totals(shares: Sequence[ir.Reduce], function: str, *arguments: ir.Value) -> Iterator[ir.Statement]:
+    for k, s in enumerate(shares):
+        total = ir.Called(function, (ir.fixed(f"share{k}"), *arguments))
+        yield ir.Assign(ir.Entry(SUMS, ir.Constant(s.number)), total, adds=True)
+
+
+# ---- bonds and pairs
+
+
+@dataclass(frozen=True)
+class BondTranspose:
+    """The transpose of a function that sums over bonds or pairs, seen from the ``end`` that the site of the loop is.
+
+    The cotangents of the ``count`` sums are in arrays from ``sums_from`` on; ``oriented`` parameters at bonds have the
+    opposite sign seen from the end b.
+    """
+
+    function: ir.Function
+    end: str
+    sums_from: int
+    count: int
+    oriented: frozenset[str] = frozenset()
+
+    def rows(self, layout: RowLayout) -> Rows:
+        """Return what the function reads."""
+        arrays = [ir.fixed(f"handed_{self.sums_from + k}") for k in range(self.count)]
+        reading = Reading(seeds={HERE: arrays}, here=self.end, oriented=self.oriented)
+        return Rows(layout, reading).read((*self.function.body, *lowered(self.function).body))
+
+    @property
+    def updates(self) -> list[ir.Update]:
+        """The values that are added up."""
+        return [s for s in lowered(self.function).body if isinstance(s, ir.Update)]
+
+
+def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Block:
+    """Return the statements of the transpose of a function that sums over bonds or pairs."""
+    rows, loop, updates = transpose.rows(layout), lowered(transpose.function), transpose.updates
+    head = [*rows.before()]
+    seeds = {transpose.sums_from + d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED}
+    head += [_pointer(f"handed_{k}", ir.Pointer(), _entry("handed", k)) for k in sorted(seeds)]
+    bars = {s.array.number for s in updates if isinstance(s, ir.Store) and s.array.storage is Storage.COTANGENT}
+    head += [_pointer(f"bar_{k}", ir.Pointer(constant=False), _entry("bar", k)) for k in sorted(bars)]
+    shares = [k for k, s in enumerate(updates) if isinstance(s, ir.Reduce)]
+    head += [ir.Discard("sums")] * (not shares)
+    head += unread_coefficients(rows) if "coef" in transpose.function.parameters else []
+    head += [_zero(f"share{k}") for k in shares]
+    over = _over_bonds if layout.lattice.step.others.graph else _over_pairs
+    totals = (
+        ir.Assign(ir.Entry(SUMS, ir.Constant(s.number)), ir.fixed(f"share{k}"), adds=True)
+        for k, s in enumerate(updates)
+        if isinstance(s, ir.Reduce)
+    )
+    return (*head, over(transpose, rows), *totals)
+
+
+def _over_bonds(transpose: BondTranspose, rows: Rows) -> ir.Loop:
+    """Return the loop over sites, and in it over their bonds.
+
+    What bonds add to a sum over all sites is added up at each site first, so that few additions wait for one another.
+    """
+    loop, updates = lowered(transpose.function), transpose.updates
+    at_bonds = {k: s.array for k, s in enumerate(updates) if isinstance(s, ir.Store) and s.end == "bond"}
+    turned = [k for k, array in at_bonds.items() if array.name in transpose.oriented]
+    inner = [*_bond_reads(transpose, rows, signed=bool(turned)), *rows.computed]
+    for k, s in enumerate(updates):
+        value = ir.Binary("*", ir.fixed("side"), ir.Grouped(s.value)) if k in turned else s.value
+        place: ir.Value = ir.fixed(f"own{k}")
+        if k in at_bonds:
+            place = ir.Entry(ir.fixed(f"bar_{at_bonds[k].number}"), BOND)
+        inner.append(ir.Assign(place, value, adds=True))
+    summed = [k for k in range(len(updates)) if k not in at_bonds]
+    own = (_zero(f"own{k}") for k in summed)
+    out = (_into(updates[k], k, SITE, ir.fixed(f"own{k}")) for k in summed)
+    return over_sites((*together(rows.own), *own, bonds_of(loop, inner), *out), "")
+
+
+def _bond_reads(transpose: BondTranspose, rows: Rows, *, signed: bool) -> Iterator[ir.Statement]:
+    """Yield the statements that pass over bonds without a site of the chosen colour, and that read at their ends."""
+    other = ir.Entry(ir.Member(SOLVER, "other"), BOND)
+    if lowered(transpose.function).chosen == "there":
+        colour = ir.Entry(ir.Member(SOLVER, "colours"), other)
+        yield ir.If(ir.Binary("!=", colour, ir.Member(ROW, "chosen")), (ir.Continue(),))
+    if any(isinstance(value, ir.Entry) and value.index == OTHER for value in rows.other.values()):
+        yield ir.index(OTHER, other)
+    if signed or any(isinstance(value, ir.Binary) for value in rows.other.values()):
+        yield ir.real(ir.fixed("side").symbol, side(ONE if transpose.end == "a" else ir.Constant(-1.0)))
+    yield from together(rows.other.items())
+
+
+def _over_pairs(transpose: BondTranspose, rows: Rows) -> ir.Loop:
+    """Return the loop over batches of sites, and in it over all other sites.
+
+    Batches are whole vectors of 8: rows have room for them. What a pair adds is computed for all sums before any of it
+    is added, or gcc would not vectorise the loop.
+    """
+    updates = transpose.updates
+    first, left, count, batch = ir.fixed("first"), ir.fixed("left"), ir.fixed("count"), ir.Constant(PAIR_BATCH)
+    rest = ir.Binary("-", INDEX_TO, first)
+    vectors = ir.Binary("/", ir.Binary("+", left, ir.Constant(7)), ir.Constant(8))
+    sizes = (
+        (left.symbol, ir.Select(ir.Binary("<", rest, batch), rest, batch)),
+        (count.symbol, ir.Binary("*", vectors, ir.Constant(8))),
+    )
+    own = [ir.fixed(f"own{k}") for k in range(len(updates))]
+    places = [ir.Entry(name, LANE) for name in own]
+    site, same = ir.index(SITE, ir.Binary("+", first, LANE)), ir.Binary("==", SITE, OTHER)
+    added = [ir.real(ir.fixed(f"add{k}").symbol, ir.Select(same, ZERO, s.value)) for k, s in enumerate(updates)]
+    add = (ir.Assign(place, ir.fixed(f"add{k}"), adds=True) for k, place in enumerate(places))
+    inner = _lanes(count, (site, *together(rows.own), *rows.computed, *added, *add), independent="SITE")
+    others = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
+    out = (_into(s, k, ir.Binary("+", first, LANE), places[k]) for k, s in enumerate(updates))
+    body = (
+        ir.Declare(ir.Type.INDEX, sizes),
+        ir.Declare(ir.Vector(batch), tuple((name.symbol, ir.Constant(None)) for name in own), mutable=True),
+        _lanes(count, tuple(ir.Assign(place, ZERO) for place in places)),
+        others,
+        _lanes(left, tuple(out), note="beyond are numbers, but no sites"),
+    )
+    return ir.Loop("plain", body, "first", FROM, TO, limit="to", step=batch)
+
+
+def _lanes(count: ir.Value, body: ir.Block, *, independent: str = "", note: str = "") -> ir.Loop:
+    return ir.Loop("plain", body, "l", ir.Constant(0), count, independent=independent, note=note)
+
+
+def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
+    """Return the statement that adds what bonds or pairs give to a site, or that puts a sum where it is read."""
+    if isinstance(s, ir.Reduce):
+        return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)
+    if s.array.storage is Storage.SUM:
+        gathered = ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(s.array.number))
+        return ir.Assign(ir.Entry(gathered, site), value)
+    return ir.Assign(ir.Entry(ir.fixed(f"bar_{s.array.number}"), site), value, adds=True)
+
+
+def _zero(name: str) -> ir.Declare:
+    return ir.Declare(ir.Type.REAL, ((ir.fixed(name).symbol, ZERO),), mutable=True)
+
+
+def _entry(member: str, k: int) -> ir.Value:
+    return ir.Entry(ir.Member(ROW, member), ir.Constant(k))
+
+
+def _pointer(name: str, kind: ir.Pointer, value: ir.Value) -> ir.Declare:
+    return ir.Declare(kind, ((ir.fixed(name).symbol, value),))
+
+
+def _loads(loop: ir.Loop) -> Iterator[ir.Load]:
+    declared = (s.items for s in loop.body if isinstance(s, ir.Declare))
+    return (value for items in declared for _, value in items if isinstance(value, ir.Load))
+
+
+def _updates(loop: ir.Loop) -> Iterator[ir.Store]:
+    return (s for s in loop.body if isinstance(s, ir.Store))
