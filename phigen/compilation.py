@@ -135,6 +135,11 @@ class Compilation:
         return method is None or method.exact
 
     @property
+    def degree(self) -> int | None:
+        """The degree d of a truncation, with a Poisson defect of O(h^(d+1)); None where none is known."""
+        return self.order.order if self.gauss else self.chart.degree
+
+    @property
     def poisson(self) -> bool:
         """Whether a step is a Poisson map to round-off: that of an exact bi-realisation, without forces."""
         return self.exact and self.system.forces is None

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from phigen.gauss.matrices import of_matrices
 from phigen.gauss.quaternionic import quaternionic
 from phigen.gauss.star_algebra import StarAlgebra, Vector
 from phigen.geometry.lie_algebra import LieAlgebra
@@ -127,7 +128,7 @@ def _part(indices: Sequence[int], lie: LieAlgebra, *, central: bool) -> Part | N
 
 def star_algebra(lie: LieAlgebra) -> StarAlgebra | None:
     """A star algebra whose skew elements hold the Lie algebra; None where none is known."""
-    return quaternionic(lie)
+    return quaternionic(lie) or of_matrices(lie)
 
 
 def _without_constants(lie: LieAlgebra, last: int) -> LieAlgebra:

@@ -419,7 +419,7 @@ def _approximate(
     subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], found: float
 ) -> tuple[str, bool, str]:
     """The limit for a truncation of degree d: a defect of O(h^(d+1))."""
-    degree = subject.compilation.chart.degree
+    degree = subject.compilation.degree
     if degree is None:
         return "", True, ""
     fine = max(_or_infinite(defect, subject.main, x, subject.h / 2) for x in states)

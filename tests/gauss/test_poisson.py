@@ -87,6 +87,21 @@ def test_written_systems_step_by_poisson_maps(name):
     assert 1e-6 < np.ptp(moved.energy) < 0.3 * (1 + np.abs(moved.energy).max())
 
 
+#: Algebras of matrices: with a form, complex, without a form, and with a skew one.
+MATRICES = {"sl(3)": 8, "su(3)": 8, "sp(4)": 10, "so(5)": 10, "gl(3)": 9}
+
+
+@pytest.mark.parametrize("name", slow_but(("su(3)",), MATRICES))
+def test_matrix_algebras_step_by_poisson_maps(name):
+    n = MATRICES[name]
+    names = [f"x{i}" for i in range(1, n + 1)]
+    energy = " + ".join([f"{c}**2/{k + 2}" for k, c in enumerate(names)] + ["x1*x2*x3/4 + sin(x4)"])
+    text = f"coordinates: {names}\npoisson: {{lie_algebra: {{name: {name}, sign: minus}}}}\nhamiltonian: {energy}\n"
+    spec = loads(f"phigen: 1\nname: t\n{text}scheme: gauss\n")
+    x = 0.5 * np.sin(1.0 + np.arange(n))
+    assert defect(of(spec, 2), x, 0.15, poisson_of(spec)) <= 1e-13
+
+
 def test_direct_step_is_no_poisson_map_and_says_so():
     """On the rigid body at the same step the defect is far above rounding."""
     spec = replace(spec_of("rigid_body"), structure="to truncation")
@@ -174,3 +189,19 @@ def test_lattices_are_refused():
     text += "hamiltonian: p**2/2 + (q[i+1] - q)**2/2\nscheme: gauss\n"
     with pytest.raises(SpecError, match="not for lattices"):
         compile_spec(loads(f"phigen: 1\nname: t\n{text}"))
+
+
+def test_verify_measures_the_defect_of_a_step_to_truncation(tmp_path):
+    """It is of one order more than the method, and nothing is required of it but that."""
+    from click.testing import CliRunner
+
+    from phigen.cli import group
+
+    file = tmp_path / "t.yaml"
+    run = "runs: {r: {initial: [1, 0.5, 0.8], step: 0.2, steps: 60}}\n"
+    method = "scheme: gauss\nstructure: to truncation\norder: 4\ntargets: [numpy]\n"
+    text = f"phigen: 1\nname: t\n{SPECIES}{method}{run}"
+    file.write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(group, ["verify", str(file)])
+    assert result.exit_code == 0, result.output
+    assert "O(h^5)" in result.output

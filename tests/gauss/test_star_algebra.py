@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from phigen.gauss.matrices import of_matrices
 from phigen.gauss.quaternionic import quaternionic
 from phigen.geometry.families import named
 from phigen.geometry.matrix_algebras import from_structure_constants
@@ -59,7 +60,17 @@ def test_change_of_basis_with_parameters():
     assert (found.dimension, found.sound) == (4, True)
 
 
-def test_algebras_of_higher_rank_have_none():
+def test_algebras_of_matrices_have_one_of_matrices():
+    """so(5) keeps a form on R^5; sl(3) keeps none, and acts on R^3 and its dual; motions of R^4 do neither."""
+    found = {name: of_matrices(named(*name)) for name in (("so", 5), ("sl", 3), ("se", 4))}
+    assert found["se", 4] is None
+    assert {name: a and (a.dimension, a.sound) for name, a in found.items() if name != ("se", 4)} == {
+        ("so", 5): (25, True),
+        ("sl", 3): (18, True),
+    }
+
+
+def test_algebras_of_higher_rank_have_no_quaternions():
     assert quaternionic(named("so", 5)) is None
     assert quaternionic(named("su", 3)) is None
 

@@ -1,0 +1,166 @@
+"""Star algebras of matrices, for Lie algebras of matrices that keep a bilinear form, and for others twice as large.
+
+If the matrices ρ(e) are skew for an invertible form B, ρᵀB + Bρ = 0, the associative algebra that they generate with 1
+has the involution a ↦ B⁻¹aᵀB. If there is no such form, ρ ⊕ −ρᵀ has the form that pairs the two halves. So so(n),
+so(p, q) and sp(2n) need n² or 4n² unknowns, su(n) and sl(n) and gl(n) 2n².
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
+from phigen.geometry.field import Field, Scalar
+from phigen.geometry.lie_algebra import LieAlgebra, SparseMatrix
+from phigen.geometry.linear import Span, add_multiple, kernel
+from phigen.geometry.matrix_algebras import product
+from phigen.geometry.representations import known_representation
+
+#: Largest algebra that is tried: each sweep takes some third power of its root in operations at every stage.
+MOST_UNKNOWNS = 36
+
+
+def of_matrices(lie: LieAlgebra) -> StarAlgebra | None:
+    """The algebra of a Lie algebra that is known by matrices with rational entries; None where there is none."""
+    known = known_representation(lie)
+    if known is None or not lie.field.is_rational:
+        return None
+    field, n = lie.field, known.size
+    try:
+        matrices = [{at: field.convert(e) for at, e in m.items()} for m in known.matrices]
+    except KeyError:  # entries with parameters
+        return None
+    form = _form(matrices, n, field)
+    if form is None:
+        matrices = [_doubled(m, n, field) for m in matrices]
+        form = {(i, (i + n) % (2 * n)): field.one for i in range(2 * n)}
+        n = 2 * n
+    hull = _hull([_unit(n, field), *matrices], n, field)
+    return _assembled(hull, matrices, form, n, field) if hull else None
+
+
+def _unit(n: int, field: Field) -> SparseMatrix:
+    return {(i, i): field.one for i in range(n)}
+
+
+def _transposed(a: SparseMatrix) -> SparseMatrix:
+    return {(j, i): v for (i, j), v in a.items()}
+
+
+def _doubled(a: SparseMatrix, n: int, field: Field) -> SparseMatrix:
+    """a ⊕ −aᵀ."""
+    return {**a, **{(n + j, n + i): -v for (i, j), v in a.items()}}
+
+
+def _form(matrices: Sequence[SparseMatrix], n: int, field: Field) -> SparseMatrix | None:
+    """An invertible form B, symmetric or skew, with mᵀB + Bm = 0 for all matrices; None if there is none in the basis
+    of all forms."""
+    rows: list[dict[int, Scalar]] = []
+    for m in matrices:
+        equations: dict[tuple[int, int], dict[int, Scalar]] = {}
+        for (k, i), v in m.items():
+            for j in range(n):
+                add_multiple(equations.setdefault((i, j), {}), {k * n + j: v}, field.one)
+                add_multiple(equations.setdefault((j, i), {}), {j * n + k: v}, field.one)
+        rows += [e for e in equations.values() if e]
+    for vector in kernel(field, rows, n * n):
+        found = {divmod(at, n): v for at, v in vector.items()}
+        for sign in (field.one, -field.one):
+            form = dict(found)
+            add_multiple(form, _transposed(found), sign)
+            if _inverse(form, n, field) is not None:
+                return form
+    return None
+
+
+def _inverse(a: SparseMatrix, n: int, field: Field) -> SparseMatrix | None:
+    columns = [{i: v for (i, j), v in a.items() if j == k} for k in range(n)]
+    span = Span(field, columns)
+    if span.dimension < n:
+        return None
+    found: SparseMatrix = {}
+    for j in range(n):
+        for i, v in (span.coordinates({j: field.one}) or {}).items():
+            found[i, j] = v
+    return found
+
+
+def _hull(generators: Sequence[SparseMatrix], n: int, field: Field) -> list[SparseMatrix]:
+    """A sparse basis of the associative algebra that matrices generate; empty if that is too large."""
+    found: list[SparseMatrix] = []
+    pending = list(generators)
+    while pending:
+        candidate = pending.pop(0)
+        if Span(field, [*found, candidate]).dimension == len(found):
+            continue
+        found.append(candidate)
+        if len(found) > MOST_UNKNOWNS:
+            return []
+        pending += [product(candidate, g) for g in generators[1:]]
+    vectors = [{i * n + j: v for (i, j), v in m.items()} for m in found]
+    reduced = kernel(field, kernel(field, vectors, n * n), n * n)
+    return [{divmod(at, n): v for at, v in vector.items()} for vector in reduced]
+
+
+def _assembled(
+    hull: Sequence[SparseMatrix], matrices: Sequence[SparseMatrix], form: SparseMatrix, n: int, field: Field
+) -> StarAlgebra | None:
+    span = Span(field, hull)
+    inverse = _inverse(form, n, field) or {}
+
+    def coordinates(a: Mapping[tuple[int, int], Scalar]) -> Vector:
+        return span.coordinates(a) or {}
+
+    table = {(i, j): coordinates(p) for i, a in enumerate(hull) for j, b in enumerate(hull) if (p := product(a, b))}
+    star = [coordinates(product(inverse, product(_transposed(a), form))) for a in hull]
+    basis = [coordinates(m) for m in matrices]
+    functional = _functional(hull, star, matrices, basis, field)
+    if functional is None:
+        return None
+    own = [{a: field.one} for a in range(len(basis))]
+    unit = coordinates(_unit(n, field))
+    found = StarAlgebra(field, len(hull), table, star, unit, basis, functional, basis, own)
+    return found if found.sound else None
+
+
+def _functional(
+    hull: Sequence[SparseMatrix],
+    star: Sequence[Vector],
+    matrices: Sequence[SparseMatrix],
+    basis: Sequence[Vector],
+    field: Field,
+) -> list[Vector] | None:
+    """x̃ at the basis: it vanishes on symmetric elements, and on skew ones orthogonal to g by the trace of products."""
+    half = field.one / field.number(2)
+    skew: list[Vector] = []
+    for i in range(len(hull)):
+        part: Vector = {i: half}
+        add_multiple(part, star[i], -half)
+        skew.append(part)
+    traces = [{i: t for i, a in enumerate(hull) if (t := _trace(a, m, field)) != 0} for m in matrices]
+    symmetric: list[Vector] = []
+    for i in range(len(hull)):
+        part = {i: half}
+        add_multiple(part, star[i], half)
+        symmetric.append(part)
+    # what is orthogonal to g and skew: in the kernel of the traces, and of the projection on symmetric elements
+    rows = [{i: v[k] for i, v in enumerate(symmetric) if k in v} for k in range(len(hull))]
+    others = kernel(field, [*traces, *(r for r in rows if r)], len(hull))
+    span = Span(field, [*basis, *others])
+    if span.dimension < len(basis) + len(others):
+        return None
+    found = []
+    for part in skew:
+        value = span.coordinates(combined([part], {0: field.one}))
+        if value is None:
+            return None
+        found.append({a: v for a, v in value.items() if a < len(basis)})
+    return found
+
+
+def _trace(a: SparseMatrix, b: SparseMatrix, field: Field) -> Scalar:
+    result = field.zero
+    for (i, j), v in a.items():
+        if (j, i) in b:
+            result = result + v * b[j, i]
+    return result
