@@ -47,19 +47,19 @@ def lead(compilation: Compilation) -> Markup:
 def _sections(material: Material) -> Iterator[tuple[str, str, Markup]]:
     if material.live:
         yield "live", "Live", live_section(material.compilation, material.live)
-    yield "brief", "In brief", evidence.brief_section(material)
-    yield "system", "The system", system_section(material.compilation.system)
-    yield "choices", "What the compiler chose", evidence.choices_section(material.compilation)
-    yield "method", "The method", method_section(material.compilation)
-    yield "proofs", "What was proved", evidence.proofs_section(material)
+    yield "brief", "Summary", evidence.brief_section(material)
+    yield "system", "System", system_section(material.compilation.system)
+    yield "choices", "Method", evidence.choices_section(material.compilation)
+    yield "method", "Formulas of the method", method_section(material.compilation)
+    yield "proofs", "Proofs", evidence.proofs_section(material)
     if material.verification:
-        yield "measured", "What was measured", evidence.measured_section(material.verification)
-        yield "modified", "The modified Hamiltonian", modified_section(material.constancy, material.no_constancy)
+        yield "measured", "Measurements", evidence.measured_section(material.verification)
+        yield "modified", "Modified Hamiltonian", modified_section(material.constancy, material.no_constancy)
     if material.methods:
-        yield "run", "A run", page.joined(_run(material))
+        yield "run", "Run", page.joined(_run(material))
     if material.study:
         yield "precision", "Precision and time", precision_section(material.study)
-    yield "provenance", "Where this page comes from", page.joined(provenance(material))
+    yield "provenance", "Provenance", page.joined(provenance(material))
 
 
 def _run(material: Material) -> Iterator[Markup]:

@@ -63,15 +63,15 @@ def _sections(material: LatticeMaterial) -> Iterator[tuple[str, str, Markup]]:
     whole = Material(material.examination, compilation, material.command, verification=verification, notes=notes)
     if material.live:
         yield "live", "Live", lattice_live_section(compilation, material.live)
-    yield "brief", "In brief", evidence.brief_section(whole)
-    yield "system", "The cell", page.joined(_cell(compilation.cell))
-    yield "choices", "What the compiler chose", page.joined(_method(compilation))
-    yield "proofs", "What was proved", evidence.proofs_section(whole)
+    yield "brief", "Summary", evidence.brief_section(whole)
+    yield "system", "Cell", page.joined(_cell(compilation.cell))
+    yield "choices", "Method", page.joined(_method(compilation))
+    yield "proofs", "Proofs", evidence.proofs_section(whole)
     if verification:
-        yield "measured", "What was measured", evidence.measured_section(verification)
+        yield "measured", "Measurements", evidence.measured_section(verification)
     if material.trajectory is not None:
-        yield "run", "A run", page.joined(_run(material, material.trajectory))
-    yield "provenance", "Where this page comes from", page.joined(provenance(whole))
+        yield "run", "Run", page.joined(_run(material, material.trajectory))
+    yield "provenance", "Provenance", page.joined(provenance(whole))
 
 
 def _cell(cell: Cell) -> Iterator[Markup]:

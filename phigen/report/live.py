@@ -172,7 +172,7 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
 def _quantities(system: System) -> list[dict[str, object]]:
     """What the flow conserves: the energy, and all its Casimirs as one."""
     moved = moving(system)
-    found: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "its energy", "casimirs": None}]
+    found: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "energy error", "casimirs": None}]
     kept = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
     if kept:
         found.append({"name": _named(system, kept), "casimirs": [*kept.values()]})
@@ -180,12 +180,12 @@ def _quantities(system: System) -> list[dict[str, object]]:
 
 
 def _named(system: System, kept: Mapping[str, int]) -> str:
-    """Casimirs, by their numbers, as what a motion may be off."""
+    """The label of the errors of Casimirs, which are given by their numbers."""
     names = ", ".join(kept)
     if len(kept) > 1:
-        return f"its Casimirs {names}" if len(kept) <= 3 else f"its {len(kept)} Casimirs"
+        return f"Casimir errors ({names})" if len(kept) <= 3 else f"error of {len(kept)} Casimirs"
     drawn = any(_leaf(system, group) == kept[names] for group in _groups(system))
-    return f"its surface (Casimir {names})" if drawn else f"its Casimir {names}"
+    return f"distance from the surface (Casimir {names})" if drawn else f"Casimir error ({names})"
 
 
 def _groups(system: System) -> list[Group]:

@@ -258,10 +258,12 @@ def _quantities(compilation: Compilation) -> list[dict[str, Any]]:
     """What is conserved: the energy, unless time or forces act, and the Casimirs that they leave as one."""
     cell, pushed = compilation.cell, compilation.program.pushed
     assert cell is not None
-    found: list[dict[str, Any]] = [] if cell.driven else [{"name": "its energy", "casimirs": None}]
+    found: list[dict[str, Any]] = [] if cell.driven else [{"name": "energy error", "casimirs": None}]
     kept = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
     if kept:
-        found.append({"name": f"its Casimir{'s' * (len(kept) > 1)} {', '.join(kept)}", "casimirs": [*kept.values()]})
+        found.append(
+            {"name": f"Casimir error{'s' * (len(kept) > 1)} ({', '.join(kept)})", "casimirs": [*kept.values()]}
+        )
     return found
 
 

@@ -178,7 +178,7 @@ if (document.getElementById("live-panel")) {
       const x0 = g * wide + left, width = wide - left - 12;
       pen.fillStyle = pen.strokeStyle = ink();
       [pen.textAlign, pen.textBaseline] = ["left", "top"];
-      pen.fillText(`off ${group.name}`, x0, 2, width);
+      pen.fillText(group.name, x0, 2, width);
       [pen.textAlign, pen.textBaseline] = ["right", "middle"];
       for (const power of [-16, -12, -8, -4, 0]) {
         pen.fillText(power === 0 ? "1" : `10${superscript(power)}`, x0 - 5, y(10 ** power));
@@ -226,8 +226,8 @@ if (document.getElementById("live-panel")) {
     at("play").textContent = still.matches ? `${ahead} steps` : "Play";
     waiting = 1;
     if (race?.ours.steps) {
-      const told = (runner) => race.groups.map(({ name }, i) => `${name} by ${readable(runner.histories[i].last)}`).join(", ");
-      at("told").textContent = `After ${race.ours.steps} steps, phigen is off ${told(race.ours)}; RK4 ${told(race.theirs)}.`;
+      const told = (runner) => race.groups.map(({ name }, i) => `${name} ${readable(runner.histories[i].last)}`).join(", ");
+      at("told").textContent = `After ${race.ours.steps} steps: phigen, ${told(race.ours)}; RK4, ${told(race.theirs)}.`;
       if (!race.groups.length) at("told").textContent = `After ${race.ours.steps} steps.`;
     }
     draw();

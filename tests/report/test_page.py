@@ -284,8 +284,8 @@ def test_panel_runs_a_system_without_its_attitude():
 def test_panel_counts_errors_only_in_what_is_conserved():
     said = {name: str(live.live_section(*panel_of(name))) for name in ("thruster_body", "landau_lifshitz", "pendulum")}
     assert "nothing is conserved" in said["thruster_body"]
-    assert "off its energy" not in said["landau_lifshitz"]
-    assert "off its surface (Casimir length)" in said["landau_lifshitz"]
+    assert "energy error" not in said["landau_lifshitz"]
+    assert "distance from the surface (Casimir length)" in said["landau_lifshitz"]
     assert "the curve drawn here" in said["pendulum"]
 
 
