@@ -126,7 +126,17 @@ def prepared(
     for setting in settings:
         _set(setting, initial, parameters)
     expect_positive(spec, parameters)
+    _expect_room_for_members(spec, run)
     return Experiment(run, tuple(initial.values()), parameters)
+
+
+def _expect_room_for_members(spec: Spec, run: Run) -> None:
+    """`LimitError` where the members of a run with noise do not fit into memory: their states, and copies of these."""
+    from phigen.runtime.memory import expect_room
+
+    place = spec.diagnostic(("runs", run.name, "members"), "").location
+    if run.members > 1:
+        expect_room(f"{run.members} members", 3 * 8 * spec.dimension * run.members, place, "fewer members")
 
 
 def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> Run:

@@ -14,7 +14,7 @@ import click
 from phigen import interrupts
 from phigen._version import __version__
 from phigen.cli.console import Console
-from phigen.errors import PhigenError, SpecError
+from phigen.errors import LimitError, PhigenError, SpecError
 
 #: What a shell reports of a process that SIGPIPE ended.
 BROKEN_PIPE = 141
@@ -77,6 +77,9 @@ def report(error: BaseException, console: Console) -> int:
             place = _place(error)
             console.error(f"error: {place + ': ' if place else ''}{error.strerror}")
             return USAGE
+        case MemoryError():
+            console.error("error: out of memory\n  hint: fewer sites, members, or states that are stored at a time")
+            return LimitError.exit_code
     return _internal(error, console)
 
 
@@ -119,8 +122,6 @@ def _described(error: PhigenError) -> str:
 
 def _internal(error: BaseException, console: Console) -> int:
     summary = "".join(traceback.format_exception_only(error)).strip()
-    if isinstance(error, MemoryError):
-        summary = "out of memory"
     console.error(f"internal error: {summary}")
     if console.verbose:
         _show_traceback(error, console)

@@ -6,6 +6,7 @@ import zipfile
 import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 import click
@@ -52,7 +53,7 @@ def past_of(path: Path, names: Interface, option: str) -> Past:
     try:
         past = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
         if len(past.rows):
-            past.last([n for c in columns_of(names)[: 2 + names.monitored] for n in c.names])
+            _expect_rows(past, [n for c in columns_of(names)[: 2 + names.monitored] for n in c.names])
             return past
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         why = f"it has no column {error}" if isinstance(error, KeyError) else str(error)
@@ -60,17 +61,33 @@ def past_of(path: Path, names: Interface, option: str) -> Past:
     raise click.BadParameter(f"{path} has no rows", param_hint=option)
 
 
+def _expect_rows(past: Past, needed: Sequence[str]) -> None:
+    """`ValueError` for rows that no run has written, `KeyError` for a column that is needed and not there."""
+    if past.rows.dtype != np.float64 or past.rows.ndim != 2 or past.rows.shape[1] != len(past.columns):
+        raise ValueError(f"it has {len(past.columns)} names of columns, and rows of another length")
+    if len(set(past.columns)) < len(past.columns):
+        raise ValueError("two columns have one name")
+    if not np.isfinite(past.last(needed)).all():
+        raise ValueError("its last state is not finite")
+
+
 def _of_csv(path: Path) -> Past:
     with opened_text(path) as file:
         header = tuple(file.readline().strip().split(","))
-        return Past(header, np.loadtxt(file, delimiter=",", ndmin=2))
+        begin = file.readline()
+        rows = np.loadtxt(chain([begin], file), delimiter=",", ndmin=2) if begin.strip() else np.zeros((0, len(header)))
+    return Past(header, rows)
 
 
 def _of_npz(path: Path, names: Interface) -> Past:
     with opened(path) as file, np.load(file, allow_pickle=False) as stored:
         found = [(column, stored[column.key]) for column in columns_of(names) if column.key in stored]
+    for column, values in found:
+        shape = values.shape[:1] if column.flat else (*values.shape[:1], len(column.names))
+        if values.dtype.kind not in "fiu" or not values.ndim or values.shape != shape:
+            raise ValueError(f"{column.key} is no array of {len(column.names)} real numbers in each row")
     header = tuple(name for column, _ in found for name in column.names)
-    return Past(header, np.column_stack([values for _, values in found]))
+    return Past(header, np.column_stack([values for _, values in found]).astype(np.float64))
 
 
 def started_from(experiment: Experiment, past: Past, solver: Solver) -> Experiment:

@@ -19,7 +19,7 @@ UNASKED = 2**24
 _HINT = "fewer sites; frames in a file; real: float, which halves the solver; phigen.mpi on several machines"
 
 
-def expect_room(what: str, needed: int, place: Location | None = None) -> None:
+def expect_room(what: str, needed: int, place: Location | None = None, hint: str = _HINT) -> None:
     """Raises `LimitError` if so many bytes are more than there can be. Where that is not known, or few, all is well."""
     if needed <= UNASKED:
         return
@@ -27,7 +27,7 @@ def expect_room(what: str, needed: int, place: Location | None = None) -> None:
     if free is None or needed <= free:
         return
     message = f"{what} take {_readable(needed)} of memory at least, and {_readable(free)} are available"
-    raise LimitError([Diagnostic(message, place, _HINT)])
+    raise LimitError([Diagnostic(message, place, hint)])
 
 
 def filled(what: str, shape: Sequence[int], dtype: type[np.floating[Any]] = np.float64) -> NDArray[Any]:

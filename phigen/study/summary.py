@@ -221,7 +221,8 @@ def _is_telling(turns: NDArray[np.int64]) -> bool:
 
 def _windows(rows: NDArray[np.int64], of: int) -> NDArray[np.int64]:
     """The window of each row but the first, which has one of its own: `WINDOWS` parts of a run of so many rows."""
-    ends = np.cumsum([len(part) for part in np.array_split(np.arange(1, of), WINDOWS)])
+    share, rest = divmod(of - 1, WINDOWS)
+    ends = np.cumsum([share + (k < rest) for k in range(WINDOWS)])
     return np.where(rows == 0, WINDOWS, np.searchsorted(ends, rows - 1, side="right"))
 
 

@@ -84,6 +84,7 @@ def made(
     _expect_names([*(axis.name for axis in sweep.over), *listed], spec, sweep)
     target = chosen_target(setting.target)
     plan = _plan(spec, sweep, run, {name: len(values) for name, values in listed.items()}, target)
+    _expect_room_for_axes(sweep, spec)
     beside = _beside(compilation, target, spec)
     counts = np.zeros(2, dtype=np.int64)
 
@@ -119,6 +120,13 @@ def _expect_names(varied: Iterable[str], spec: Spec, sweep: Sweep) -> None:
 def _with_ensembles(spec: Spec) -> Spec:
     """Return the spec with code for ensembles, which sweeps need, whatever it leaves out."""
     return replace(spec, extras=replace(spec.extras, without=spec.extras.without - {"ensemble", "members"}))
+
+
+def _expect_room_for_axes(sweep: Sweep, spec: Spec) -> None:
+    """`LimitError` where the values along a dimension do not fit into memory; they are made with one copy."""
+    for axis in sweep.over:
+        place = spec.diagnostic(("sweeps", sweep.name, "over", axis.name), "").location
+        expect_room(f"{axis.size} values of {axis.name}", 2 * 8 * axis.size, place, "random members have no axes")
 
 
 def _members_of(plan: Plan, number: int) -> int:

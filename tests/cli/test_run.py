@@ -277,3 +277,41 @@ def test_states_too_far_apart_for_the_balance_of_energy_are_told(phigen, in_tmp)
     duffing = ("run", str(resources.bundled()["duffing"]), "--target", "numpy")
     assert "too far apart" not in phigen(*duffing).stdout
     assert "They are too far apart" in phigen(*duffing, "--every", 2).stdout
+
+
+#: Files that no run has written, and why: their rows, or their arrays.
+STRANGE = {
+    "twice.csv": ("t,q,p,q\n0,1,2,3\n", "two columns have one name"),
+    "short.csv": ("t,q,p,energy\n0,1,2\n", "rows of another length"),
+    "nan.csv": ("t,q,p\n0,1,nan\n", "its last state is not finite"),
+    "names.csv": ("t,q,p\n", "has no rows"),
+    "empty.csv": ("", "has no rows"),
+    "complex.npz": ({"t": [0.0], "x": [[1j, 0]]}, "x is no array of 2 real numbers"),
+    "texts.npz": ({"t": [0.0], "x": [["a", "b"]]}, "x is no array of 2 real numbers"),
+    "wide.npz": ({"t": [0.0], "x": [[1.0, 2.0, 3.0]]}, "x is no array of 2 real numbers"),
+    "flat.npz": ({"t": 0.0, "x": [[1.0, 2.0]]}, "t is no array of 1 real numbers"),
+}
+
+
+@pytest.mark.parametrize("file", STRANGE)
+def test_a_run_does_not_start_from_what_no_run_has_written(phigen, write, file):
+    content, why = STRANGE[file]
+    path = write("a.yaml")
+    if isinstance(content, dict):
+        np.savez(file, **content)
+    else:
+        Path(file).write_text(content)
+    done = phigen("run", path, "-t", "numpy", "--from", file)
+    assert done.exit_code == 2
+    assert why in " ".join(done.stderr.split())
+
+
+def test_more_members_than_there_is_memory_for_are_refused_at_their_place(phigen, write):
+    noisy = (
+        "phigen: 1\nname: thermal\ncoordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
+        "hamiltonian: p**2/2 + q**2/2\nnoise: {w: {hamiltonian: q}}\n"
+        "runs: {a: {initial: [1, 0], step: 0.1, steps: 10, members: 4294967296}}\n"
+    )
+    done = phigen("run", write("a.yaml", noisy), "-t", "numpy")
+    assert done.exit_code == 3
+    assert "a.yaml:7:60: error: 4294967296 members take 192 GiB of memory" in done.stderr

@@ -15,6 +15,7 @@ from phigen.realisations.catalogue import realise
 from phigen.spec.model import BirealisationChoice
 from phigen.spec.names import SPEC_FUNCTIONS
 from phigen.study import classical, conservation, dop853, summary
+from phigen.study.summary import WINDOWS, _windows
 from phigen.symbolic import arrays, readable
 from phigen.symbolic.expression import PI, call, number, power, symbol, text
 from phigen.symbolic.functions import FUNCTIONS
@@ -205,3 +206,11 @@ def test_starter_spec_summary_agrees_with_the_solver():
 
 def test_spec_of_the_demo_still_has_its_run():
     assert "blow_up" in spec.load(SPECS / "lotka_volterra.yaml").runs
+
+
+def test_windows_part_a_run_evenly_whatever_its_length():
+    for count in (1, 2, WINDOWS, WINDOWS + 1, 1000, 1003):
+        parts = np.array_split(np.arange(1, count), WINDOWS)
+        expected = [WINDOWS, *(k for k, part in enumerate(parts) for _ in part)]
+        assert _windows(np.arange(count), count).tolist() == expected
+    assert _windows(np.array([0, 1, 10**15 - 1]), 10**15).tolist() == [WINDOWS, 0, WINDOWS - 1]
