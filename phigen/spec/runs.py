@@ -15,7 +15,7 @@ from phigen.spec.model import AverageChoice, Run, Values
 from phigen.spec.problems import counted, did_you_mean, shown
 from phigen.spec.values import values as site_values
 from phigen.spec.yaml_source import Scalar
-from phigen.symbolic.expression import Expression, substitute, symbol
+from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import ELAPSED, initial
 
 #: What the step of an adaptive method is called.
@@ -49,7 +49,6 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
     stride = raw.get("stride", 1)
     if steps is not None and stride > max(steps, 1):
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
-    section = raw.get("section")
     lattice = run_of_lattice(name, raw, declared)
     numbers_of, arrays = _overrides(raw.get("parameters", {}), declared)
     return Run(
@@ -64,12 +63,12 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         start=start,
         exact=_exact(raw.get("exact", {}), declared),
         compare=without_repetition(raw.get("compare", ()), ("runs", name, "compare"), declared),
-        section=declared.formula(section, declared.dated_scope()),
+        section=_crossed(name, "section", raw, declared, declared.dated_scope()),
         direction=raw.get("direction") or "rising",
         duration=duration,
         until=until,
         every=every,
-        stop=declared.formula(raw.get("stop"), replace(declared.dated_scope(), piecewise=True)),
+        stop=_crossed(name, "stop", raw, declared, replace(declared.dated_scope(), piecewise=True)),
         average=_average(raw.get("average"), declared),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
@@ -85,6 +84,15 @@ def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageCh
     if raw is None:
         return AverageChoice()
     return AverageChoice(declared.number(raw.get("after"), declared.numbers()), raw.get("blocks"))
+
+
+def _crossed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: Scope) -> Expression | None:
+    """An expression whose zeros are looked for along the run, so that it has to change."""
+    found = declared.formula(raw.get(key), scope)
+    changing = {*declared.coordinates, *filter(None, [declared.time])}
+    if found is not None and not declared.incomplete and changing.isdisjoint(symbols_of(found)):
+        _fail(name, key, f"{key}: {shown(raw[key].text)} depends neither on a coordinate nor on the time", declared)
+    return found
 
 
 def _start(name: str, given: Scalar | None, declared: Declarations) -> Fraction:

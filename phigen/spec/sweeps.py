@@ -168,6 +168,9 @@ def _expect_sense(
     if members > limits.SWEPT:
         hint = "several sweeps, of a part each, or random members"
         _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, hint, limit=True)
+    if run is not None and found.frames > run.steps:
+        message = f"frames: every {found.frames} steps, and the run {run.name} has {run.steps}"
+        _fail((*place, "frames"), message, declared)
     if "crossings" in found.keep and run is not None and run.section is None:
         hint = "give the run a section: an expression whose zeros are the crossings"
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)
