@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from phigen.ir.lattice import bounds
 from phigen.lanes.lowering import Rows
@@ -203,7 +204,7 @@ def _case(
 
 def _near_seams(layout: Layout, part: Sequence[Sweep]) -> Iterator[str]:
     """What leaves out rows, and sites of them, that are not near all seams that the terms of a part begin on."""
-    window, last = max((sweep.window or 0) for sweep in part), len(layout.step.sites.axes) - 1
+    window, last = max((s.window or 0 for s in part), default=0), len(layout.step.sites.axes) - 1
     rows = window & ~(1 << last)
     if rows:
         yield f"if ((row.near & {rows}) != {rows}) continue;"
@@ -432,7 +433,7 @@ def over_rows(
     low = (low + 7) // 8 * 8 if back else low
     seamed = bool(layout.step.sites.seams)
     away, end = "s->inside[0]" if seamed else low, f"s->length - {max([0, *(high for _, high in last)])}"
-    values = {
+    values: dict[str, Any] = {
         "NAME": program.name,
         "low": away if one_row else f"{'row.near == 0' if seamed else 'row.whole'} ? {away} : s->length",
         "high": "s->inside[1]" if seamed else f"({end}) & ~(ptrdiff_t)7" if back else end,
@@ -446,7 +447,19 @@ def over_rows(
     body = ["/* the fields in other orders, in which loops that are for one order serve others */"] * bool(orders)
     body += [*orders, *_over_pieces(program, layout, values, cases, labels or range(1, 1 + len(cases)))]
     indented = [line if line.startswith("#") else f"    {line}" for line in body]
-    return render("c", "sweep_rows.c", {**values, "coloured": False, "unused": (), "body": indented, **more})
+    values |= {"coloured": False, "unused": (), "body": indented, **more}
+    if any(isinstance(case, Case) and not case.calls for case in cases):  # nothing moves, as where brackets are zero
+        values["unused"] = _not_read(values)
+    return render("c", "sweep_rows.c", values)
+
+
+def _not_read(values: Mapping[str, Any]) -> list[str]:
+    """The arguments of a function over rows that its body does not name."""
+    own = ["unit"] * values["alone"] + ["first", "end"] * values["several"]
+    arguments = ["s", *re.findall(r"(\w+)(?:,|$)", values["arguments"]), *own]
+    named = " s flow part" if values["coloured"] else ""  # by the lines that find the colour of a flow
+    text = "\n".join(values["body"]) + named
+    return [name for name in arguments if not re.search(rf"\b{name}\b", text)]
 
 
 def _over_pieces(
@@ -474,6 +487,8 @@ def _over_pieces(
 
 
 def _piece(values: Mapping[str, object], case: Case) -> list[str]:
+    if not case.calls:
+        return []
     changed = any(re.search(r"\brow\.\w+ = |_between\(", line) for line in (*case.setup, *case.calls))
     lines = render("c", "each_piece.c", {**values, **vars(case), "changed": changed}).splitlines()
     threads = values["threads"]
@@ -486,7 +501,7 @@ def _piece(values: Mapping[str, object], case: Case) -> list[str]:
 def _cases(loops: Sequence[Sequence[str]], labels: Sequence[int]) -> Iterator[str]:
     """The cases of a switch over parts of H, with their statements; each on a line, where all are short."""
     heads = ["default:" if k == labels[-1] else f"case {k}:" for k in labels]
-    short = all(len(lines) <= MOST_ON_A_LINE and "for" not in lines[0] for lines in loops)
+    short = all(len(lines) <= MOST_ON_A_LINE and "for" not in "".join(lines[:1]) for lines in loops)
     for head, lines in zip(heads, loops, strict=True):
         yield " ".join([head, *lines, "break;"]) if short else head
         yield from () if short else (f"    {line}" for line in (*lines, "break;"))
