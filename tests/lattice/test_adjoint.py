@@ -16,9 +16,9 @@ import phigen
 from phigen import SpecError, StepError
 from phigen.compiler import compile_spec
 from phigen.lanes.lowering import in_lanes
-from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.resources import bundled
 from phigen.runtime import c_lattice
+from phigen.scheme.sweep_inverse import can_be_undone, transposes
 from phigen.symbolic.expression import topological
 
 H, STEPS, SITES = 0.05, 4, 6

@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 from phigen.ir.passes.row_transposes import Handed
 from phigen.lanes.lowering import Rows
-from phigen.lattice.undoing import apart, can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import BACK, Adjoint, Ends, Gather, Sweep, Sweeps
+from phigen.scheme.sweep_inverse import apart, can_be_undone, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets.c.kernels import function, members

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 from phigen.ir.lattice import LatticeLoops, begins, weights
 from phigen.ir.passes.by_rows import RowLayout
-from phigen.lattice.undoing import can_be_undone, transposes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import BACK, Gather, Partners, Sweep, Sweeps
+from phigen.scheme.sweep_inverse import can_be_undone, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets import lattice

@@ -12,8 +12,8 @@ from dataclasses import replace
 
 from phigen.ir.passes import row_transposes
 from phigen.ir.passes.temporaries import temporaries
-from phigen.lattice.pairing import paired
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.pair_transposes import paired
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Ends
 from phigen.symbolic.expression import ZERO

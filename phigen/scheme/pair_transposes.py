@@ -1,4 +1,4 @@
-"""Transposes of what bonds or pairs add up, as a site gets them from each of them: both as a and as b.
+"""Transposes of sums over bonds or pairs of sites, as a site receives them from each: both as a and as b.
 
 Where the sums of b are those of a but for a sign, as forces are that act between two sites, the site gets as b what it
 gets as a, for the cotangents of the other one: a product of the Hessian of the pair's energy with one vector.

@@ -1,4 +1,4 @@
-"""Transposes of sweeps that collect: each site finds itself what those around would hand to it.
+"""Transposed sweeps of lattices that collect: each site computes itself what those around would hand to it.
 
 So it is where the shares of neighbours are cheap, as those of springs are: what they read is read here anyway, and
 cotangents of neighbours are all that is new. Where they are dear, such as sines of sums over neighbours, each is found

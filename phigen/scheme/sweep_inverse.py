@@ -1,4 +1,4 @@
-"""Sweeps that are undone: the fields before a flow, found from those after it by the flow over the time −h.
+"""Inverse sweeps of lattices: the fields before a flow, computed from those after it by the flow over the time −h.
 
 Of what bonds or pairs add up nothing is computed twice either: it reads nothing that the sweep moves. Where forces
 damp, a multiple of a field that is added to it is divided away; other damping is left out.
@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from phigen.lattice.collecting import collecting
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
 from phigen.scheme.steps import BACK, Sites, Sweep, Sweeps
+from phigen.scheme.sweep_collecting import collecting
 from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import PRESENT, Symbol
 
