@@ -121,7 +121,7 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
     if system.noise:
         section("Noise: dx = … + Σ σ π∇g ∘ dW", assignments(_noise(system, most)))
     if system.casimirs:
-        section("Casimirs", assignments(_named(system.casimirs, most)))
+        section("Casimirs", assignments(_casimirs(system, most)))
     if system.invariants:
         section("Invariants", assignments(_named(system.invariants, most)))
     if compilation.splitting:
@@ -195,6 +195,13 @@ def readable_one(expression: Any, most: int | None) -> str:
 
 def _named(formulas: Any, most: int | None) -> list[tuple[str, str]]:
     return [(name, readable_one(e, most)) for name, e in formulas.items()]
+
+
+def _casimirs(system: System, most: int | None) -> list[tuple[str, str]]:
+    """The Casimirs, those of log-canonical structures as logarithms of products of powers."""
+    from phigen.notation.powers import as_powers
+
+    return [(name, as_powers(e) or readable_one(e, most)) for name, e in system.casimirs.items()]
 
 
 def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:

@@ -1,0 +1,50 @@
+"""Casimirs of log-canonical structures as logarithms of products of powers, which is how they are known."""
+
+from __future__ import annotations
+
+from phigen.symbolic.expression import ONE, Expression, fold, symbols_of
+from phigen.symbolic.readable import readable
+
+
+def as_powers(casimir: Expression) -> str | None:
+    """½ Σ u log x² as ``log|x**u*…|``; None for an expression of another form."""
+    exponents = fold([casimir], _exponents)[0]
+    if not exponents or None in exponents:
+        return None
+    factors = [_power(name, u * 2) for name, u in exponents.items() if name is not None]
+    return f"log|{'*'.join(factors)}|"
+
+
+#: Coefficients of log x² by the name of x; that of 1 by None.
+_Sum = dict[str | None, Expression] | None
+
+
+def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
+    """The node as a linear combination of logarithms of squares of symbols, None where it is none."""
+    if any(a is None for a in args) and node.op != "log":
+        return None
+    parts = [a for a in args if a is not None]
+    if node.op == "log" and node.args[0].op == "pow" and node.args[0].value == 2:
+        base = node.args[0].args[0]
+        return {base.value: ONE} if base.op == "symbol" else None
+    match node.op:
+        case "add" | "sub":
+            sign = 1 if node.op == "add" else -1
+            found = dict(parts[0])
+            for name, u in parts[1].items():
+                found[name] = found[name] + u * sign if name in found else u * sign
+            return found
+        case "neg":
+            return {name: -u for name, u in parts[0].items()}
+        case "mul" if set(parts[0]) == {None} or set(parts[1]) == {None}:
+            scale, other = (parts[0], parts[1]) if set(parts[0]) == {None} else (parts[1], parts[0])
+            return {name: scale[None] * u for name, u in other.items()}
+    return {None: node} if not any(set(p) - {None} for p in parts) else None
+
+
+def _power(name: str, exponent: Expression) -> str:
+    written = readable([exponent], None)[0]
+    if written == "1":
+        return name
+    plain = written.isdigit() or (not symbols_of(exponent) and "/" not in written and "-" not in written)
+    return f"{name}**{written}" if plain or written.isidentifier() else f"{name}**({written})"
