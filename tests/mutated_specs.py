@@ -143,6 +143,17 @@ hamiltonian: x**2 + y**2/2 + z**2/3
 order: 2
 runs: {a: {initial: [1, 0, 0.1], step: 0.1, steps: 10}}
 """,
+    "gauss": """\
+phigen: 1
+name: body
+coordinates: [x, y, z]
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: x**2 + y**2/2 + z**2/3
+scheme: gauss
+structure: exact
+order: 4
+runs: {a: {initial: [1, 0, 0.1], step: 0.1, steps: 10}}
+""",
     "product": """\
 phigen: 1
 name: blocks
