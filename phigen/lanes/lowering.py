@@ -164,15 +164,15 @@ def _of_steps(program: Program) -> Blocks | Packs | Stages | None:
             return _paths(program, step, step.lanes)
         case Explicit() as step:
             back = step.adjoint.steps if step.adjoint else ()
-            return _with_back(_packs(program, (step.increment,), ()), back, 0)
+            return _with_back(program, _packs(program, (step.increment,), ()), back, 0)
         case Splitting() as step:
             used = operations(step.flows)
             packs = _packs(program, step.flows, tuple(f for f in NEAR_FUNCTIONS if f in used))
             kept = 2 * _DOUBLE * LANES**2 * program.dimension  # bytes of a segment of one pack
             undone = undoing(program, step) if packs else ()
             if packs and undone:
-                return _with_back(replace(packs, undone=True), undone, 0)
-            return _with_back(packs, step.adjoint.steps if step.adjoint else (), kept)
+                return _with_back(program, replace(packs, undone=True), undone, 0)
+            return _with_back(program, packs, step.adjoint.steps if step.adjoint else (), kept)
     return None
 
 
@@ -293,9 +293,10 @@ def _packs(program: Program, kernels: Sequence[Kernel], near: tuple[str, ...]) -
     return Packs(tuple(kernels), with_formulas(ops), near)
 
 
-def _with_back(packs: Packs | None, back: Sequence[Kernel], kept: int) -> Packs | None:
+def _with_back(program: Program, packs: Packs | None, back: Sequence[Kernel], kept: int) -> Packs | None:
     """Packs that members are pulled back in, if the transposes of the kernels can be computed in lanes too: as many as
     may keep so many bytes on the stack, which grow with the square of their number."""
+    back = back if program.offers("members") else ()
     ops = operations(back)
     abreast = next((k for k in (PACKS, 2, 1) if 2 * k**2 * kept <= MOST_STACK), 0)
     if packs is None or not abreast or library_calls(ops) or library_powers(back):

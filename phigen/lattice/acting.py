@@ -48,7 +48,7 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
     impulse = {f: at.impulse(f) for f in cell.fields}
     whole = _flow(cell, colouring, {f: tangent[f] + impulse[f] for f in cell.fields})
     if isinstance(whole, CellFlow):
-        return (whole,)
+        return (whole,) if whole.motions else ()
     components = [(f"f = {shortened(e)}", {f: e}) for f, e in impulse.items()]
     found = (*_tangent_flows(cell, colouring, host), *_pieces(cell, colouring, impulse, components, host))
     return tuple(flow for flow in found if flow.motions)

@@ -23,9 +23,10 @@ SYSTEMS = {
     "series, time": OSCILLATOR.replace("/4", "*(1 + cos(t)/9)") + TIME + SERIES,
     "series, composed": BODY + SERIES + "order: 4\ncomposition: suzuki\n",
     "path": BODY + "birealisation: karasev\n",
+    "pendulum": OSCILLATOR.replace("q**4/4", "cos(q)") + "scheme: splitting\norder: 2\ncomposition: none\n",
     "splitting": BODY + "scheme: splitting\n",
 }
-WITHOUT = [frozenset[str](), frozenset(["recurrences"]), frozenset(["lanes"]), frozenset(["members", "ensemble"])]
+WITHOUT = [frozenset[str](), frozenset(["recurrences"]), frozenset(["lanes"]), frozenset(["members"])]
 
 #: A system, what is left out, and the profile; those of one system suffice to see what each does to the others.
 FEW = [
@@ -33,6 +34,7 @@ FEW = [
     ("monitor, no parameters", WITHOUT[0], "small"),
     ("monitor", WITHOUT[1], "fast"),
     ("series, no parameters", WITHOUT[1], "fast"),
+    ("pendulum", frozenset(["members"]), "fast"),
 ]
 
 

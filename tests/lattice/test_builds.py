@@ -25,6 +25,9 @@ LATTICES = {
     "neighbours are read in reverse alone": GRID
     + HEISENBERG
     + "hamiltonian: u0**2/2 + u1**2/4 + u2**2/3 + u1*u1[i-1]/4\n",
+    "forces move nothing": GRAPH
+    + HEISENBERG
+    + 'hamiltonian: {sites: u1**2/3, bonds: "u1[a]*u1[b]/3"}\nforces: {covector: {u2: -u0/9}}\n',
     "rows are not handed over": PLANE + OSCILLATORS + "hamiltonian: p**2/2 + q**4/4\n",
     "coefficients alone call functions": GRID
     + OSCILLATORS
