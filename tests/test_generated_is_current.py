@@ -19,12 +19,13 @@ ROOT = resources.bundled_specs().parent
 GENERATED = ROOT / "generated"
 SUFFIXES = {"c": ("c", "h"), "numpy": ("py",), "js": ("mjs",)}
 NAMES = ["lotka_volterra", "kepler", "so4_manakov", "pendulum_euler", "vortices3"]
+#: Systems of the corpus that tests of their own are about.
+BESIDE = (*systems.TIMED, *systems.FORCED, *systems.NOISY, *systems.MONITORED, *systems.COLLOCATED)
+
 BUILD = "from phigen.cli import main; main()"
 
 
-@pytest.mark.parametrize(
-    "name", [*systems.NAMES, *systems.TIMED, *systems.FORCED, *systems.NOISY, *systems.MONITORED, *systems.LATTICES]
-)
+@pytest.mark.parametrize("name", [*systems.NAMES, *BESIDE, *systems.LATTICES])
 def test_generated_is_what_is_made_of_the_spec(name):
     compilation = systems.as_given(name)
     for target in compilation.spec.targets:
@@ -41,7 +42,7 @@ def test_generated_is_what_phigen_build_writes(monkeypatch):
 
 def test_nothing_else_is_generated():
     found = {str(p.relative_to(GENERATED)) for p in GENERATED.rglob("*") if p.is_file()}
-    names = (*systems.NAMES, *systems.TIMED, *systems.FORCED, *systems.NOISY, *systems.MONITORED, *systems.LATTICES)
+    names = (*systems.NAMES, *BESIDE, *systems.LATTICES)
     targets = [(name, target) for name in names for target in systems.spec_of(name).targets]
     assert found == {f"{name}/{name}.{suffix}" for name, target in targets for suffix in SUFFIXES[target]}
 
