@@ -39,7 +39,7 @@ class Session:
         (self.folder / f"{name}.json").write_text(json.dumps(data, indent=1), encoding="utf-8")
         (self.folder / f"{name}.md").write_text(text, encoding="utf-8")
         if self.docs:
-            document.write({name: text})
+            document.publish(self.folder, [name])
 
 
 def main() -> int:
@@ -57,8 +57,10 @@ def main() -> int:
     if options.prepare:
         prepare(problems, say)
         return 0
-    if options.write_docs:
-        document.write({"machine": f"Measured on {tables.machine()}."})
+    if options.publish:
+        document.publish(options.output, [file.stem for file in options.output.glob("*.md")])
+        return 0
+    session.save("machine", {}, f"Measured on {tables.machine()}.")
     failures: list[str] = []
     for name in options.only:
         say(name)
@@ -77,6 +79,7 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--problem", nargs="+", choices=names, default=names, help="problems of work and steps")
     parser.add_argument("--output", type=Path, default=Path("benchmark-results"), help="folder for tables and data")
     parser.add_argument("--prepare", action="store_true", help="compile the solvers of work and steps, no more")
+    parser.add_argument("--publish", action="store_true", help="put the tables of the folder into the docs, no more")
     parser.add_argument("--write-docs", action="store_true", help="put the tables into docs/benchmarks.md")
     return parser.parse_args()
 
@@ -108,7 +111,7 @@ def work(session: Session) -> list[str]:
     for problem in session.problems:
         measured = studies.work_precision(problem, session.effort, session.say)
         failures += [note for s in measured for note in s.notes if note.startswith(studies.GRID_FAILED)]
-        drawn = plots.draw(measured, document.FIGURES) if session.docs else {}
+        drawn = plots.draw(measured, session.folder / "figures")
         text = "\n".join(f"{tables.work_precision(s)}{drawn.pop(s.problem, '')}" for s in measured)
         data = {"summary": [tables.speed_up_row(s) for s in measured], "studies": [asdict(s) for s in measured]}
         session.save(f"work-{problem.name}", data, text)

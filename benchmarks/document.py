@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "benchmarks.md"
@@ -20,6 +21,13 @@ def replaced(text: str, name: str, table: str) -> str:
     before, _, rest = text.partition(begin)
     _, _, after = rest.partition(end)
     return f"{before}{begin}\n\n{table.strip()}\n\n{end}{after}"
+
+
+def publish(folder: Path, names: list[str]) -> None:
+    """Put tables that were saved in a folder into the document, and its figures beside it."""
+    write({name: (folder / f"{name}.md").read_text(encoding="utf-8") for name in names})
+    for figure in (folder / "figures").glob("*.svg"):
+        shutil.copy(figure, FIGURES / figure.name)
 
 
 def write(tables: dict[str, str]) -> None:
