@@ -75,7 +75,7 @@ function slopes(solver, stage, start, z, moves) {
   }
 }
 
-/** The largest change at any stage, in sizes of the unknowns: of coordinates the norm of x, of group elements 1. */
+/** The largest change at any stage, in units of the unknowns: |x| for coordinates, 1 for group elements. */
 function changeOf(start, before, after) {
   let norm = 0;
   for (let i = 0; i < DIM; i++) norm += start[i] * start[i];

@@ -460,10 +460,9 @@ export class Solver {
     const { tCarry } = this;
     // #endif
     const before = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
-    // #if GAUSS
-    const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry), t };
-    // #else
     const at = { x: Float64Array.from(this.x), carry: Float64Array.from(this.carry) };
+    // #if GAUSS
+    at.t = t;
     // #endif
     // #if ATTITUDE
     const turned = Float64Array.from(this.turned);

@@ -7,7 +7,7 @@ import { stageChange, stageChangeJacobian, stageSlopeJacobian } from "./model.mj
 
 const WIDE = DIM + UNKNOWNS;
 
-/** How the moves vary along coordinate j, by sweeps of their linear equations; null if these do not come to an end. */
+/** Derivatives of the moves along coordinate j, by sweeps of linear equations; null if they do not end. */
 function variedAlong(solver, slopes, j) {
   const [z, moves] = [stages(), stages()];
   let previous = Infinity;

@@ -1,5 +1,5 @@
 /* A pendulum, H = p^2/2 - g cos q, as a hand-written model for the runtime in templates/c/runtime. One of PHI_NEWTON, PHI_PATH,
-   PHI_EXPLICIT and PHI_SPLITTING is given, and others that are wanted; of these switches, generated files have no traces. */
+   PHI_EXPLICIT, PHI_SPLITTING and PHI_GAUSS is given, and others that are wanted; of these switches, generated files have no traces. */
 #ifndef DECLARATIONS_H
 #define DECLARATIONS_H
 #include <stddef.h>
@@ -19,6 +19,12 @@
 #ifndef PHI_SPLITTING
 #define PHI_SPLITTING 0
 #endif
+#ifndef PHI_GAUSS
+#define PHI_GAUSS 0
+#endif
+#define PHI_STAGED 0
+#define PHI_FRAMED 0
+enum { PHI_NODES = 1, PHI_WIDTH = 1, PHI_UNKNOWNS = 2 };
 #ifndef PHI_COMPOSED
 #define PHI_COMPOSED 0
 #endif
@@ -49,7 +55,7 @@
 #define PHI_NOISE 0
 #endif
 #define PHI_IMPLICIT (PHI_NEWTON || PHI_PATH)
-#define PHI_GUESSED (PHI_IMPLICIT && !PHI_NOISE)
+#define PHI_GUESSED ((PHI_IMPLICIT || PHI_GAUSS) && !PHI_NOISE)
 #define PHI_PARAMETERS 1
 #define PHI_KICKS 0
 #ifndef PHI_GAUGE
@@ -63,7 +69,7 @@
 #define PHI_MODIFIED 0
 #define PHI_ADVANCE 1
 #define PHI_UNROLLED 0
-#define PHI_RECURRENCES (PHI_FAST && PHI_GUESSED)
+#define PHI_RECURRENCES (!PHI_GAUSS && PHI_FAST && PHI_GUESSED)
 #define PHI_BLOCKS PHI_RECURRENCES
 #define PHI_GROUPS PHI_BLOCKS
 #define PHI_TRACED (PHI_IMPLICIT && PHI_ADJOINT && PHI_FAST)
