@@ -69,7 +69,8 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
         leading = None if compilation.realisation is None else series_formulas(compilation, most).leading
         return [] if leading is None else [(compilation.order.order, leading)]
     if compilation.realisation is None:
-        raise SpecError([Diagnostic(f"the modified Hamiltonian is not computed for {compilation.label}")])
+        message = f"the modified Hamiltonian is not computed for a step by {compilation.label}"
+        raise SpecError([Diagnostic(message, hint="scheme: series has it")])
     system, chart = compilation.system, compilation.chart
     expect_modified(system, chart, len(compilation.program.fractions))
     found = corrections(system, chart, compilation.order, count, compilation.gauge)

@@ -192,7 +192,7 @@ def test_modified_hamiltonian_in_latex_is_refused_where_it_is_not_computed(phige
     assert "H_{2} &= " in phigen("show", SPECS / "henon_heiles.yaml", *options).stdout
     done = phigen("show", SPECS / "henon_heiles.yaml", *options, "--modified", "1")
     assert (done.exit_code, done.stdout) == (1, "")
-    assert "not computed for a splitting" in done.stderr
+    assert "not computed for a step by splitting" in done.stderr
 
 
 def test_show_names_each_correction_once(phigen):

@@ -321,6 +321,7 @@ def test_completion_script_is_offered():
                 "plain,kelp/",
                 "plain,kepler",
                 "plain,kepler_eccentric",
+                "plain,kowalevski_gauss",
                 "plain,kowalevski_top",
                 "plain,kdv",
                 "plain,klein_gordon",
