@@ -1,7 +1,7 @@
 /*
  * The declarations of double_well.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3f285f314f17675c36b8613467fd0d969c867fb018fd0bafe43120ae5f81ac3c
+ * body-sha256: fda1fdec722d1c58e51b1dcac211c25c844efe6d15415bb5d0a1a4dc67a32cb9
  */
 #ifndef DOUBLE_WELL_H
 #define DOUBLE_WELL_H
@@ -27,7 +27,8 @@ typedef struct {
 } double_well_params;
 extern const double_well_params double_well_default_params;
 
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x). params may be
+   NULL. */
 double double_well_hamiltonian(const double_well_params *params, const double x[2]);
 void double_well_casimirs(const double_well_params *params, const double x[2], double out[]);
 void double_well_vector_field(const double_well_params *params, const double x[2], double out[2]);

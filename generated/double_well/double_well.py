@@ -11,7 +11,7 @@
 #   one Newton iteration: 5 additions, 11 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build double_well
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 5726a0b12c4e243c7efba20387107d9245a018262f35a96586a953efd56ec803
+# body-sha256: fee96bce3f0ab56346f25052712a2c6bb5d7badc57cff9c0f131d0880332c4a4
 import numpy as np
 
 VERSION = "0.1.0"
@@ -435,6 +435,6 @@ def noise_fields(x, **parameters):
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """The right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 1570ee41a8d762eba53d24939d16a28ee7e0346e953502e8910fc3166aed19df
+ * body-sha256: 095344cde55190032e9c61a5f40405d019ef01aa946a771c2128dd7a776c7b95
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -436,7 +436,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(t, x). */
+  /** The vector field dx/dt at a state and a time. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorField(this.params, t, x, out);

@@ -1,7 +1,7 @@
 /*
  * The declarations of landau_lifshitz.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 7b4d5e9db358fb236694a641b22ca26b881c45b163fde8da543bf4ff5d2d7bc2
+ * body-sha256: 8817d6033495eaa8531f44971fa69fde89c9a2de6f5585f71075455493c5c533
  */
 #ifndef LANDAU_LIFSHITZ_H
 #define LANDAU_LIFSHITZ_H
@@ -24,7 +24,8 @@ typedef struct {
 } landau_lifshitz_params;
 extern const landau_lifshitz_params landau_lifshitz_default_params;
 
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x). params may be
+   NULL. */
 double landau_lifshitz_hamiltonian(const landau_lifshitz_params *params, const double x[3]);
 void landau_lifshitz_casimirs(const landau_lifshitz_params *params, const double x[3], double out[]);
 void landau_lifshitz_vector_field(const landau_lifshitz_params *params, const double x[3], double out[3]);

@@ -10,7 +10,7 @@
 #   one Newton iteration: 70 additions, 109 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build landau_lifshitz
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 1cb8567e58a797da04b0b0f7a7f7aed392907e006324e2341f1b9be486c57f10
+# body-sha256: 3a92b03cc117acc051e4d454ba2f089622d2d5d0682bbc1673c01f0e0e1a2092
 import numpy as np
 
 VERSION = "0.1.0"
@@ -509,6 +509,6 @@ def casimirs(x, **parameters):
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """The right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: ab6972d9d86521c06ed31a8a0b25c09f954d72f212b3717a0f23b06bbaf534f5
+ * body-sha256: 3ff2cf7f82bb62bb924bd1dbdd48f04e7cd5cd6f382d3e2e6ec578fbe4029b74
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -326,7 +326,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x). */
+  /** The vector field dx/dt at a state. */
   vectorField(x = this.x) {
     const out = new Float64Array(DIM);
     vectorField(this.params, x, out);

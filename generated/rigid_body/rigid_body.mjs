@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 6e900c8682c5c8754691d3015892f2883f72994a29ac3d1d17f1bbe99d4a214d
+ * body-sha256: 49998314f1eabae2b2f4711313e8389be9e5f9bf85d50cc676c1c969c8e4429c
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -714,7 +714,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x). */
+  /** The vector field dx/dt at a state. */
   vectorField(x = this.x) {
     const out = new Float64Array(DIM);
     vectorField(this.params, x, out);

@@ -7,7 +7,7 @@
  *   one evaluation of the equation for p: 2 additions, 11 multiplications, 1 division
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build sir_epidemic
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 0da7480dacbfc3714aa6bf813e7ccb78b754fc237712064a1cf0d7faacc98818
+ * body-sha256: e1643636bd6f8d75e4fddf740c2763a0125db8f7acf766de83d9536d7e592db0
  */
 /*
  * import { Solver, StepError } from './sir_epidemic.mjs';
@@ -415,7 +415,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x). */
+  /** The vector field dx/dt at a state. */
   vectorField(x = this.x) {
     const out = new Float64Array(DIM);
     vectorField(this.params, x, out);

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_chain.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 32f59f2d9353350e3b290e9ad09c21a20b3576e1ea94551944e1caa1f11c7fd5
+ * body-sha256: 1395d6aec2323248c559d8a74983463aee4be2709212d8aac35a6ac3fbee1c2e
  */
 #ifndef THERMAL_CHAIN_H
 #define THERMAL_CHAIN_H
@@ -29,7 +29,8 @@ typedef struct {
 } thermal_chain_params;
 extern const thermal_chain_params thermal_chain_default_params;
 
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x). params may be
+   NULL. */
 double thermal_chain_hamiltonian(const thermal_chain_params *params, const double x[12]);
 void thermal_chain_casimirs(const thermal_chain_params *params, const double x[12], double out[]);
 void thermal_chain_vector_field(const thermal_chain_params *params, const double x[12], double out[12]);

@@ -12,7 +12,7 @@
 #   one Newton iteration: 448 additions, 636 multiplications, 8 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_chain
 # SPDX-License-Identifier: 0BSD
-# body-sha256: e4536fc0b71306ad799918e11ed1d802ab50e4d24a0ab0b8615acee70ad548c8
+# body-sha256: 25a91c040af8338cfd736726bbf3db0604fd1db77309345cd99d7c85f7e83492
 import numpy as np
 
 VERSION = "0.1.0"
@@ -1370,6 +1370,6 @@ def noise_fields(x, **parameters):
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """The right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -1,7 +1,7 @@
 /*
  * The declarations of thermal_spin.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 055337ec431e61777714558e899f3b55b44c78a2062365d342ea930afc85ce2a
+ * body-sha256: 9b84463475840935a15c105dc6ff8c2854567db034d9836f6d34644cf7b8ab15
  */
 #ifndef THERMAL_SPIN_H
 #define THERMAL_SPIN_H
@@ -27,7 +27,8 @@ typedef struct {
 } thermal_spin_params;
 extern const thermal_spin_params thermal_spin_default_params;
 
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x). params may be
+   NULL. */
 double thermal_spin_hamiltonian(const thermal_spin_params *params, const double x[3]);
 void thermal_spin_casimirs(const thermal_spin_params *params, const double x[3], double out[]);
 void thermal_spin_vector_field(const thermal_spin_params *params, const double x[3], double out[3]);

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bfe9ed807f992a022ed3f3f86d492ba0d4ba277c10718feb1d937d9f8dac1923
+ * body-sha256: c7cc88bd0502f0454853d8462899db7b9697b56f7b321ca4ed30b5a5a7c53174
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -552,7 +552,7 @@ export class Solver {
     return out;
   }
 
-  /** The right-hand side pi(x) grad H(x). */
+  /** The vector field dx/dt at a state. */
   vectorField(x = this.x) {
     const out = new Float64Array(DIM);
     vectorField(this.params, x, out);

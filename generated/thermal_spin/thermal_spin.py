@@ -12,7 +12,7 @@
 #   one Newton iteration: 49 additions, 72 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fe991927ebe225574224c0cfb21d20b5de943ae4b5795cd975020b7f2e4a954b
+# body-sha256: 6a23bf175ea4c0c8766eae2e2d4afdf635c47e6946e9a8715c32bd37eeb2916d
 import numpy as np
 
 VERSION = "0.1.0"
@@ -574,6 +574,6 @@ def noise_fields(x, **parameters):
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """The right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

@@ -1,7 +1,7 @@
 /*
  * The declarations of thruster_body.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cc95da035fbc8912187bccb3bd0c3aeb3fa79dfcf5d87925391a1dc7994d241a
+ * body-sha256: 5e870812c713fd2073c927a2ea82df52bf723b080e99e1285b9c93a6e3b83924
  */
 #ifndef THRUSTER_BODY_H
 #define THRUSTER_BODY_H
@@ -26,7 +26,8 @@ typedef struct {
 } thruster_body_params;
 extern const thruster_body_params thruster_body_default_params;
 
-/* The Hamiltonian; the Casimirs; the right-hand side pi(x) grad H(x). params may be NULL. */
+/* The Hamiltonian; the Casimirs; the right-hand side pi(x) (grad H(x) + zeta(x)) + f(x). params may be
+   NULL. */
 double thruster_body_hamiltonian(const thruster_body_params *params, const double x[3]);
 void thruster_body_casimirs(const thruster_body_params *params, const double x[3], double out[]);
 void thruster_body_vector_field(const thruster_body_params *params, const double x[3], double out[3]);

@@ -10,7 +10,7 @@
 #   one Newton iteration: 71 additions, 96 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build thruster_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: fd6327be6b7c6a59a6beee4402565eaeb4a7c30f17b3c1b3858542b17e3efecd
+# body-sha256: b05a75e8990d30aab77baa2345b6c36e6927dd29d28e4db6093210a290bbf580
 import numpy as np
 
 VERSION = "0.1.0"
@@ -517,6 +517,6 @@ def casimirs(x, **parameters):
 
 
 def vector_field(x, **parameters):
-    """The right-hand side pi(x) grad H(x): (..., DIM) -> (..., DIM)."""
+    """The right-hand side pi(x) (grad H(x) + zeta(x)) + f(x): (..., DIM) -> (..., DIM)."""
     with np.errstate(all="ignore"):
         return _vector_field(_values(parameters), np.asarray(x, dtype=float))

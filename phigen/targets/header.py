@@ -55,6 +55,12 @@ def _kind(program: Program) -> str:
     return "An integrator on the leaves, with forces," if program.forced else "A Poisson Hamiltonian integrator"
 
 
+def right_hand_side(program: Program) -> str:
+    """Return the formula of the vector field, with the forces if there are any."""
+    at = "(t, x)" if program.time else "(x)"
+    return f"pi(x) (grad H{at} + zeta{at}) + f{at}" if program.forced else f"pi(x) grad H{at}"
+
+
 def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Callable[[str], str]) -> dict[str, object]:
     """What a module states of its system: ``listed`` writes a sequence, ``key`` the name of a parameter."""
     noise = program.noise
@@ -69,6 +75,7 @@ def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Call
         "observed": listed(program.observed) if program.observed else "",
         "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
         "positive": listed([p.name for p in program.parameters if p.positive]),
+        "right_hand_side": right_hand_side(program),
         "noise": noise is not None,
         "sources": listed(noise.sources) if noise else "",
         "parts": noise.parts if noise else 0,

@@ -23,6 +23,8 @@ SYSTEMS = {
     "series, time": OSCILLATOR.replace("/4", "*(1 + cos(t)/9)") + TIME + SERIES,
     "series, composed": BODY + SERIES + "order: 4\ncomposition: suzuki\n",
     "path": BODY + "birealisation: karasev\n",
+    "path, zero brackets": "coordinates: [x, y]\npoisson: {log_canonical: [[0, 0], [0, 0]]}\n"
+    "hamiltonian: cos(x + y)\nbirealisation: karasev\ngauge: none\n",
     "pendulum": OSCILLATOR.replace("q**4/4", "cos(q)") + "scheme: splitting\norder: 2\ncomposition: none\n",
     "splitting": BODY + "scheme: splitting\n",
 }
@@ -35,6 +37,7 @@ FEW = [
     ("monitor", WITHOUT[1], "fast"),
     ("series, no parameters", WITHOUT[1], "fast"),
     ("pendulum", frozenset(["members"]), "fast"),
+    ("path, zero brackets", WITHOUT[0], "fast"),
 ]
 
 

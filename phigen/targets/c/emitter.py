@@ -24,7 +24,7 @@ from phigen.targets.c.lanes import KNOTS, printed_back, remembered, travels
 from phigen.targets.c.lanes import printed as kernels_in_lanes
 from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
-from phigen.targets.header import header_lines, plain, sealed
+from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
 from phigen.targets.rendering import render
 
@@ -188,9 +188,9 @@ Exported = list[tuple[Kernel, str, bool]]
 def _observables(program: Program) -> Iterator[tuple[str, Exported]]:
     """What users may ask of a system at a state, and what the header says of it."""
     seen, noise, monitor, modified = program.observables, program.noise, program.monitor, program.modified
-    at, of = (" at the time t", "t, x") if program.time else ("", "x")
+    at = " at the time t" if program.time else ""
     yield (
-        f"The Hamiltonian{at}; the Casimirs; the right-hand side pi(x) grad H({of}). params may be NULL.",
+        f"The Hamiltonian{at}; the Casimirs; the right-hand side {right_hand_side(program)}. params may be NULL.",
         [(seen.energy, "hamiltonian", True), (seen.casimirs, "casimirs", False), (seen.vector_field, "", False)],
     )
     if seen.named:

@@ -600,14 +600,14 @@ export class Solver {
 
   // #endif
   // #if TIMED
-  /** The right-hand side pi(x) grad H(t, x). */
+  /** The vector field dx/dt at a state and a time. */
   vectorField(x = this.x, t = this.t) {
     const out = new Float64Array(DIM);
     vectorField(this.params, t, x, out);
     return out;
   }
   // #else
-  /** The right-hand side pi(x) grad H(x). */
+  /** The vector field dx/dt at a state. */
   vectorField(x = this.x) {
     const out = new Float64Array(DIM);
     vectorField(this.params, x, out);
