@@ -29,6 +29,7 @@ def expect_refused(why: str, **asked: Any) -> None:
         lattice.integrate(x0, 0.2, 50, 20, **asked)
     MPI.COMM_WORLD.barrier()
     assert before == {path: path.read_bytes() for path in sorted(folder.iterdir())}
+    MPI.COMM_WORLD.barrier()  # or a process that goes on changes files that another one still looks at
 
 
 def expect_failing_run_leaves_nothing() -> None:
@@ -36,7 +37,9 @@ def expect_failing_run_leaves_nothing() -> None:
     files = folder / f"failing_{count}.npy", folder / f"failing_{count}.state"
     with pytest.raises(StepError):
         lattice.integrate(x0, 1e300, 50, 1, output=files[0], checkpoints=files[1], parameters=values)
+    MPI.COMM_WORLD.barrier()
     assert not list(folder.glob(f"failing_{count}*"))
+    MPI.COMM_WORLD.barrier()
 
 
 folder, count = Path(sys.argv[1]), MPI.COMM_WORLD.size
