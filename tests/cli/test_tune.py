@@ -120,7 +120,7 @@ def test_lattices_are_tuned_by_the_same_search(phigen, in_tmp):
     found = json.loads(done.stdout)
     best = found["winner"]
     assert found["sizes"] == [24]
-    assert found["unit"]["kind"] == "of its sites"
+    assert found["unit"]["kind"] == "relative"
     assert best["error"] <= 1e-6
     assert best["seconds_per_unit_time"] <= 1.1 * min(f["seconds_per_unit_time"] for f in found["finalists"])
     Path("chain.yaml").write_text(paste(CHAIN, found), encoding="utf-8")

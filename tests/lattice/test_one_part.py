@@ -11,7 +11,7 @@ import pytest
 import phigen
 import phigen.spec
 from phigen.compiler import compile_spec, emit
-from phigen.lattice import undoing
+from phigen.scheme import sweep_inverse
 
 H, STEPS, STRIDE, SITES = 0.1, 5, 2, 6
 KINDS = ("axes", "graph", "pairs")
@@ -71,7 +71,7 @@ def test_gradients_of_lattices_of_one_part_are_differences(kind, seed, profile):
 @pytest.mark.parametrize("kind", KINDS)
 def test_gradients_of_one_part_are_differences_where_fields_are_stored(kind, monkeypatch):
     """Not found again by the inverse of a flow, which all these have."""
-    monkeypatch.setattr(undoing, "_changes", lambda *_: {})
+    monkeypatch.setattr(sweep_inverse, "_changes", lambda *_: {})
     text, given = drawn(kind, 1)
     assert "t_keep_steps(" in expect_gradients(phigen.spec.loads(text), given, 1, "fast")
 

@@ -131,7 +131,7 @@ def test_messages_show_no_control_or_bidirectional_characters(tmp_path: Path) ->
 
 def test_a_file_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     for path in (tmp_path / "missing.yaml", tmp_path, tmp_path / "a\0b"):
-        with pytest.raises(SpecError, match="cannot read"):
+        with pytest.raises(SpecError, match=r"cannot read|there is no file"):
             load(path)
 
 
