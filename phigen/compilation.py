@@ -112,7 +112,7 @@ class Compilation:
 
     @property
     def structure(self) -> str:
-        """That of a Gauss method, as in specs."""
+        """The structure of a Gauss method, as in specs."""
         return "to truncation" if self.gauss and not self.gauss.exact else "exact"
 
     def told(self, method: str) -> str:

@@ -59,7 +59,7 @@ def command(
     for value, option in ((horizon, "--horizon"), (budget, "--budget")):
         if value is not None and not (value > 0 and math.isfinite(value)):
             raise click.BadParameter(f"{value!r} is not a positive number", param_hint=option)
-    wanted = _orders(orders)
+    compared_orders = _orders(orders)
     if plot:
         from phigen.drawing.palette import require_matplotlib
 
@@ -68,15 +68,15 @@ def command(
     _expect_comparable(spec)
     compilation = compile_proved(spec.for_running(tangent=spec.lattice is None))
     run, problem = initial_value_problem(console, compilation, name, settings, horizon, "energy")
-    found = compare(compilation, problem, wanted, equal=equal, budget=budget, note=console.note)
+    result = compare(compilation, problem, compared_orders, equal=equal, budget=budget, note=console.note)
     if as_json:
-        out_json(_described(found, spec, run))
+        out_json(_described(result, spec, run))
     else:
-        _print(found, spec, run)
+        _print(result, spec, run)
     if plot:
         from phigen.drawing import comparison, figures
 
-        figures.save(comparison.figure(found, f"{spec.name}, run {run.name}"), plot)
+        figures.save(comparison.figure(result, f"{spec.name}, run {run.name}"), plot)
         console.note(f"wrote {plot}")
 
 

@@ -162,7 +162,7 @@ def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expre
 
 
 def change_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """What a step adds to the coordinates."""
+    """Kernel of the change of the coordinates in a step."""
     return Kernel(
         "stage_change",
         "the change of the coordinates from x, by the unknowns",

@@ -75,7 +75,7 @@ class StarAlgebra:
         return not any(any(residuals) for _, residuals in self.axioms())
 
     def axioms(self) -> Iterator[tuple[str, Iterator[Vector]]]:
-        """What the momentum map rests on, each with residuals that are empty where it holds."""
+        """Statements that the momentum map rests on, each with residuals that are empty where it holds."""
         n, one = range(self.dimension), self.field.one
         units = [{i: one} for i in n]
         yield "A is associative", (self._associator(i, j, k) for i in n for j in n for k in n)

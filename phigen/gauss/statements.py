@@ -1,4 +1,4 @@
-"""What makes a Gauss step what it is said to be, proved for each build.
+"""Statements about a Gauss step, proved for each build: symplecticity, order, momentum map.
 
 A Gauss method is symplectic and keeps quadratic first integrals if μ_ij + μ_ji = 1 for its coefficients as used. With
 the axioms of `phigen.gauss.star_algebra` the components of J are quadratic, and J is a Poisson map from the

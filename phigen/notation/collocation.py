@@ -15,7 +15,7 @@ def method(compilation: Compilation) -> str:
 
 
 def realisation_of(compilation: Compilation) -> Realisation:
-    """That of a compilation by Gauss collocation."""
+    """Return the formulas of a compilation by Gauss collocation."""
     if compilation.gauss is None:
         raise ValueError(f"{compilation.spec.name} is not compiled to Gauss collocation")
     return compilation.gauss
@@ -32,7 +32,7 @@ def equations() -> list[tuple[str, str]]:
 
 
 def lines(compilation: Compilation) -> list[str]:
-    """What the unknowns are, one line for each part, and what the step is."""
+    """Describe the unknowns, one line for each part, and the step."""
     found, names = [], compilation.system.coordinates
     for part in realisation_of(compilation).parts:
         listed = ", ".join(names[i] for i in part.indices)

@@ -38,7 +38,7 @@ def expect_offered(spec: Spec) -> None:
 
 
 def _refused(spec: Spec) -> Iterator[tuple[tuple[str, ...], str, str]]:
-    """What is asked for and not offered: where, what, and what to use."""
+    """Yield the options that are not offered: path of keys, message, hint."""
     extras, series = spec.extras, "scheme: series has it"
     if spec.lattice:
         yield ("lattice",), "not for lattices", "scheme: auto, splitting or series"
@@ -71,7 +71,7 @@ def plan_gauss(spec: Spec) -> Order:
 
 
 def realise_gauss(spec: Spec, system: System) -> Realisation:
-    """How the coordinates are treated. Raises `SpecError` where an exact Poisson map is wanted and none is known."""
+    """Return the realisation of the coordinates. Raises `SpecError` for `structure: exact` where none is known."""
     if spec.structure == "to truncation":
         return direct(system)
     found = collective(system)

@@ -1,4 +1,4 @@
-"""What is printed of a Gauss method in C: its coefficients, sizes, and the kernels at one stage."""
+"""Parts of a Gauss method in C: its coefficients, sizes, and the kernels at one stage."""
 
 from __future__ import annotations
 
