@@ -1,4 +1,4 @@
-"""``python -m benchmarks``: all tables of docs/benchmarks.md, or some of them."""
+"""``python -m benchmarks``: all tables of docs/benchmarks.md and docs/gradients.md, or some of them."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from benchmarks import document, eccentric, ensembles, lattices, plots, studies, tables
+from benchmarks import document, eccentric, ensembles, lattices, plots, pullbacks, studies, tables
 from benchmarks.problems import PROBLEMS, Problem
 from benchmarks.studies import Effort
 
 ROOT = Path(__file__).resolve().parent.parent
-TABLES = ("work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "gradients", "sharing")
+TABLES = ("work", "steps", "ensembles", "growth", "build", "lattices", "eccentric", "pullbacks", "gradients", "sharing")
 #: Of a table that is made alone, in a process of its own: what it imports reads variables of the environment.
 ALONE = ("gradients", "sharing")
 
@@ -160,6 +160,13 @@ def orbit(session: Session) -> list[str]:
     return []
 
 
+def passes(session: Session) -> list[str]:
+    """The tables of docs/gradients.md."""
+    for name, text in pullbacks.measured(session.effort.quick, session.say).items():
+        session.save(name, {}, text)
+    return []
+
+
 def alone(name: str) -> Callable[[Session], list[str]]:
     """A table by the module of its name, in another process."""
 
@@ -178,7 +185,7 @@ def alone(name: str) -> Callable[[Session], list[str]]:
 
 MAKERS: dict[str, Callable[[Session], list[str]]] = {
     "work": work, "steps": steps, "ensembles": members, "growth": growth, "build": build, "lattices": sites,
-    "eccentric": orbit, **{name: alone(name) for name in ALONE},
+    "eccentric": orbit, "pullbacks": passes, **{name: alone(name) for name in ALONE},
 }  # fmt: skip
 
 if __name__ == "__main__":

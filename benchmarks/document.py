@@ -1,12 +1,15 @@
-"""docs/benchmarks.md: each table stands between two markers with its name, and is replaced alone."""
+"""Tables of the docs: each stands between two markers with its name, on one page, and is replaced alone."""
 
 from __future__ import annotations
 
 import shutil
 from pathlib import Path
 
-DOCUMENT = Path(__file__).resolve().parents[1] / "docs" / "benchmarks.md"
-FIGURES = DOCUMENT.parent / "figures"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+DOCUMENT = DOCS / "benchmarks.md"
+FIGURES = DOCS / "figures"
+#: Pages with tables, beside the one of the benchmarks.
+PAGES = {"pullbacks": DOCS / "gradients.md"}
 
 
 def markers(name: str) -> tuple[str, str]:
@@ -17,7 +20,7 @@ def replaced(text: str, name: str, table: str) -> str:
     """The text with another table between the markers of this name; raises `LookupError` where there are none."""
     begin, end = markers(name)
     if text.count(begin) != 1 or text.count(end) != 1:
-        raise LookupError(f"{DOCUMENT} has no place for {name}: the lines {begin} and {end}")
+        raise LookupError(f"{page(name)} has no place for {name}: the lines {begin} and {end}")
     before, _, rest = text.partition(begin)
     _, _, after = rest.partition(end)
     return f"{before}{begin}\n\n{table.strip()}\n\n{end}{after}"
@@ -30,9 +33,13 @@ def publish(folder: Path, names: list[str]) -> None:
         shutil.copy(figure, FIGURES / figure.name)
 
 
+def page(name: str) -> Path:
+    """The page of a table: that of the first word of its name, or the one of the benchmarks."""
+    return PAGES.get(name.partition("-")[0], DOCUMENT)
+
+
 def write(tables: dict[str, str]) -> None:
-    """Put these tables into the document."""
-    text = DOCUMENT.read_text(encoding="utf-8")
+    """Put these tables into their pages."""
     for name, table in tables.items():
-        text = replaced(text, name, table)
-    DOCUMENT.write_text(text, encoding="utf-8")
+        document = page(name)
+        document.write_text(replaced(document.read_text(encoding="utf-8"), name, table), encoding="utf-8")

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
+from phigen.display import display
 from phigen.gauss.realisation import Realisation
 from phigen.geometry.system import System, system_of_lattice
 from phigen.realisations.protocol import BiRealisation
@@ -173,12 +174,10 @@ class Compilation:
 
     def _repr_latex_(self) -> str:
         """The formulas of the system and of the method, of a lattice those of the cell, for notebooks."""
-        from phigen.notation import latex, lattices
-
-        return lattices.document(self.cell) if self.cell else latex.document(self)
+        if self.cell:
+            return cast(str, display("formulas of a cell")(self.cell))
+        return cast(str, display("formulas of a compilation")(self))
 
     def _repr_html_(self) -> str:
         """The system and what it was compiled to, for notebooks."""
-        from phigen.notation.notebook import compilation_html
-
-        return compilation_html(self)
+        return cast(str, display("page of a compilation")(self))

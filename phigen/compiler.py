@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, Unpack
 from phigen import progress, registry
 from phigen.compilation import Compilation, NoSystem
 from phigen.errors import CheckError, Diagnostic, LimitError, PhigenWarning, SpecError
+from phigen.gauss.gauge import slowest
 from phigen.geometry.system import System, system_from_spec
 from phigen.proofs import statements
 from phigen.proofs.examination import UNEXAMINED, Examination, doubts, located, refutation, refuted
@@ -39,7 +40,7 @@ from phigen.scheme.program import Program
 from phigen.scheme.splitting import build_splitting
 from phigen.spec.model import Overrides, Spec
 from phigen.splitting.forces import force_flows
-from phigen.splitting.parts import split
+from phigen.splitting.parts import Splitting, split
 
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
@@ -229,7 +230,7 @@ def _split(spec: Spec, source: System, clock: _Clock) -> Compilation:
     """Compile to a splitting."""
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
-    parts = clock.timed("splitting", lambda: split(discretised.frozen))
+    parts = clock.timed("splitting", lambda: _parts(spec, discretised.frozen))
     pushing = clock.timed("splitting", lambda: force_flows(source.frozen))
     parts = replace(parts, flows=(*parts.flows, *pushing))
     monitor, wanted = logarithmic_of(spec, source, parts.flows), spec.wanted_order
@@ -252,12 +253,24 @@ def _split(spec: Spec, source: System, clock: _Clock) -> Compilation:
     return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
 
 
+def _parts(spec: Spec, system: System) -> Splitting:
+    """The parts of H. A monitor takes T and V, and a composition that is named composes two parts."""
+    if spec.monitor:
+        return replace(split(system, motions=False), small=None)
+    parts = split(system)
+    alone = len(parts.flows) == 1 and parts.flows[0].has_motion
+    return split(system, motions=False) if alone and spec.composition != "auto" else parts
+
+
 def _collocated(spec: Spec, source: System, clock: _Clock) -> Compilation:
     """Compile to Gauss collocation."""
     expect_offered(spec)
     plan = plan_gauss(spec)
-    gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     realisation = clock.timed("momentum maps", lambda: realise_gauss(spec, source))
+    if isinstance(spec.gauge, str):
+        gauge = slowest(source, realisation) if spec.gauge == "auto" else Gauge()
+    else:
+        gauge = given(source, spec.gauge)
     program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec))
     return Compilation(spec, source, None, plan, program, gauge, clock.seconds, gauss=realisation)
 

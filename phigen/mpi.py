@@ -122,7 +122,9 @@ class DistributedLattice:
         )
         begin = arguments.start_time(t0, self.solver.interface, more)
         draws = arguments.draws(self.solver.interface, more, {"seed": seed, "member": member, "step0": step0})
-        domain = _Domain(self, whole, x0, h, arguments.together(parameters, more), begin, draws)
+        arrays = arguments.together(parameters, more)
+        arrays |= self.solver.defaults(arrays, whole)  # of the whole lattice, since a process has some of its planes
+        domain = _Domain(self, whole, x0, h, arrays, begin, draws)
         marks = row_steps(steps, stride)
         shape = (len(marks), len(self.solver.coordinates), *whole)
         kept = _Kept(domain, Path(checkpoints), [h, steps, stride, begin, *astuple(draws)]) if checkpoints else None

@@ -26,7 +26,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    settings.register_profile("phigen", max_examples=400 if config.option.all else 130, deadline=None)
+    settings.register_profile("phigen", max_examples=250 if config.option.all else 130, deadline=None)
     settings.load_profile("phigen")
     # What is compiled is kept for the tests that follow: there is much to go through, and little of it is garbage.
     gc.set_threshold(200_000, 20, 100)
@@ -101,13 +101,12 @@ def compiled_solvers(request, tmp_path_factory):
         yield shared
 
 
-@pytest.fixture(scope="module")
-def as_users_compile(request, compiled_solvers):
-    """With --all, C is compiled with the flags users get: where the C of the whole corpus is what is tested."""
-    with pytest.MonkeyPatch.context() as patch:
-        if request.config.option.all:
-            patch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
-        yield
+@pytest.fixture
+def as_users_compile(request, compiled_solvers, monkeypatch):
+    """With --all, C is compiled with the flags users get, of the corpus that of one system for each kind of step."""
+    given = request.node.callspec.params.values() if hasattr(request.node, "callspec") else ()
+    if request.config.option.all and {*map(str, given)}.isdisjoint({*NAMES} - {*QUICK}):
+        monkeypatch.setattr(toolchain, "BASE_FLAGS", _optimised("-O3"))
 
 
 def _optimised(how):

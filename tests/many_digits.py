@@ -71,7 +71,7 @@ def _entire(name: str, s: Any) -> Any:
         root = mpmath.sqrt(z)
         if name.startswith("exprel"):
             return (mpmath.exp(z) - 1) / z
-        if name == "arcroot":
+        if name.startswith("arcroot"):
             return (root - mpmath.sin(root)) / root**3
         return mpmath.cos(root) if name == "cosroot" else mpmath.sin(root) / root
 
@@ -97,6 +97,20 @@ def _phi(order: int, s: Any) -> Any:
             return result
 
 
+def _anomaly(t: Any, r: Any, eta: Any, beta: Any, mu: Any, _spin: Any) -> Any:
+    """The universal anomaly of a Kepler motion, by a root of its equation."""
+
+    def residual(s: Any) -> Any:
+        z = beta * s**2
+        g2 = (1 - _entire("cosroot", z)) / beta
+        return r * s * _entire("sinroot", z) + eta * g2 + mu * s**3 * _entire("arcroot", z) - t
+
+    high = t / r
+    while residual(high) * t < 0:
+        high *= 2
+    return mpmath.findroot(residual, (high / 10**9, high), solver="anderson")
+
+
 _RULES: dict[str, Callable[..., Any]] = {
     "add": operator.add,
     "sub": operator.sub,
@@ -112,7 +126,11 @@ _RULES: dict[str, Callable[..., Any]] = {
     "inv": lambda s: 1 / s if s > 0 else mpmath.nan,
     "inv0": lambda s: 1 / s if s > 0 else mpmath.mpf(0),
     **{f"phi{order}": partial(_phi, order) for order in range(3)},
-    **{name: partial(_entire, name) for name in ("cosroot", "sinroot", "sinroot1", "arcroot", "exprel", "exprel1")},
+    "anomaly": _anomaly,
+    **{
+        name: partial(_entire, name)
+        for name in ("cosroot", "sinroot", "sinroot1", "arcroot", "arcroot1", "exprel", "exprel1")
+    },
 }
 
 

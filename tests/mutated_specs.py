@@ -28,7 +28,8 @@ references: [somebody]
 license: MIT
 coordinates: [q, p]
 time: t
-parameters: {k: {value: 2, positive: true, at: all, description: stiffness}, g: 0.1}
+parameters: {k: {value: 2, positive: true, at: all, description: stiffness, unit: N/m}, g: {value: 0.1, small: true}}
+inputs: [g]
 definitions: {kinetic: p**2/2}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: kinetic + k*q**2/2 + g*q*sin(t)
@@ -216,11 +217,13 @@ casimirs: {}
 invariants: {}
 forces: {covector: {q: g*p/10}}
 damping: g/100
+observables: {M: {mean: q}, E: {sum: "p*q[i+1]"}, L: {max: q}, S: {min: "q - q[i+1]"}, F: "if(q > t, q, 0)"}
 solver: {compensated: true}
 order: 2
 runs:
   a: {sizes: [6], initial: {q: {random: normal, seed: 1, scale: 0.5, mean: i/2}, p: 0}, step: 0.1, steps: 4, start: 1}
-  b: {sizes: [6], initial: {random: uniform, seed: 1, scale: 0.5, mean: i/2}, step: 0.1, steps: 4, stride: 2}
+  b: {sizes: [6], initial: {random: uniform, seed: 1, scale: 0.5, mean: i/2}, step: 0.1, steps: 4, stride: 2,
+      record: [M, energy]}
   c: {sizes: [6], initial: [1, 2], step: 0.1, duration: 0.4, parameters: {B: [1, 2, 3, 4, 5, 6], k: i + 1, g: 0}}
 sweeps: {s: {run: a, over: {g: [1, 2], seed: {count: 2}}}}
 """,
@@ -254,6 +257,7 @@ coordinates: [q, p]
 parameters: {k: {value: [1, 2, 3], at: bonds}, m: {value: 2, at: sites, positive: true}}
 poisson: {canonical: {q: [q], p: [p]}}
 hamiltonian: {sites: p**2/(2*m), bonds: "k*(q[a] - q[b])**2/2"}
+observables: {E: {mean: "k*q[a]*q[b]", over: bonds}}
 order: 2
 runs:
   a: {sizes: [4], bonds: [[0, 1], [1, 2], [2, 3]], initial: {q: [1, 0, 0, 0], p: 0}, step: 0.1, steps: 4}

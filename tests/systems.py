@@ -32,9 +32,11 @@ NOISY = ("double_well", "thermal_chain", "thermal_spin")
 MONITORED = ("kepler_eccentric",)
 #: Those by Gauss collocation: tests/gauss.
 COLLOCATED = ("kowalevski_gauss",)
+#: Those by splitting: tests/splitting.
+SPLIT = ("satellite_wheels",)
 NAMES = sorted(
     {path.stem for path in resources.bundled_specs().glob("*.yaml")}
-    - {*TIMED, *FORCED, *NOISY, *MONITORED, *COLLOCATED}
+    - {*TIMED, *FORCED, *NOISY, *MONITORED, *COLLOCATED, *SPLIT}
 )
 
 
@@ -126,11 +128,6 @@ def compiled(name: str, order: int | None = None, scheme: str | None = None) -> 
     if order is None and scheme is None and found.profile == "fast" and not as_given(name).program.gauge:
         return as_given(name)
     return compile_spec(plain(found), order=order, scheme=scheme, system=described(name)[1])
-
-
-def golden(name: str, file: str) -> str:
-    """A file of generated/NAME: tells much of a solver without compiling it. That it is current is another test."""
-    return (resources.bundled_specs().parent / "generated" / name / file).read_text(encoding="utf-8")
 
 
 @cache

@@ -159,7 +159,7 @@ def test_wrong_arguments_are_refused(arguments, error):
 def test_auto_is_numpy_with_a_warning_without_compiler_and_c_with_one(request):
     assert phigen.compile(RIGID_BODY, order=2).target == "c"
     request.getfixturevalue("without_compiler")
-    with pytest.warns(RuntimeWarning, match="using NumPy, .* no C compiler works: none of cc, gcc, clang is there"):
+    with pytest.warns(RuntimeWarning, match="using NumPy, .* no C compiler works: none of cc, gcc, clang was found"):
         assert phigen.compile(RIGID_BODY, order=2).target == "numpy"
     with pytest.raises(phigen.ToolchainError):
         phigen.compile(RIGID_BODY, target="c", order=2)
@@ -167,7 +167,7 @@ def test_auto_is_numpy_with_a_warning_without_compiler_and_c_with_one(request):
 
 def test_a_compiler_that_is_named_is_used_or_refused(monkeypatch):
     monkeypatch.setenv("CC", "/there/is/none")
-    with pytest.raises(phigen.ToolchainError, match="/there/is/none, is not there"):
+    with pytest.raises(phigen.ToolchainError, match="/there/is/none, was not found"):
         phigen.compile(RIGID_BODY, order=2)
 
 

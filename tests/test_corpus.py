@@ -1,9 +1,9 @@
 import json
-import re
 from pathlib import Path
 
 import pytest
-from support import NAMES, QUICK, described, golden
+from golden import calls
+from support import NAMES, QUICK, described
 
 from phigen import resources, spec
 
@@ -32,8 +32,7 @@ def test_reference_state_belongs_to_the_run_of_the_spec(name):
 
 def traits(name):
     """The kind of the bi-realisation, and all functions that the generated C defines and calls."""
-    called = (word.replace(f"{name}_", "") for word in re.findall(r"\b(\w+)\(", golden(name, f"{name}.c")))
-    return {described(name)[2].kind, *(re.sub(r"(_part)?\d*$", "", word) for word in called)}
+    return {described(name)[2].kind, *calls()[name]}
 
 
 #: Of the corpus only `guiding_centre` has powers along paths, and it takes long: tests/paths/test_functions.py and

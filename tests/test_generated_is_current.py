@@ -1,36 +1,60 @@
-"""The shipped examples are the golden files: generated/ is what `phigen build specs` writes, on every machine."""
+"""The golden files are current: whole solvers in generated/, and the parts of the other systems in tests/golden.
+
+tests/golden.py says what is where.
+"""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
+import golden
 import pytest
-import solvers
-import systems
 from click.testing import CliRunner
+from golden import GENERATED, ROOT
 
 from phigen import resources
 from phigen.cli import group
+from phigen.targets.c.emitter import FEW_SCREENS
 
-ROOT = resources.bundled_specs().parent
-GENERATED = ROOT / "generated"
-SUFFIXES = {"c": ("c", "h"), "numpy": ("py",), "js": ("mjs",)}
-NAMES = ["lotka_volterra", "kepler", "so4_manakov", "pendulum_euler", "vortices3"]
-#: Systems of the corpus that tests of their own are about.
-BESIDE = (*systems.TIMED, *systems.FORCED, *systems.NOISY, *systems.MONITORED, *systems.COLLOCATED)
+NAMES = ["duffing", "guiding_centre", "kepler_eccentric", "quaternion_top", "toda"]
 
 BUILD = "from phigen.cli import main; main()"
 
 
-@pytest.mark.parametrize("name", [*systems.NAMES, *BESIDE, *systems.LATTICES])
-def test_generated_is_what_is_made_of_the_spec(name):
-    compilation = systems.as_given(name)
-    for target in compilation.spec.targets:
-        for file, text in solvers.files(compilation, target).items():
-            assert (GENERATED / name / file).read_text(encoding="utf-8") == text, "make golden makes it anew"
+@pytest.mark.parametrize("name", golden.WHOLE)
+def test_whole_solver_is_what_is_made_of_the_spec(name):
+    expected = {path.name: path.read_text(encoding="utf-8") for path in (GENERATED / name).iterdir()}
+    assert golden.solver_files(name) == expected, "make golden makes it anew"
+
+
+@pytest.mark.parametrize("name", golden.PARTIAL)
+def test_part_of_its_own_is_what_is_made_of_the_spec(name):
+    made = golden.part(name, golden.solver_files(name), golden.of_whole_solvers())
+    assert (golden.PARTS / f"{name}.txt").read_text(encoding="utf-8") == made, "make golden makes it anew"
+
+
+@pytest.mark.parametrize("name", [*golden.WHOLE, *golden.PARTIAL])
+def test_calls_are_those_of_the_solver(name):
+    assert golden.calls()[name] == golden.called(name), "make golden makes the table anew"
+
+
+def test_a_paragraph_is_omitted_where_a_whole_solver_has_it():
+    whole = {"a.c": "int a_n;\n\n/* Of a_step\n * alone. */\nint a_step(void);\n\nint a_last;\n"}
+    shared = golden.keys("a", whole.values())
+    same = "/* Of rather_long_step alone. */\nint rather_long_step(void);"
+    texts = {"b.c": f"int other;\n\n{same}\n\nint rather_long_last;\n\nint a_step(void);\n"}
+    assert golden.part("rather_long", texts, shared) == "==== b.c ====\nint other;\n\n...\n\nint a_step(void);\n\n"
+
+
+def test_every_system_has_golden_files_and_nothing_else_does():
+    assert {*golden.WHOLE} <= {*resources.bundled()}
+    assert sorted(path.name for path in GENERATED.iterdir() if path.is_dir()) == golden.WHOLE
+    found = {path.name for path in golden.PARTS.iterdir()}
+    assert found == {f"{name}.txt" for name in golden.PARTIAL} | {golden.CALLS.name}
 
 
 def test_generated_is_what_phigen_build_writes(monkeypatch):
@@ -40,14 +64,23 @@ def test_generated_is_what_phigen_build_writes(monkeypatch):
     assert done.exit_code == 0, done.stderr
 
 
-def test_nothing_else_is_generated():
-    found = {str(p.relative_to(GENERATED)) for p in GENERATED.rglob("*") if p.is_file()}
-    names = (*systems.NAMES, *BESIDE, *systems.LATTICES)
-    targets = [(name, target) for name in names for target in systems.spec_of(name).targets]
-    assert found == {f"{name}/{name}.{suffix}" for name, target in targets for suffix in SUFFIXES[target]}
+@pytest.mark.parametrize("name", [*golden.WHOLE, *golden.PARTIAL])
+def test_code_is_fit_to_be_read(name):
+    """No long lines, no loops over one stage, no traces of how the runtime was put together; contents that are true."""
+    for text in (text for file, text in golden.solver_files(name).items() if file.endswith((".c", ".h"))):
+        assert max(map(len, text.splitlines())) <= 110
+        assert not re.search(r"\bphi_|PHI_(?!GEN)|% 1\b|\n\n\n", text)
+        assert "_STAGES" in text or not re.search(r"\bstage <|\[stage\]|\bint stage\b", text)
+        contents = re.findall(r"^ \* Contents: (.*?)\n \* body", text, re.M | re.S)
+        chapters = re.findall(r"^/\* ---- (.*) ---- \*/$", text, re.M)
+        long = text.split("*/\n", 1)[1].count("\n") > FEW_SCREENS
+        assert [re.sub(r"\n \* +", " ", line) for line in contents] == ["; ".join(chapters)] * bool(chapters and long)
+        assert not re.search(r"^}\n(?:/\*|#define|enum|static)", text, re.M), (
+            "something sticks to the end of a function"
+        )
 
 
-def golden():
+def expected():
     """The files that `built` should make."""
     return {str(p.relative_to(GENERATED)): p.read_bytes() for n in NAMES for p in (GENERATED / n).iterdir()}
 
@@ -56,7 +89,7 @@ def built(tmp_path, environment=None, cwd=None, python=(), specs=None):
     """The files that a process of its own writes: name → bytes."""
     specs = specs or resources.bundled_specs()
     output = tmp_path / f"out{len(list(tmp_path.iterdir()))}"
-    files = [str(specs / f"{name}.yaml") for name in NAMES]
+    files = [str(next(specs.rglob(f"{name}.yaml"))) for name in NAMES]
     command = [sys.executable, *python, "-c", BUILD, "build", *files, "-o", str(output)]
     env = {k: v for k, v in os.environ.items() if k not in ("PYTHONHASHSEED", "LC_ALL")} | (environment or {})
     subprocess.run(command, check=True, env=env, cwd=cwd or ROOT, capture_output=True)
@@ -69,7 +102,7 @@ def test_output_depends_neither_on_hash_seed_nor_locale_nor_folder(tmp_path):
     elsewhere.mkdir()
     copies = shutil.copytree(resources.bundled_specs(), tmp_path / "copies")
     environment = {"PYTHONHASHSEED": "4711", "LC_ALL": "tr_TR.UTF-8", "PYTHONPATH": str(ROOT), "TZ": "Asia/Tokyo"}
-    assert built(tmp_path, environment, elsewhere, specs=copies) == golden()
+    assert built(tmp_path, environment, elsewhere, specs=copies) == expected()
 
 
 @pytest.mark.slow
@@ -93,4 +126,4 @@ def test_wheel_builds_the_same_bytes_and_carries_its_data(tmp_path):
         check=True, capture_output=True, text=True, cwd=work, env={**os.environ, **environment},
     )  # fmt: skip
     assert Path(where.stdout.strip()).is_relative_to(unpacked)
-    assert built(tmp_path, environment, work, ("-P",), unpacked / "phigen" / "_data" / "specs") == golden()
+    assert built(tmp_path, environment, work, ("-P",), unpacked / "phigen" / "_data" / "specs") == expected()

@@ -22,6 +22,7 @@ _DEBIAN = {
     "clang++": "clang libclang-rt-dev",
     "ninja": "ninja-build",
     "node": "nodejs",
+    "rustc": "rustc cargo",
     "qemu-aarch64-static": "qemu-user-static",
 }
 _LACK = " is not installed"

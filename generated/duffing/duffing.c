@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 5038b7d787c8cd099e77964568b6c437308a5fdc3eb2083b626ce1f10ae5c95f
+ * body-sha256: 6b0b6ae1e902b2f26b00d8642673043a9466bd6dd394daaa5fff68835e9f0340
  */
 #include "duffing.h"
 #include <float.h>
@@ -137,6 +137,8 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
     out[1] = q + A * cos(omega * t) - q * (q * q);
 }
 
+#define duffing_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- Compensated sums, linear equations ---- */
 static int duffing_finite(const double *values, int count)
 {
@@ -192,7 +194,7 @@ static int duffing_solve(double matrix[duffing_DIM * duffing_DIM], double side[d
 }
 
 /* ---- Starting guesses ---- */
-#define duffing_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
+#define duffing_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
 /* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
    equation of a step has solutions that have nothing to do with the motion. */
@@ -255,7 +257,11 @@ static int duffing_plausible(const duffing_solver *s, const double increment[duf
 
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+
 #define duffing_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+
+#define duffing_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define duffing_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double duffing_size(const double y[duffing_DIM], const double delta[duffing_DIM])
@@ -269,9 +275,6 @@ static double duffing_size(const double y[duffing_DIM], const double delta[duffi
     }
     return size;
 }
-
-#define duffing_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define duffing_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    last correction changes the increment to first order, without an evaluation: it is accepted if the error
@@ -320,7 +323,7 @@ duffing_status duffing_init_at(duffing_solver *s, const duffing_params *params, 
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
     fresh.t = t0;
-    duffing_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
+    duffing_prepare(&fresh.params, duffing_PROBE_STEP, fresh.coef);
     if (!duffing_finite(fresh.x, duffing_DIM) || !duffing_allowed(&fresh.params)
         || !duffing_finite(fresh.coef, duffing_COEFFICIENTS))
         return duffing_BAD_ARGUMENT;
@@ -353,10 +356,10 @@ duffing_status duffing_integrate(duffing_solver *s, double h, size_t steps)
     if (s == NULL || !isfinite(h)) return duffing_BAD_ARGUMENT;
     if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
         duffing_prepare(&s->params, h, s->coef);
-        memset(&s->history, 0, sizeof s->history);
         s->h = h;
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
+        memset(&s->history, 0, sizeof s->history);
     }
     for (; steps > 0; --steps) {
         duffing_renew(s);

@@ -1,7 +1,7 @@
 /*
  * The declarations of duffing.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 14c2a0db83b6d3a660c635a9adeeb48f8fd694a5f0a3e9a73f1dba798de817b4
+ * body-sha256: 8f5f5b3be60a5f6f0c608439790011955db12c48089b5fddc161b8e7695802fe
  */
 #ifndef DUFFING_H
 #define DUFFING_H
@@ -15,6 +15,7 @@ extern "C" {
 #define duffing_PHIGEN_VERSION "0.1.0"
 #define duffing_SPEC_SHA256 "72ba392fccc406dfdc3b1d47b1172899f03878892236d624cb8d53a7a18b6c1c"
 enum { duffing_COEFFICIENTS = 33 }; /* numbers that depend on params and h, and on the time */
+enum { duffing_DIFFERENCES = 9 };   /* that a step is extrapolated from: more amplify rounding */
 
 typedef struct {
     double A;     /* amplitude of the drive */
@@ -30,8 +31,6 @@ void duffing_vector_field(const duffing_params *params, double t, const double x
 typedef enum { duffing_OK = 0, duffing_NO_CONVERGENCE, duffing_SINGULAR, duffing_NOT_FINITE,
     duffing_BAD_ARGUMENT } duffing_status;
 const char *duffing_status_string(duffing_status status);
-
-enum { duffing_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {

@@ -7,7 +7,7 @@
  *   one Newton iteration: 29 additions, 33 multiplications
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 095344cde55190032e9c61a5f40405d019ef01aa946a771c2128dd7a776c7b95
+ * body-sha256: 39ed93d1aba9d233d68412ac5a6fae3be00c71f8907facdaa320292dec7e2465
  */
 /*
  * import { Solver, StepError } from './duffing.mjs';
@@ -57,9 +57,6 @@ const MAX_ITERATIONS = 20;
 
 /** The error that may remain, relative to y. */
 const TOLERANCE = 1e-20;
-
-/** Components are measured no finer than by this part of the largest. */
-const FLOOR = 1e-6;
 
 /** Everything that depends on parameters and step size only. */
 function prepare(params, h, coef) {
@@ -173,6 +170,27 @@ function vectorField(params, t, x, out) {
   out[1] = q + params.A * Math.cos(params.omega * t) - q * (q * q);
 }
 
+/** So short that coefficients are finite */
+const PROBE_STEP = 1e-100;
+
+/** Components of y are measured no finer than by this part of the largest */
+const FLOOR = 1e-6;
+
+/** Corrections below this have reached the level of rounding, ... */
+const NEARLY_SOLVED = 1e-8;
+/** ... if one is more than this part of the one before */
+const SHRINKING = 0.25;
+
+/** How far any step may lead, in sizes of the state and of its motion */
+const PLAUSIBLE = 1.5;
+/** Part of the energy that one which leads farther must not lose */
+const LOST = 0.5;
+
+/** How far from the last value a prediction may be, in sizes of that value */
+const REACH = 4.0;
+/** That are stored: those of higher order amplify rounding more than they gain */
+const DIFFERENCES = 9;
+
 // ---- Errors ----
 
 /** What statuses mean. */
@@ -238,7 +256,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, 1e-100, table);
+  prepare(params, PROBE_STEP, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -446,10 +464,6 @@ export class Solver {
 
 // ---- The implicit step, by Newton's method ----
 
-/** Corrections below the first that shrink by less than the second have reached the level of rounding. */
-const NEARLY_SOLVED = 1e-8;
-const SHRINKING = 0.25;
-
 /**
  * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
  * is NaN.
@@ -517,12 +531,6 @@ function makeStage(solver, stage) {
 }
 
 // ---- Starting guesses, and whether a solution may be right ----
-
-/** Differences that are kept: extrapolation of more than order 8 amplifies rounding more than it gains. */
-const DIFFERENCES = 9;
-
-/** How far from the last value a guess may be, in sizes of that value. */
-const REACH = 4;
 
 /**
  * The last value of the unknown and its backward differences, which the next is extrapolated by. For
@@ -598,15 +606,6 @@ class History {
     if (this.count < DIFFERENCES) this.count++;
   }
 }
-
-/**
- * How far a step may lead, in sizes of the state and of what the vector field says, if the energy is
- * lost.
- */
-const PLAUSIBLE = 1.5;
-
-/** The part of the energy that counts as lost. */
-const LOST = 0.5;
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);

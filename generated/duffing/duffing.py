@@ -6,7 +6,7 @@
 #   one Newton iteration: 29 additions, 33 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build duffing
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 40509f25f908ea09647a7f9a6456f3cc21eae39345dcb0e31c9c48948e9c4d97
+# body-sha256: 24f1a41df6984182589277cc1855aaa6057e7c3e43a52f086595be0bb3ccfdbd
 import numpy as np
 
 VERSION = "0.1.0"
@@ -79,6 +79,9 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
+PROBE_STEP = 1e-100  # so short that coefficients are finite
+
+
 def _numbers(values):
     """An array of numbers; ValueError where one is too large."""
     try:
@@ -106,7 +109,7 @@ def _admissible(values):
     if not all(np.all(values[name] > 0.0) for name in POSITIVE):
         return False
     with np.errstate(all="ignore"):
-        return all(np.isfinite(c).all() for c in _prepare(values, 1e-100))
+        return all(np.isfinite(c).all() for c in _prepare(values, PROBE_STEP))
 
 
 def _prepare(parameters, h):
@@ -206,6 +209,10 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
+PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
+LOST = 0.5  # part of the energy that one which leads farther must not lose
+
+
 def _plausible(stage, x, end):
     """Whether steps lead where the motion does; arrays (members, DIM).
 
@@ -214,13 +221,13 @@ def _plausible(stage, x, end):
     """
     _, parameters, h, t = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= 1.5 * size
+    near = moved <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, t, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, t, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= 0.5 * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= 1.5 * size) | kept
+    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
+    return (moved <= PLAUSIBLE * size) | kept
 
 
 def _solved(stage, x, carry, guess):
@@ -230,9 +237,14 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
+FLOOR = 1e-6  # components of y are measured no finer than by this part of the largest
+NEARLY_SOLVED = 1e-8  # corrections below this have reached the level of rounding, ...
+SHRINKING = 0.25  # ... if one is more than this part of the one before
+
+
 def _size(y, delta):
-    """Size of a correction relative to each component of y, but no finer than 1e-6 of the largest."""
-    scale = np.abs(y) + 1e-6 * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
+    """Size of a correction relative to each component of y, but no finer than FLOOR of the largest."""
+    scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
 
@@ -257,7 +269,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-20) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build food_web
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; Bonds; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 6993d9a8b438574dd3d2f4db44c1ccd11507dd6a4b821f5be46dd71150ea8782
+ * body-sha256: 4e913bef4bf0bc734061c8085103c9a20edcef6e811388b20e242bb29c6579de
  */
 #include "food_web.h"
 #include <float.h>
@@ -303,6 +303,8 @@ static void food_web_connect(food_web_solver *s, const food_web_bonds *bonds, do
 }
 
 /* ---- The lattice ---- */
+#define food_web_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 enum { food_web_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { food_web_BUFFER = 256 }; /* densities that are added in one go */
 
@@ -385,7 +387,7 @@ food_web_status food_web_init(food_web_solver *s, const food_web_params *params,
         food_web_DIM * sites) || !food_web_allowed(&own, sites, count))
         return food_web_BAD_ARGUMENT;
     double coef[food_web_COEFFICIENTS];
-    food_web_prepare_step(&own, 1e-100, coef);
+    food_web_prepare_step(&own, food_web_PROBE_STEP, coef);
     if (!food_web_finite(coef, food_web_COEFFICIENTS)) return food_web_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);

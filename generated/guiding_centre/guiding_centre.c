@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: d33da721ed77a06d1d344f3254b29ac65e4218b2cd928157e451e1c489440591
+ * body-sha256: 56192ba3d00f7007b101947118c4db7bab84e75a52b7896d4bf429bfe41b76c4
  */
 #include "guiding_centre.h"
 #include <float.h>
@@ -116,6 +116,8 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
     out[3] = t19 * t17 - t12 * t18 - t1 * t21;
 }
 
+#define guiding_centre_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- Compensated sums, linear equations ---- */
 static int guiding_centre_finite(const double *values, int count)
 {
@@ -174,7 +176,7 @@ static int guiding_centre_solve(double matrix[guiding_centre_DIM * guiding_centr
 }
 
 /* ---- Starting guesses ---- */
-#define guiding_centre_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
+#define guiding_centre_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
 /* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
    equation of a step has solutions that have nothing to do with the motion. */
@@ -441,14 +443,12 @@ static void guiding_centre_path_field(const double *coef, const double p[4], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     guiding_centre_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
-    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    /* of all paths of a solve: steps that need more are wrong by as much as the state */
     guiding_centre_MOST_PIECES = 512,
     /* iterations with the approximate Jacobian, before it is asked whether it contracts */
-    guiding_centre_PATIENCE = 3
+    guiding_centre_PATIENCE = 3,
 };
-
-/* terms that rounding hides in their sum, in sizes of the path */
-#define guiding_centre_NEGLIGIBLE 1e-17
+#define guiding_centre_NEGLIGIBLE 1e-17 /* terms that rounding hides in their sum, in sizes of the path */
 /* coordinates are measured no finer than by this part of all together */
 #define guiding_centre_LEAST_SHARE 1e-5
 /* rounding of the slope of a path, in sizes of the path and its slope */
@@ -620,7 +620,7 @@ guiding_centre_status guiding_centre_init(guiding_centre_solver *s, const guidin
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    guiding_centre_prepare(&fresh.params, 1e-100, fresh.coef[0]); /* so short a step does not matter */
+    guiding_centre_prepare(&fresh.params, guiding_centre_PROBE_STEP, fresh.coef[0]);
     if (!guiding_centre_finite(fresh.x, guiding_centre_DIM) || !guiding_centre_allowed(&fresh.params)
         || !guiding_centre_finite(fresh.coef[0], guiding_centre_COEFFICIENTS))
         return guiding_centre_BAD_ARGUMENT;
@@ -640,8 +640,8 @@ static guiding_centre_status guiding_centre_stage(guiding_centre_solver *s, int 
 /* The stages of one step. If one fails, the state is as before the step. */
 static guiding_centre_status guiding_centre_stages(guiding_centre_solver *s)
 {
-    double x[guiding_centre_DIM], carry[guiding_centre_DIM];
     guiding_centre_status status = guiding_centre_OK;
+    double x[guiding_centre_DIM], carry[guiding_centre_DIM];
     memcpy(x, s->x, sizeof x);
     memcpy(carry, s->carry, sizeof carry);
     for (int stage = 0; stage < guiding_centre_STAGES && status == guiding_centre_OK; ++stage)
@@ -659,10 +659,10 @@ guiding_centre_status guiding_centre_integrate(guiding_centre_solver *s, double 
     if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
         for (int stage = 0; stage < guiding_centre_STAGES; ++stage)
             guiding_centre_prepare(&s->params, guiding_centre_fractions[stage] * h, s->coef[stage]);
-        memset(&s->history, 0, sizeof s->history);
         s->h = h;
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
+        memset(&s->history, 0, sizeof s->history);
     }
     for (; steps > 0; --steps) {
         const guiding_centre_status status = guiding_centre_stages(s);

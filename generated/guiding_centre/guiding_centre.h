@@ -1,7 +1,7 @@
 /*
  * The declarations of guiding_centre.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: cb11dd045e042ccdc3ccb725a6dcda70b582e293e85ac0f328d436bc6dcffb48
+ * body-sha256: 444f6be9352628b5646835acbb527327c829fa78899dd9715361f8b29d11ab94
  */
 #ifndef GUIDING_CENTRE_H
 #define GUIDING_CENTRE_H
@@ -16,6 +16,7 @@ extern "C" {
 #define guiding_centre_SPEC_SHA256 "2fe2b1310137da070ce71887dcad93562dc0dd719fad890ce1b776e6af4b1570"
 enum { guiding_centre_STAGES = 5 };       /* of a step */
 enum { guiding_centre_COEFFICIENTS = 5 }; /* numbers that depend on params and h only */
+enum { guiding_centre_DIFFERENCES = 9 };  /* that a step is extrapolated from: more amplify rounding */
 
 typedef struct {
     double kappa; /* twist of the field lines per unit of length */
@@ -32,8 +33,6 @@ void guiding_centre_vector_field(const guiding_centre_params *params, const doub
 typedef enum { guiding_centre_OK = 0, guiding_centre_NO_CONVERGENCE, guiding_centre_SINGULAR,
     guiding_centre_NOT_FINITE, guiding_centre_BAD_ARGUMENT } guiding_centre_status;
 const char *guiding_centre_status_string(guiding_centre_status status);
-
-enum { guiding_centre_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {

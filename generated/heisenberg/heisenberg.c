@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; Several flows at once; What
  *   is seen at sites; Steps by hand
- * body-sha256: 96308aa58e982cac518c9140e90d70c3b12e3797fad5858aa05b7d7367375430
+ * body-sha256: beff6f92e149813bc78c45c7868515a9b96f4cef1a9d6d01ca7faeb0002d65cb
  */
 #include "heisenberg.h"
 #include <float.h>
@@ -466,6 +466,8 @@ static void heisenberg_vector_field_row(const heisenberg_row *row, double *restr
 }
 
 /* ---- The lattice ---- */
+#define heisenberg_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 #ifdef _OPENMP
 #ifdef __cplusplus
 extern "C" {
@@ -617,7 +619,7 @@ heisenberg_status heisenberg_init(heisenberg_solver *s, const heisenberg_params 
     if (rows == 0 || !heisenberg_finite(x0, heisenberg_DIM * sites) || !heisenberg_allowed(&own, sites))
         return heisenberg_BAD_ARGUMENT;
     double coef[heisenberg_COEFFICIENTS];
-    heisenberg_prepare_step(&own, 1e-100, coef);
+    heisenberg_prepare_step(&own, heisenberg_PROBE_STEP, coef);
     if (!heisenberg_finite(coef, heisenberg_COEFFICIENTS)) return heisenberg_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);

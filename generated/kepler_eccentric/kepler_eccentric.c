@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; The explicit step; What a monitored trajectory holds fixed: e = -H(x0), so that
  *   K = monitor (H + e) is 0 along it; The solver
- * body-sha256: 79ca787201303d3afb61ff24ab0d6c25a089b94b74eed2e70772a8c7111fa0d7
+ * body-sha256: ca3e85755d055710f3f843d67d50a35c1bf3dc4a291baa0a20eca909cafb664c
  */
 #include "kepler_eccentric.h"
 #include <math.h>
@@ -74,6 +74,8 @@ double kepler_eccentric_monitor(const kepler_eccentric_params *params, const dou
     const double t1 = q2 * q2, t2 = t1 + q1 * q1, t3 = 1.0 / sqrt(t2);
     return 1.0 / (t3 + 0.5 * (oblateness * (t3 * (t3 * t3)) * (1.0 - 3.0 * (t1 / t2))));
 }
+
+#define kepler_eccentric_PROBE_STEP 1e-100 /* so short that coefficients are finite */
 
 /* ---- The explicit step ---- */
 static int kepler_eccentric_finite(const double *values, int count)
@@ -248,8 +250,7 @@ kepler_eccentric_status kepler_eccentric_init_gauge(kepler_eccentric_solver *s,
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    /* so short a step does not matter */
-    kepler_eccentric_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
+    kepler_eccentric_prepare(&fresh.params, fresh.gauge, kepler_eccentric_PROBE_STEP, fresh.coef);
     if (!kepler_eccentric_finite(fresh.x, kepler_eccentric_DIM) || !kepler_eccentric_allowed(&fresh.params)
         || !kepler_eccentric_finite(fresh.coef, kepler_eccentric_COEFFICIENTS))
         return kepler_eccentric_BAD_ARGUMENT;

@@ -7,7 +7,7 @@
 #   step: explicit; one step: 155 additions, 466 multiplications, 69 divisions, 52 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build kepler_eccentric
 # SPDX-License-Identifier: 0BSD
-# body-sha256: d51235b3b6d8e12b27ff5c4075e2a017dd610399dab287cd23c29aa7d4ee2d50
+# body-sha256: 86e2a5b108d6f2d3330363543f1befab3c29750cd1e74189f70c59c83c33f05f
 import numpy as np
 
 VERSION = "0.1.0"
@@ -79,6 +79,9 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
+PROBE_STEP = 1e-100  # so short that coefficients are finite
+
+
 def _numbers(values):
     """An array of numbers; ValueError where one is too large."""
     try:
@@ -106,7 +109,7 @@ def _admissible(values):
     if not all(np.all(values[name] > 0.0) for name in POSITIVE):
         return False
     with np.errstate(all="ignore"):
-        return all(np.isfinite(c).all() for c in _prepare(values, np.zeros((len(GAUGE), 1)), 1e-100))
+        return all(np.isfinite(c).all() for c in _prepare(values, np.zeros((len(GAUGE), 1)), PROBE_STEP))
 
 
 def _prepare_row(parameters, gauge, h):

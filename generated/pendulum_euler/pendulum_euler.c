@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 850b1a71f55f28241dfa43ea8980b70ccfb3682ca83c15dca95487728eaf00e7
+ * body-sha256: 31400b61b999309100cde5c66409155c9adc632c5f48e57d3ac60774405adb1e
  */
 #include "pendulum_euler.h"
 #include <math.h>
@@ -56,6 +56,8 @@ void pendulum_euler_vector_field(const pendulum_euler_params *params, const doub
     out[1] = -(g * sin(q));
 }
 
+#define pendulum_euler_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- The solver ---- */
 static int pendulum_euler_finite(const double *values, int count)
 {
@@ -91,7 +93,7 @@ pendulum_euler_status pendulum_euler_init(pendulum_euler_solver *s, const pendul
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    pendulum_euler_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
+    pendulum_euler_prepare(&fresh.params, pendulum_euler_PROBE_STEP, fresh.coef);
     if (!pendulum_euler_finite(fresh.x, pendulum_euler_DIM) || !pendulum_euler_allowed(&fresh.params)
         || !pendulum_euler_finite(fresh.coef, pendulum_euler_COEFFICIENTS))
         return pendulum_euler_BAD_ARGUMENT;

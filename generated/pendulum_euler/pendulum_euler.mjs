@@ -6,7 +6,7 @@
  *   step: explicit; one step: 1 addition, 2 multiplications, 1 function
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build pendulum_euler
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 3ff2cf7f82bb62bb924bd1dbdd48f04e7cd5cd6f382d3e2e6ec578fbe4029b74
+ * body-sha256: b2b0d28fda2984fa2d429a9f87090a49a30e2892a6ce325901f875ecebe4c62b
  */
 /*
  * import { Solver, StepError } from './pendulum_euler.mjs';
@@ -77,6 +77,9 @@ function vectorField(params, x, out) {
   out[1] = -(params.g * Math.sin(q));
 }
 
+/** So short that coefficients are finite */
+const PROBE_STEP = 1e-100;
+
 // ---- Errors ----
 
 /** What statuses mean. */
@@ -142,7 +145,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, 1e-100, table);
+  prepare(params, PROBE_STEP, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }

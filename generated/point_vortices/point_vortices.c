@@ -11,7 +11,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The stages; Krylov spaces; Newton's
  *   method where sweeps fail; What is seen at sites
- * body-sha256: a54e96c579f2c06f3b431113ea71c856a04704093fb98351ae521ddc3f0a7c42
+ * body-sha256: 623018430a9e9339ebdac38eed430c8897cf4d8421136be58abf164bc8c36f0c
  */
 #include "point_vortices.h"
 #include <float.h>
@@ -276,6 +276,8 @@ static void point_vortices_vector_field_row(const point_vortices_row *row, doubl
 }
 
 /* ---- The lattice ---- */
+#define point_vortices_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* Before a loop over pieces: they are worked at in parallel. */
 #ifdef _OPENMP
 #define point_vortices_EACH_PIECE _Pragma("omp parallel for if (s->sites > 512)")
@@ -378,7 +380,7 @@ point_vortices_status point_vortices_init(point_vortices_solver *s, const point_
     if (rows == 0 || !point_vortices_finite(x0, point_vortices_DIM * sites) || !point_vortices_allowed(&own,
         sites)) return point_vortices_BAD_ARGUMENT;
     double coef[point_vortices_COEFFICIENTS];
-    point_vortices_prepare_step(&own, 1e-100, coef);
+    point_vortices_prepare_step(&own, point_vortices_PROBE_STEP, coef);
     if (!point_vortices_finite(coef, point_vortices_COEFFICIENTS)) return point_vortices_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -427,6 +429,16 @@ static void point_vortices_copy(double *const *to, double *const *from, const po
 }
 
 /* ---- The stages ---- */
+enum {
+    point_vortices_PATIENCE = 10, /* sweeps after which slow ones are left to Newton's method */
+};
+/* fields are measured no finer than by this part of the largest */
+#define point_vortices_LEAST_SIZE 0.001
+#define point_vortices_SETTLED 0x1p-55        /* what further sweeps may still change, in sizes of y */
+#define point_vortices_ROUNDING 0x1p-40       /* changes below this may be rounding */
+#define point_vortices_SLOW 0.6               /* slower changes are left to Newton's method, ... */
+#define point_vortices_NEARLY_SETTLED 0x1p-30 /* ... unless they are below this */
+
 enum { point_vortices_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
 
 static inline void point_vortices_raise(double *largest, double value)
@@ -479,7 +491,7 @@ static double point_vortices_relaxed(point_vortices_solver *s, const double *coe
     }
     for (int k = 0; k < point_vortices_DIM; ++k) point_vortices_raise(&largest, size[k]);
     for (int k = 0; k < point_vortices_DIM; ++k) {
-        s->usual[k] = size[k] + 1e-3 * largest + 1e-300;
+        s->usual[k] = size[k] + point_vortices_LEAST_SIZE * largest + 1e-300;
         change[k] /= s->usual[k]; /* no number where both are infinite */
         moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }
@@ -545,9 +557,10 @@ static void point_vortices_forget(point_vortices_solver *s)
 }
 
 /* ---- Krylov spaces ---- */
-/* how well a correction solves the equation for it, if the space allows, */
+/* how well a correction solves the equation for it, if the space allows, ... */
 #define point_vortices_SOLVED 1e-6
-#define point_vortices_USEFUL 0.9 /* and how well it has to */
+#define point_vortices_USEFUL 0.9    /* ... and how well it has to */
+#define point_vortices_PLAUSIBLE 1.5 /* the motion reaches no further, in sizes of x and of its motion */
 
 /* The sum of x y over all sites and fields, in usual sizes. Those of pieces are added in their order: the
    bits do not depend on threads. */
@@ -647,8 +660,6 @@ static double point_vortices_krylov(point_vortices_solver *s, const double *coef
 }
 
 /* ---- Newton's method where sweeps fail ---- */
-#define point_vortices_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
-
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double point_vortices_distance(const point_vortices_solver *s, int side, double added)
 {
@@ -678,11 +689,6 @@ static double point_vortices_range(point_vortices_solver *s, const double *coef)
     return point_vortices_PLAUSIBLE * point_vortices_distance(s, 1, 1.0);
 }
 
-#define point_vortices_SETTLED 0x1p-55  /* what further sweeps may still change, in sizes of y */
-#define point_vortices_ROUNDING 0x1p-40 /* changes below this may be rounding */
-#define point_vortices_SLOW 0.6         /* changes that shrink by less are left to Newton's method, ... */
-enum { point_vortices_PATIENCE = 10 };  /* ... after so many sweeps */
-
 /* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where
    these have failed, by corrections, and then no farther from x than in that range. It is in s->y[*now]. */
 static point_vortices_status point_vortices_middle(point_vortices_solver *s, const double *coef, double range,
@@ -704,7 +710,7 @@ static point_vortices_status point_vortices_middle(point_vortices_solver *s, con
             return (s->stiff ? point_vortices_distance(s, *now, 0.0) <= range : point_vortices_all_hold(s,
                 s->y[*now])) ? point_vortices_OK : failed;
         if (!s->stiff && count >= point_vortices_PATIENCE && change > point_vortices_SLOW * before
-            && change > 0x1p-30) break;
+            && change > point_vortices_NEARLY_SETTLED) break;
         before = change;
     }
     return point_vortices_NO_CONVERGENCE;

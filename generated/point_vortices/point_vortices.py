@@ -8,7 +8,7 @@
 #   one step of one site: 2 additions, 10 multiplications, 2 divisions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build point_vortices
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 041252cded4c92ee7f0a15d975b49450b0eba50d012b188d84a2e91ab3ea2f0c
+# body-sha256: 48e306ccafe09e9902046704c24bb6018a7bf8ab248b2a2ad6182d85ab96bdc7
 import numpy as np
 
 VERSION = "0.1.0"
@@ -112,20 +112,21 @@ class _Sites:
         return self._known[bounds]
 
 
-# Sweeps that a stage may take; values that guesses are extrapolated from; a change by this part of y may be rounding.
+# Sweeps that a stage may take, and corrections by Newton's method.
 MOST_SWEEPS = 200
-DIFFERENCES = 4
-
-# After so many sweeps, changes that still shrink by less than this factor are left to Newton's method.
-PATIENCE = 10
-SLOW = 0.6
-ROUNDING = 2.0**-40
+DIFFERENCES = 4  # that predictions of a stage are extrapolated from
+PATIENCE = 10  # sweeps after which slow ones are left to Newton's method
+LEAST_SIZE = 0.001  # fields are measured no finer than by this part of the largest
+SETTLED = 2.0**-55  # what further sweeps may still change, in sizes of y
+ROUNDING = 2.0**-40  # changes below this may be rounding
+SLOW = 0.6  # slower changes are left to Newton's method, ...
+NEARLY_SETTLED = 2.0**-30  # ... unless they are below this
 
 
 def _usual(y):
     """The sizes of fields, none much less than the largest."""
     sizes = np.abs(y).max(tuple(range(1, y.ndim)))
-    return sizes + 1e-3 * sizes.max() + 1e-300
+    return sizes + LEAST_SIZE * sizes.max() + 1e-300
 
 
 def _size(change, y):
@@ -144,9 +145,9 @@ def _by_sweeps(coef, x, y, sites):
         change = _size(following - y, following)
         y, shrunk = following, before - change
         # What further sweeps would change, with the rate change / before, or that changes shrink no more.
-        if change * change <= shrunk * 2.0**-55 or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
+        if change * change <= shrunk * SETTLED or (shrunk <= 0.0 and change <= ROUNDING and sweeps > 1):
             return y
-        if sweeps > PATIENCE and change > max(SLOW * before, 2.0**-30):
+        if sweeps > PATIENCE and change > max(SLOW * before, NEARLY_SETTLED):
             break
         before = change
     raise FailedError("NO_CONVERGENCE")
@@ -178,14 +179,10 @@ def _advance(sites, rows, x, past):
     return x
 
 
-# Newton's corrections of a stage; directions of the Krylov space that each is taken from, how well it solves the equation
-# for it, if the space allows, and how well it has to; how far from x a solution is one of the motion, in sizes of x and
-# of what the field says.
-MOST_CORRECTIONS = 200
-DIRECTIONS = 24
-SOLVED = 1e-6
-USEFUL = 0.9
-PLAUSIBLE = 1.5
+DIRECTIONS = 24  # of the Krylov space that a correction is taken from
+SOLVED = 1e-6  # how well a correction solves the equation for it, if the space allows, ...
+USEFUL = 0.9  # ... and how well it has to
+PLAUSIBLE = 1.5  # the motion reaches no further, in sizes of x and of its motion
 
 
 def _middle(coef, x, guess, sites, past):
@@ -204,13 +201,13 @@ def _middle(coef, x, guess, sites, past):
 def _newton(coef, x, y, sites):
     """y at the middle of a stage by Newton's method; raises FailedError."""
     before, far = 0.0, PLAUSIBLE * (np.abs(x) + np.abs(_relax(coef, x, x, sites) - x)).sum()
-    for correction in range(MOST_CORRECTIONS):
+    for correction in range(MOST_SWEEPS):
         swept = _finite(_relax(coef, x, y, sites))
         change = _krylov(lambda v: v - _slope(coef, x, y, v, sites), swept - y, _usual(swept))
         y = _finite(y + change)
         size = _size(change, y)
         shrunk = before - size
-        if size * size <= shrunk * 2.0**-55 or (shrunk <= 0.0 and size <= ROUNDING and correction > 0):
+        if size * size <= shrunk * SETTLED or (shrunk <= 0.0 and size <= ROUNDING and correction > 0):
             if np.abs(y - x).sum() <= far:
                 return y
             break

@@ -9,7 +9,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, by
  *   Newton's method; The solver
- * body-sha256: 6130197783fe85f473a614ca507c5e44079c5d926cb3ee33c93508ce73bda9dd
+ * body-sha256: b8f4226fa41bbc3744b4adfd2c4ae5b232cda3509aab1b4842d18f7fa5348534
  */
 #include "predator_prey.h"
 #include <float.h>
@@ -108,6 +108,8 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
     out[1] = -(t1 * (death / prey - gain));
 }
 
+#define predator_prey_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- Compensated sums, linear equations ---- */
 static int predator_prey_finite(const double *values, int count)
 {
@@ -166,7 +168,7 @@ static int predator_prey_solve(double matrix[predator_prey_DIM * predator_prey_D
 }
 
 /* ---- Starting guesses ---- */
-#define predator_prey_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
+#define predator_prey_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
 /* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
    equation of a step has solutions that have nothing to do with the motion. */
@@ -229,21 +231,24 @@ static int predator_prey_plausible(const predator_prey_solver *s, const double i
 
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
-/* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
-   different size); NaN or infinite if the correction is. */
+
+#define predator_prey_FLOOR 0.0 /* components of y are measured no finer than by this part of the largest */
+
+#define predator_prey_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define predator_prey_SHRINKING 0.25     /* ... if one is more than this part of the one before */
+
+/* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double predator_prey_size(const double y[predator_prey_DIM], const double delta[predator_prey_DIM])
 {
-    double size = 0.0;
+    double norm = 0.0, size = 0.0;
+    for (int i = 0; i < predator_prey_DIM; ++i) norm = fabs(y[i]) > norm ? fabs(y[i]) : norm;
     for (int i = 0; i < predator_prey_DIM; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + DBL_MIN);
+        const double ratio = fabs(delta[i]) / (fabs(y[i]) + predator_prey_FLOOR * norm + DBL_MIN);
         if (!isfinite(ratio)) return ratio;
         size = ratio > size ? ratio : size;
     }
     return size;
 }
-
-#define predator_prey_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define predator_prey_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    last correction changes the increment to first order, without an evaluation: it is accepted if the error
@@ -295,7 +300,7 @@ predator_prey_status predator_prey_init(predator_prey_solver *s, const predator_
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    predator_prey_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
+    predator_prey_prepare(&fresh.params, predator_prey_PROBE_STEP, fresh.coef);
     if (!predator_prey_finite(fresh.x, predator_prey_DIM) || !predator_prey_allowed(&fresh.params)
         || !predator_prey_finite(fresh.coef, predator_prey_COEFFICIENTS))
         return predator_prey_BAD_ARGUMENT;
@@ -317,10 +322,10 @@ predator_prey_status predator_prey_integrate(predator_prey_solver *s, double h, 
     if (s == NULL || !isfinite(h)) return predator_prey_BAD_ARGUMENT;
     if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
         predator_prey_prepare(&s->params, h, s->coef);
-        memset(&s->history, 0, sizeof s->history);
         s->h = h;
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
+        memset(&s->history, 0, sizeof s->history);
     }
     for (; steps > 0; --steps) {
         const predator_prey_status status = predator_prey_stage(s);

@@ -1,7 +1,7 @@
 /*
  * The declarations of predator_prey.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: bcaf39b73169f39092328426d60697113b3790ffbdd98fcdfd5a8812ade2ea8d
+ * body-sha256: b5f422a3866079d3a5304977fbbdef179931144f4f2214bf2c5a7ba4eac4ccd3
  */
 #ifndef PREDATOR_PREY_H
 #define PREDATOR_PREY_H
@@ -15,6 +15,7 @@ extern "C" {
 #define predator_prey_PHIGEN_VERSION "0.1.0"
 #define predator_prey_SPEC_SHA256 "e9ed620ed8f3d5aad12a62fc9348c8e9ca6a49af75e51b9b9dab791a7ff33715"
 enum { predator_prey_COEFFICIENTS = 11 }; /* numbers that depend on params and h only */
+enum { predator_prey_DIFFERENCES = 9 };   /* that a step is extrapolated from: more amplify rounding */
 
 typedef struct {
     double growth; /* growth rate of the prey without predators */
@@ -32,8 +33,6 @@ void predator_prey_vector_field(const predator_prey_params *params, const double
 typedef enum { predator_prey_OK = 0, predator_prey_NO_CONVERGENCE, predator_prey_SINGULAR,
     predator_prey_NOT_FINITE, predator_prey_BAD_ARGUMENT } predator_prey_status;
 const char *predator_prey_status_string(predator_prey_status status);
-
-enum { predator_prey_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {

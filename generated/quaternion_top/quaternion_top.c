@@ -10,7 +10,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; Starting guesses; The implicit step, along
  *   paths dm/dt = pi(m) p; The solver
- * body-sha256: 716fa13e5facfa094e9525d655ff8615a066669eeb6055a5023ac5cc8fa20fc7
+ * body-sha256: ac8506cccc433351e53d0f267883c957774d104f1708a390fcdf6e54c090d687
  */
 #include "quaternion_top.h"
 #include <float.h>
@@ -281,6 +281,8 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
     out[6] = 0.5 * (w * t3) + (0.5 * (x_ * t4) - 0.5 * (y * t7));
 }
 
+#define quaternion_top_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- Compensated sums, linear equations ---- */
 static int quaternion_top_finite(const double *values, int count)
 {
@@ -339,7 +341,7 @@ static int quaternion_top_solve(double matrix[quaternion_top_DIM * quaternion_to
 }
 
 /* ---- Starting guesses ---- */
-#define quaternion_top_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
+#define quaternion_top_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
 /* The guess for the next value, the sum of differences. 0 if there is none, or if it is far away, where the
    equation of a step has solutions that have nothing to do with the motion. */
@@ -676,14 +678,12 @@ static void quaternion_top_path_field(const double *coef, const double p[7], con
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
 enum {
     quaternion_top_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
-    /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
+    /* of all paths of a solve: steps that need more are wrong by as much as the state */
     quaternion_top_MOST_PIECES = 512,
     /* iterations with the approximate Jacobian, before it is asked whether it contracts */
-    quaternion_top_PATIENCE = 3
+    quaternion_top_PATIENCE = 3,
 };
-
-/* terms that rounding hides in their sum, in sizes of the path */
-#define quaternion_top_NEGLIGIBLE 1e-17
+#define quaternion_top_NEGLIGIBLE 1e-17 /* terms that rounding hides in their sum, in sizes of the path */
 /* coordinates are measured no finer than by this part of all together */
 #define quaternion_top_LEAST_SHARE 1e-5
 /* rounding of the slope of a path, in sizes of the path and its slope */
@@ -868,8 +868,7 @@ quaternion_top_status quaternion_top_init_gauge(quaternion_top_solver *s, const 
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    /* so short a step does not matter */
-    quaternion_top_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef);
+    quaternion_top_prepare(&fresh.params, fresh.gauge, quaternion_top_PROBE_STEP, fresh.coef);
     if (!quaternion_top_finite(fresh.x, quaternion_top_DIM) || !quaternion_top_allowed(&fresh.params)
         || !quaternion_top_finite(fresh.coef, quaternion_top_COEFFICIENTS))
         return quaternion_top_BAD_ARGUMENT;
@@ -900,10 +899,10 @@ quaternion_top_status quaternion_top_integrate(quaternion_top_solver *s, double 
     if (s == NULL || !isfinite(h)) return quaternion_top_BAD_ARGUMENT;
     if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
         quaternion_top_prepare(&s->params, s->gauge, h, s->coef);
-        memset(&s->history, 0, sizeof s->history);
         s->h = h;
         s->t_before_h = s->t;
         s->steps_before_h = s->steps;
+        memset(&s->history, 0, sizeof s->history);
     }
     for (; steps > 0; --steps) {
         const quaternion_top_status status = quaternion_top_stage(s);

@@ -1,7 +1,7 @@
 /*
  * The declarations of quaternion_top.c. DO NOT EDIT: the checksum below notices.
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 2fac9685a712083daa9975aea2bd8034ae0feac586cee53ae02f2b6ec37c4c53
+ * body-sha256: 1d47979182b05ab2fe133576fa521998fcb1345917ae1e9bb8b7250e1c580ee6
  */
 #ifndef QUATERNION_TOP_H
 #define QUATERNION_TOP_H
@@ -16,6 +16,7 @@ extern "C" {
 #define quaternion_top_SPEC_SHA256 "818ae683b38dea8c70860ad173c7962b5eb71229e0d7aeaea854acb32ebba04c"
 enum { quaternion_top_COEFFICIENTS = 47 }; /* numbers that depend on params and h only */
 enum { quaternion_top_GAUGES = 1 };        /* Casimirs whose multiples are taken from H: length */
+enum { quaternion_top_DIFFERENCES = 9 };   /* that a step is extrapolated from: more amplify rounding */
 
 typedef struct {
     double I1;     /* least moment of inertia */
@@ -34,8 +35,6 @@ void quaternion_top_vector_field(const quaternion_top_params *params, const doub
 typedef enum { quaternion_top_OK = 0, quaternion_top_NO_CONVERGENCE, quaternion_top_SINGULAR,
     quaternion_top_NOT_FINITE, quaternion_top_BAD_ARGUMENT } quaternion_top_status;
 const char *quaternion_top_status_string(quaternion_top_status status);
-
-enum { quaternion_top_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
 
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {

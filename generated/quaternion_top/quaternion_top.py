@@ -7,7 +7,7 @@
 #   one evaluation of the equation for p: 271 additions, 462 multiplications
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build quaternion_top
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 2bfd70cfec44994e6a593bb80c8a7a0e7aa39ddc2b6366c8770f41ecac328117
+# body-sha256: 2d8c39f1b05c527c646c2f7884d092978e668d6787a160bd0e69d40df0a121f2
 import numpy as np
 
 VERSION = "0.1.0"
@@ -83,6 +83,9 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
+PROBE_STEP = 1e-100  # so short that coefficients are finite
+
+
 def _numbers(values):
     """An array of numbers; ValueError where one is too large."""
     try:
@@ -110,7 +113,7 @@ def _admissible(values):
     if not all(np.all(values[name] > 0.0) for name in POSITIVE):
         return False
     with np.errstate(all="ignore"):
-        return all(np.isfinite(c).all() for c in _prepare(values, np.zeros((len(GAUGE), 1)), 1e-100))
+        return all(np.isfinite(c).all() for c in _prepare(values, np.zeros((len(GAUGE), 1)), PROBE_STEP))
 
 
 def _prepare(parameters, gauge, h):
@@ -438,6 +441,19 @@ def _generate(coef, y):
     )
 
 
+LONGEST_PATH = 128  # pieces of a path, a power of 2
+MOST_PIECES = 512  # of all paths of a solve: steps that need more are wrong by as much as the state
+PATIENCE = 3  # iterations with the approximate Jacobian, before it is asked whether it contracts
+NEGLIGIBLE = 1e-17  # terms that rounding hides in their sum, in sizes of the path
+LEAST_SHARE = 1e-5  # coordinates are measured no finer than by this part of all together
+ROUNDED_SLOPE = 2e-15  # rounding of the slope of a path, in sizes of the path and its slope
+DIFFERENCE = 1e-7  # of arguments in a quotient, in sizes of p: about the root of rounding
+SOLVED = 4e-16  # a residual, in sizes of p, that is rounding;
+NEARLY_SOLVED = 1e-12  # one below this is so too if it is ...
+SHRINKING = 0.25  # ... more than this part of the one before
+CONTRACTING = 0.05  # part of the residual that an iteration with a useful Jacobian leaves at most
+
+
 def _holds(coef, p, m, slope):
     """For which members dm/dt = pi(m) p holds at m, where the expansion has the given slope.
 
@@ -531,7 +547,7 @@ def _holds(coef, p, m, slope):
     field[6] = e[83]
     error = np.abs(field.T - slope)
     scale = np.abs(m).sum(axis=-1, keepdims=True) + np.abs(slope).sum(axis=-1, keepdims=True)
-    return (error <= 2e-15 * scale).all(axis=-1)
+    return (error <= ROUNDED_SLOPE * scale).all(axis=-1)
 
 
 def _product(a, b, k):
@@ -726,7 +742,7 @@ def _piece(coef, p, start):
         change += term
         mean += term / (k + 2)
         slope += (k + 1) * term
-        negligible = np.abs(term) <= 1e-17 * (np.abs(start) + np.abs(change) + 1e-5 * norm)
+        negligible = np.abs(term) <= NEGLIGIBLE * (np.abs(start) + np.abs(change) + LEAST_SHARE * norm)
         small = np.where(negligible.all(axis=-1), small + 1, 0)
         if (small >= 2).all() and _holds(coef, p, start + change, slope).all():
             break
@@ -772,7 +788,7 @@ def _differences(coef, x, p, residual):
     left = np.arange(len(x))
     for j in range(DIM):
         q = p[left]
-        q[:, j] += 1e-7 * norm[left]
+        q[:, j] += DIFFERENCE * norm[left]
         shifted, change, _, pieces = _residual(_at(coef, left), x[left], q)
         jacobian[left, :, j] = (shifted - residual[left]) / (q[:, j] - p[left, j])[:, np.newaxis]
         made[left] += pieces
@@ -792,6 +808,10 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
+PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
+LOST = 0.5  # part of the energy that one which leads farther must not lose
+
+
 def _plausible(stage, x, end):
     """Whether steps lead where the motion does; arrays (members, DIM).
 
@@ -800,13 +820,13 @@ def _plausible(stage, x, end):
     """
     _, parameters, h = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= 1.5 * size
+    near = moved <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= 0.5 * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= 1.5 * size) | kept
+    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
+    return (moved <= PLAUSIBLE * size) | kept
 
 
 def _solved(stage, x, carry, guess):
@@ -819,7 +839,7 @@ def _solved(stage, x, carry, guess):
 def _attempt(coef, x, carry, p):
     """Solve p = grad S_h(mean of the path from x under p), and move to the end of that path; arrays (members, DIM).
 
-    Where that takes more than 512 pieces of paths, the step is so large that a solution would mean nothing.
+    Where that takes more than MOST_PIECES pieces of paths, the step is so large that a solution would mean nothing.
     Returns new x, carry, p, and a status for each member, "" if good.
     """
     x, carry, p = x.copy(), carry.copy(), p.copy()
@@ -833,13 +853,13 @@ def _attempt(coef, x, carry, p):
         size = np.max(np.abs(residual), axis=-1) / norm
         finite = np.isfinite(residual).all(axis=-1)
         # The second test: residuals no longer shrink, the solve has reached the level of rounding.
-        done = (size <= 4e-16) | ((previous[open_] < 1e-12) & (size > 0.25 * previous[open_]))
+        done = (size <= SOLVED) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
         status[open_[done & ~good]] = "NOT_FINITE"
         status[open_[good]] = ""
         x[open_[good]], carry[open_[good]] = total[good], rest[good]
-        slow = np.flatnonzero(finite & ~done & (iteration >= 3) & (size > 0.05 * previous[open_]))
+        slow = np.flatnonzero(finite & ~done & (iteration >= PATIENCE) & (size > CONTRACTING * previous[open_]))
         if len(slow):
             at = open_[slow]
             jacobian[slow], pieces = _differences(_at(coef, at), x[at], p[at], residual[slow])
@@ -851,7 +871,7 @@ def _attempt(coef, x, carry, p):
         step = ~done & finite & ~singular
         p[open_[step]] -= delta[step]
         previous[open_] = size
-        open_ = open_[step & (made[open_] <= 512)]
+        open_ = open_[step & (made[open_] <= MOST_PIECES)]
         if not len(open_):
             break
     return x, carry, p, status

@@ -12,7 +12,7 @@
  *   Starting guesses; The implicit step, by Newton's method; The choice of the gauge: multiples of
  *   Casimirs taken from H; The solver; Several steps or members at once; Newton's method in lanes; The
  *   residuals of a block; Blocks of steps; Members of an ensemble; Groups of members; Ensembles
- * body-sha256: 73a5cda76020cd1e6897d4aed7c064b908ef24118aefbc8628a245afd462f839
+ * body-sha256: c97e8bef48d3a358600465b11e4116caa7d98d28e78bbeed2314d4f5497827ec
  */
 #include "rigid_body.h"
 #include <float.h>
@@ -346,6 +346,8 @@ void rigid_body_vector_field(const rigid_body_params *params, const double x[3],
     out[2] = x1 * t2 - x2 * t3;
 }
 
+#define rigid_body_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- Compensated sums, linear equations ---- */
 static int rigid_body_finite(const double *values, int count)
 {
@@ -518,7 +520,7 @@ static int rigid_body_train(rigid_body_history *history, int component)
 }
 
 /* ---- Starting guesses ---- */
-#define rigid_body_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
+#define rigid_body_REACH 4.0 /* how far from the last value a prediction may be, in sizes of that value */
 
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have
    nothing to do with the motion. */
@@ -654,7 +656,11 @@ static int rigid_body_plausible(const rigid_body_solver *s, const double increme
 
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+
 #define rigid_body_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+
+#define rigid_body_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define rigid_body_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double rigid_body_size(const double y[rigid_body_DIM], const double delta[rigid_body_DIM])
@@ -668,9 +674,6 @@ static double rigid_body_size(const double y[rigid_body_DIM], const double delta
     }
     return size;
 }
-
-#define rigid_body_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define rigid_body_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    last correction changes the increment to first order, without an evaluation: it is accepted if the error
@@ -712,8 +715,13 @@ enum {
     rigid_body_SAMPLES = 32, /* states along a short piece of the trajectory */
     /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
     rigid_body_DEGREE = 6,
-    rigid_body_SWEEPS = 4 /* most rounds over the multiples */
+    rigid_body_SWEEPS = 4,        /* most rounds over the multiples */
+    rigid_body_GRIDS = 3,         /* on a line, each finer than the one before by the factor mesh */
+    rigid_body_FIRST_REACH = 24,  /* points of the first grid to either side */
+    rigid_body_REACH_OF_GRID = 8, /* points of the others to either side */
 };
+#define rigid_body_MESH 0.125         /* of the first grid, in widths of the error */
+#define rigid_body_SAMPLE_LENGTH 0.25 /* from one state to the next, in sizes of the first */
 /* errors, in sizes of all on a line, that are as good: rounding does not decide */
 #define rigid_body_CLOSE_CALL 1e-12
 
@@ -735,7 +743,7 @@ static void rigid_body_sample(const rigid_body_params *params, const double x[ri
     double direction[rigid_body_DIM], middle[rigid_body_DIM], length = 0.0;
     for (int i = 0; i < rigid_body_DIM; ++i) {
         samples[0][i] = x[i];
-        length += 0.25 * fabs(x[i]);
+        length += rigid_body_SAMPLE_LENGTH * fabs(x[i]);
     }
     for (int k = 1; k < rigid_body_SAMPLES; ++k) {
         const double *y = samples[k - 1];
@@ -762,7 +770,8 @@ static double rigid_body_gauge_error(const rigid_body_params *params, const doub
 static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1], double t)
 {
     double error = difference[rigid_body_DEGREE];
-    for (int k = rigid_body_DEGREE - 1; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
+    for (int k = rigid_body_DEGREE - 1; k >= 0; --k)
+        error = difference[k] + (t + rigid_body_DEGREE / 2 - k) / (k + 1) * error;
     return error;
 }
 
@@ -771,18 +780,19 @@ static double rigid_body_on_line(const double difference[rigid_body_DEGREE + 1],
 static double rigid_body_least_on_line(const rigid_body_params *params, const double gauge[rigid_body_GAUGES],
     int c, double width, double samples[][rigid_body_DIM])
 {
-    double moved[rigid_body_GAUGES], difference[rigid_body_DEGREE + 1], size = 0.0, best = 0.0, mesh = 0.125;
+    double moved[rigid_body_GAUGES], difference[rigid_body_DEGREE + 1], size = 0.0, best = 0.0,
+        mesh = rigid_body_MESH;
     memcpy(moved, gauge, sizeof moved);
     for (int j = 0; j <= rigid_body_DEGREE; ++j) {
-        moved[c] = gauge[c] + (j - 3) * width;
+        moved[c] = gauge[c] + (j - rigid_body_DEGREE / 2) * width;
         difference[j] = rigid_body_gauge_error(params, moved, samples);
         size += difference[j];
     }
     for (int order = 1; order <= rigid_body_DEGREE; ++order)
         for (int j = rigid_body_DEGREE; j >= order; --j) difference[j] -= difference[j - 1];
     double least = rigid_body_on_line(difference, best);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
+    for (int level = 0; level < rigid_body_GRIDS; ++level, mesh *= rigid_body_MESH) {
+        const int reach = level == 0 ? rigid_body_FIRST_REACH : rigid_body_REACH_OF_GRID;
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
             const double t = centre + j * mesh, error = rigid_body_on_line(difference, t);
@@ -837,7 +847,7 @@ rigid_body_status rigid_body_init_gauge(rigid_body_solver *s, const rigid_body_p
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    rigid_body_prepare(&fresh.params, fresh.gauge, 1e-100, fresh.coef); /* so short a step does not matter */
+    rigid_body_prepare(&fresh.params, fresh.gauge, rigid_body_PROBE_STEP, fresh.coef);
     if (!rigid_body_finite(fresh.x, rigid_body_DIM) || !rigid_body_allowed(&fresh.params)
         || !rigid_body_finite(fresh.coef, rigid_body_COEFFICIENTS))
         return rigid_body_BAD_ARGUMENT;
@@ -869,14 +879,14 @@ static rigid_body_status rigid_body_single_steps(rigid_body_solver *s, double h,
     if (s == NULL || !isfinite(h)) return rigid_body_BAD_ARGUMENT;
     if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
         rigid_body_prepare(&s->params, s->gauge, h, s->coef);
+        s->h = h;
+        s->t_before_h = s->t;
+        s->steps_before_h = s->steps;
         memset(&s->history, 0, sizeof s->history);
         s->history.slow_steps_allowed = rigid_body_REPAY;
         memset(&s->blocks, 0, sizeof s->blocks);
         s->blocks.single_steps = 2 * rigid_body_AHEAD;
         s->blocks.passes_without_recurrences = INT_MAX;
-        s->h = h;
-        s->t_before_h = s->t;
-        s->steps_before_h = s->steps;
     }
     for (; steps > 0; --steps) {
         const rigid_body_status status = rigid_body_stage(s);
@@ -1172,9 +1182,6 @@ static void rigid_body_invert_lanes(rigid_body_lanes matrix[restrict 9], rigid_b
 }
 
 /* ---- Newton's method in lanes ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#define rigid_body_FLOOR_OF_LANES 1e-6
-
 /* A stage in all lanes, linearised around y. */
 typedef struct {
     rigid_body_lanes y[rigid_body_DIM], displacement[rigid_body_DIM], increment[rigid_body_DIM],
@@ -1193,7 +1200,7 @@ static void rigid_body_measure(const rigid_body_model *model, rigid_body_lanes u
         for (int lane = 0; lane < rigid_body_LANES; ++lane) unit[i][lane] = fabs(model->y[i][lane]);
         rigid_body_EACH_LANE
         for (int lane = 0; lane < rigid_body_LANES; ++lane) {
-            const double least = rigid_body_FLOOR_OF_LANES * unit[i][lane];
+            const double least = rigid_body_FLOOR * unit[i][lane];
             norm[lane] = least > norm[lane] ? least : norm[lane];
         }
     }
@@ -1276,7 +1283,7 @@ static void rigid_body_correct(rigid_body_model *model, rigid_body_lanes unit[re
    correction as the second, there is rounding only, if the next is below the third. */
 #define rigid_body_FROZEN 1e-4
 #define rigid_body_SMALL 1e-8
-#define rigid_body_ROUNDING 1e-10
+#define rigid_body_BLOCK_ROUNDING 1e-10
 /* frozen matrices leave twice what new ones did, of the same correction; this is far more */
 #define rigid_body_CAUTION 32.0
 
@@ -1290,7 +1297,7 @@ static void rigid_body_leave(const rigid_body_lanes size, const rigid_body_lanes
     for (int lane = 0; lane < rigid_body_LANES; ++lane) {
         const double part = before[lane] < HUGE_VAL ? rigid_body_CAUTION * size[lane] / before[lane]
             : size[lane];
-        left[lane] = before[lane] < rigid_body_SMALL && size[lane] < rigid_body_ROUNDING ? 0.0
+        left[lane] = before[lane] < rigid_body_SMALL && size[lane] < rigid_body_BLOCK_ROUNDING ? 0.0
             : part * size[lane];
     }
 }

@@ -8,7 +8,7 @@
  *   one Newton iteration: 135 additions, 164 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 49998314f1eabae2b2f4711313e8389be9e5f9bf85d50cc676c1c969c8e4429c
+ * body-sha256: 0222ebc14373b74e8a0f513e9ba52dd753f9f17e82bc20365fadf29676e2e452
  */
 /*
  * import { Solver, StepError } from './rigid_body.mjs';
@@ -57,9 +57,6 @@ const MAX_ITERATIONS = 20;
 
 /** The error that may remain, relative to y. */
 const TOLERANCE = 1e-20;
-
-/** Components are measured no finer than by this part of the largest. */
-const FLOOR = 1e-6;
 
 /** The polynomial with these coefficients, the constant first. */
 function polynomial(coefficients, s) {
@@ -455,6 +452,46 @@ function vectorField(params, x, out) {
   out[2] = x1 * t2 - x2 * t3;
 }
 
+/** So short that coefficients are finite */
+const PROBE_STEP = 1e-100;
+
+/** Components of y are measured no finer than by this part of the largest */
+const FLOOR = 1e-6;
+
+/** Corrections below this have reached the level of rounding, ... */
+const NEARLY_SOLVED = 1e-8;
+/** ... if one is more than this part of the one before */
+const SHRINKING = 0.25;
+
+/** How far any step may lead, in sizes of the state and of its motion */
+const PLAUSIBLE = 1.5;
+/** Part of the energy that one which leads farther must not lose */
+const LOST = 0.5;
+
+/** How far from the last value a prediction may be, in sizes of that value */
+const REACH = 4.0;
+/** That are stored: those of higher order amplify rounding more than they gain */
+const DIFFERENCES = 9;
+
+/** States along a short piece of the trajectory */
+const SAMPLES = 32;
+/** S_3 is cubic in H, so the square of the error is of degree six in each multiple */
+const DEGREE = 6;
+/** Most rounds over the multiples */
+const SWEEPS = 4;
+/** On a line, each finer than the one before by the factor mesh */
+const GRIDS = 3;
+/** Points of the first grid to either side */
+const FIRST_REACH = 24;
+/** Points of the others to either side */
+const REACH_OF_GRID = 8;
+/** Of the first grid, in widths of the error */
+const MESH = 0.125;
+/** From one state to the next, in sizes of the first */
+const SAMPLE_LENGTH = 0.25;
+/** Errors, in sizes of all on a line, that are as good: rounding does not decide */
+const CLOSE_CALL = 1e-12;
+
 // ---- Errors ----
 
 /** What statuses mean. */
@@ -520,7 +557,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, new Float64Array(GAUGE.length), 1e-100, table);
+  prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -724,10 +761,6 @@ export class Solver {
 
 // ---- The implicit step, by Newton's method ----
 
-/** Corrections below the first that shrink by less than the second have reached the level of rounding. */
-const NEARLY_SOLVED = 1e-8;
-const SHRINKING = 0.25;
-
 /**
  * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
  * is NaN.
@@ -795,12 +828,6 @@ function makeStage(solver, stage) {
 }
 
 // ---- Starting guesses, and whether a solution may be right ----
-
-/** Differences that are kept: extrapolation of more than order 8 amplifies rounding more than it gains. */
-const DIFFERENCES = 9;
-
-/** How far from the last value a guess may be, in sizes of that value. */
-const REACH = 4;
 
 /**
  * The last value of the unknown and its backward differences, which the next is extrapolated by. For
@@ -877,15 +904,6 @@ class History {
   }
 }
 
-/**
- * How far a step may lead, in sizes of the state and of what the vector field says, if the energy is
- * lost.
- */
-const PLAUSIBLE = 1.5;
-
-/** The part of the energy that counts as lost. */
-const LOST = 0.5;
-
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);
 
@@ -942,15 +960,6 @@ function retried(solver, stage, attempt) {
 
 // ---- The choice of the gauge: multiples of Casimirs taken from H ----
 
-/** States along a short piece of the trajectory. */
-const SAMPLES = 32;
-
-/** S_3 is cubic in H, so the square of the error is of degree six in each multiple. */
-const DEGREE = 6;
-
-/** Most rounds over the multiples. */
-const SWEEPS = 4;
-
 /** The direction of the motion at a point, of size 1; 0 where there is none. */
 function direction(params, at) {
   const slope = new Float64Array(DIM);
@@ -969,7 +978,7 @@ function total(values) {
  */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
-  const length = 0.25 * total(states[0]);
+  const length = SAMPLE_LENGTH * total(states[0]);
   while (states.length < SAMPLES) {
     const y = states[states.length - 1];
     const first = direction(params, y);
@@ -993,7 +1002,7 @@ function gaugeError(params, gauge, samples) {
 /** The error polynomial at centre + t width, by Newton's formula from forward differences. */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
-  for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + 3 - k) / (k + 1)) * error;
+  for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;
   return error;
 }
 
@@ -1005,7 +1014,7 @@ function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
   for (let j = 0; j <= DEGREE; j++) {
     const nearby = Float64Array.from(gauge);
-    nearby[c] = gauge[c] + (j - 3) * width;
+    nearby[c] = gauge[c] + (j - DEGREE / 2) * width;
     errors.push(gaugeError(params, nearby, samples));
   }
   const size = errors.reduce((sum, error) => sum + error, 0);
@@ -1014,12 +1023,13 @@ function leastOnLine(params, gauge, c, width, samples) {
   }
   let best = 0;
   let least = errorOnLine(errors, best);
-  for (const [reach, mesh] of [[24, 1 / 8], [8, 1 / 64], [8, 1 / 512]]) {
+  for (let grid = 0, mesh = MESH; grid < GRIDS; grid++, mesh *= MESH) {
+    const reach = grid === 0 ? FIRST_REACH : REACH_OF_GRID;
     const centre = best;
     for (let j = -reach; j <= reach; j++) {
       const t = centre + j * mesh;
       const error = errorOnLine(errors, t);
-      if (!(error < least - 1e-12 * size)) continue; // close calls are not decided by rounding
+      if (!(error < least - CLOSE_CALL * size)) continue;
       least = error;
       best = t;
     }

@@ -7,7 +7,7 @@
 #   one Newton iteration: 135 additions, 164 multiplications, 2 functions
 # DO NOT EDIT: the checksum below notices; to regenerate: phigen build rigid_body
 # SPDX-License-Identifier: 0BSD
-# body-sha256: 302c39950c9f46054d8585b2e3ed30154911b41b4788982380db75f66a8c473a
+# body-sha256: 8edc63242a240b928286b0fc26da0c05e025d7e650b7b91a4853152c81387004
 import numpy as np
 
 VERSION = "0.1.0"
@@ -81,6 +81,9 @@ def _sum(x, carry, change):
     return total, (x - (total - added)) + (change - added)
 
 
+PROBE_STEP = 1e-100  # so short that coefficients are finite
+
+
 def _numbers(values):
     """An array of numbers; ValueError where one is too large."""
     try:
@@ -108,7 +111,7 @@ def _admissible(values):
     if not all(np.all(values[name] > 0.0) for name in POSITIVE):
         return False
     with np.errstate(all="ignore"):
-        return all(np.isfinite(c).all() for c in _prepare(values, np.zeros((len(GAUGE), 1)), 1e-100))
+        return all(np.isfinite(c).all() for c in _prepare(values, np.zeros((len(GAUGE), 1)), PROBE_STEP))
 
 
 def _phi0(s):
@@ -452,6 +455,10 @@ def _solve(matrix, side):
         return np.concatenate([_solve(matrix[m : m + 1], side[m : m + 1]) for m in range(len(side))])
 
 
+PLAUSIBLE = 1.5  # how far any step may lead, in sizes of the state and of its motion
+LOST = 0.5  # part of the energy that one which leads farther must not lose
+
+
 def _plausible(stage, x, end):
     """Whether steps lead where the motion does; arrays (members, DIM).
 
@@ -460,13 +467,13 @@ def _plausible(stage, x, end):
     """
     _, parameters, h = stage
     moved, size = np.abs(end - x).sum(axis=-1), np.abs(x).sum(axis=-1)
-    near = moved <= 1.5 * size
+    near = moved <= PLAUSIBLE * size
     if near.all():
         return near
     size = size + np.abs(np.reshape(h, (-1, 1)) * _vector_field(parameters, x)).sum(axis=-1)
     before, middle, after = (_energy(parameters, at)[:, 0] for at in (x, 0.5 * (x + end), end))
-    kept = np.abs(after - before) <= 0.5 * (np.abs(before) + np.abs(middle) + np.abs(after))
-    return (moved <= 1.5 * size) | kept
+    kept = np.abs(after - before) <= LOST * (np.abs(before) + np.abs(middle) + np.abs(after))
+    return (moved <= PLAUSIBLE * size) | kept
 
 
 def _solved(stage, x, carry, guess):
@@ -476,9 +483,14 @@ def _solved(stage, x, carry, guess):
     return following, rest, value, status
 
 
+FLOOR = 1e-6  # components of y are measured no finer than by this part of the largest
+NEARLY_SOLVED = 1e-8  # corrections below this have reached the level of rounding, ...
+SHRINKING = 0.25  # ... if one is more than this part of the one before
+
+
 def _size(y, delta):
-    """Size of a correction relative to each component of y, but no finer than 1e-6 of the largest."""
-    scale = np.abs(y) + 1e-6 * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
+    """Size of a correction relative to each component of y, but no finer than FLOOR of the largest."""
+    scale = np.abs(y) + FLOOR * np.max(np.abs(y), axis=-1, keepdims=True) + np.finfo(float).tiny
     return np.max(np.abs(delta) / scale, axis=-1)
 
 
@@ -503,7 +515,7 @@ def _attempt(coef, x, carry, y):
         y[open_] -= delta
         remaining = size**2 * np.maximum(1.0, size / previous[open_] ** 2)
         # The second test: corrections no longer shrink, the solve has reached the level of rounding.
-        done = (remaining <= 1e-20) | ((previous[open_] < 1e-8) & (size > 0.25 * previous[open_]))
+        done = (remaining <= 1e-20) | ((previous[open_] < NEARLY_SOLVED) & (size > SHRINKING * previous[open_]))
         change = increment - (increment_jacobian @ delta[..., np.newaxis])[..., 0]
         total, rest = _sum(x[open_], carry[open_], change)
         good = done & np.isfinite(total).all(axis=-1)
@@ -530,35 +542,47 @@ def _advance(stage, x, carry, memory):
     return following, rest, (y - x, np.where(guessed[:, np.newaxis], memory[0], y - x)), status
 
 
+SAMPLES = 32  # states along a short piece of the trajectory
+DEGREE = 6  # S_3 is cubic in H, so the square of the error is of degree six in each multiple
+SWEEPS = 4  # most rounds over the multiples
+GRIDS = 3  # on a line, each finer than the one before by the factor mesh
+FIRST_REACH = 24  # points of the first grid to either side
+REACH_OF_GRID = 8  # points of the others to either side
+MESH = 0.125  # of the first grid, in widths of the error
+SAMPLE_LENGTH = 0.25  # from one state to the next, in sizes of the first
+CLOSE_CALL = 1e-12  # errors, in sizes of all on a line, that are as good: rounding does not decide
+
+
 def _line(error_of, gauge, c, width):
-    """The error where one multiple varies, of centre + (j - 3) width for j = 0 ... 6, as forward differences (7, members).
+    """The error where one multiple varies, of centre + (j - DEGREE / 2) width for j = 0 ... DEGREE, as forward differences (DEGREE + 1, members).
 
     S_3 is cubic in H, so these are those of a polynomial of degree six. Also their size, before.
     """
     moved, errors = gauge.copy(), []
-    for j in range(7):
-        moved[:, c] = gauge[:, c] + (j - 3) * width
+    for j in range(DEGREE + 1):
+        moved[:, c] = gauge[:, c] + (j - DEGREE / 2) * width
         errors.append(error_of(moved))
-    return np.array([np.diff(errors, k, axis=0)[0] for k in range(7)]), sum(errors)
+    return np.array([np.diff(errors, k, axis=0)[0] for k in range(DEGREE + 1)]), sum(errors)
 
 
 def _least_on_line(difference, size):
     """Where that polynomial is least, in units of width: the best t on grids, each finer than the one before."""
 
     def value(t):
-        error = difference[6]
-        for k in range(5, -1, -1):
-            error = difference[k] + (t + 3.0 - k) / (k + 1) * error
+        error = difference[DEGREE]
+        for k in range(DEGREE - 1, -1, -1):
+            error = difference[k] + (t + DEGREE / 2 - k) / (k + 1) * error
         return error
 
     best = np.zeros_like(size)
     least = value(best)
-    for reach, mesh in ((24, 1 / 8), (8, 1 / 64), (8, 1 / 512)):
-        centre = best
+    for grid in range(GRIDS):
+        centre, mesh = best, MESH ** (grid + 1)
+        reach = REACH_OF_GRID if grid else FIRST_REACH
         for j in range(-reach, reach + 1):
             t = centre + j * mesh
             error = value(t)
-            better = error < least - 1e-12 * size  # close calls are not decided by rounding
+            better = error < least - CLOSE_CALL * size
             least, best = np.where(better, error, least), np.where(better, t, best)
     return best
 
@@ -569,9 +593,9 @@ def _direction(parameters, y):
     return slope / (np.abs(slope).sum(axis=-1, keepdims=True) + np.finfo(float).tiny)
 
 
-def _samples(parameters, x, count=32):
+def _samples(parameters, x, count=SAMPLES):
     """A short piece of each trajectory, by a Runge-Kutta method with steps of one length."""
-    length = 0.25 * np.abs(x).sum(axis=-1, keepdims=True)
+    length = SAMPLE_LENGTH * np.abs(x).sum(axis=-1, keepdims=True)
     points = [x]
     for _ in range(count - 1):
         y = points[-1]
@@ -594,7 +618,7 @@ def _choose_gauge(parameters, x):
 
     norms = np.where(sums[:, 2::2] > 0, sums[:, 2::2], np.inf)
     gauge, width = sums[:, 1::2] / norms, np.sqrt(sums[:, :1] / norms)
-    for _ in range(4):
+    for _ in range(SWEEPS):
         before = gauge.copy()
         for c in range(gauge.shape[1]):
             gauge[:, c] += _least_on_line(*_line(error_of, gauge, c, width[:, c])) * width[:, c]

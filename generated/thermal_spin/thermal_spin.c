@@ -15,7 +15,7 @@
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Compensated sums, linear equations; The implicit step, by Newton's method;
  *   Random numbers; Noise; The solver; Ensembles
- * body-sha256: 1acf2a97cba2d1a72dab828a8b2d00866fab5b78041f69270e14be031609d1fd
+ * body-sha256: 64986dd2bb0fb84109cf147ad29e790125a64f1e83fe0f6e02263a4481c538b6
  */
 #include "thermal_spin.h"
 #include <float.h>
@@ -202,6 +202,8 @@ void thermal_spin_noise_fields(const thermal_spin_params *params, const double x
     out[8] = 0.0;
 }
 
+#define thermal_spin_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 /* ---- Compensated sums, linear equations ---- */
 static int thermal_spin_finite(const double *values, int count)
 {
@@ -286,7 +288,11 @@ static int thermal_spin_plausible(const thermal_spin_solver *s, const double inc
 
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
+
 #define thermal_spin_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+
+#define thermal_spin_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
+#define thermal_spin_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double thermal_spin_size(const double y[thermal_spin_DIM], const double delta[thermal_spin_DIM])
@@ -300,9 +306,6 @@ static double thermal_spin_size(const double y[thermal_spin_DIM], const double d
     }
     return size;
 }
-
-#define thermal_spin_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define thermal_spin_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The
    last correction changes the increment to first order, without an evaluation: it is accepted if the error
@@ -426,7 +429,7 @@ thermal_spin_status thermal_spin_init(thermal_spin_solver *s, const thermal_spin
     fresh.h = (double)NAN;
     fresh.params = *params;
     memcpy(fresh.x, x0, sizeof fresh.x);
-    thermal_spin_prepare(&fresh.params, 1e-100, fresh.coef); /* so short a step does not matter */
+    thermal_spin_prepare(&fresh.params, thermal_spin_PROBE_STEP, fresh.coef);
     if (!thermal_spin_finite(fresh.x, thermal_spin_DIM) || !thermal_spin_allowed(&fresh.params)
         || !thermal_spin_finite(fresh.coef, thermal_spin_COEFFICIENTS))
         return thermal_spin_BAD_ARGUMENT;

@@ -13,7 +13,7 @@
  *   one Newton iteration: 49 additions, 72 multiplications, 2 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build thermal_spin
  * SPDX-License-Identifier: 0BSD
- * body-sha256: c7cc88bd0502f0454853d8462899db7b9697b56f7b321ca4ed30b5a5a7c53174
+ * body-sha256: 2cec8b54bd50651d88b2b4b55a9b1a83480843fc97be762097acd369adfa8a8f
  */
 /*
  * import { Solver, StepError } from './thermal_spin.mjs';
@@ -71,9 +71,6 @@ const MAX_ITERATIONS = 20;
 
 /** The error that may remain, relative to y. */
 const TOLERANCE = 1e-20;
-
-/** Components are measured no finer than by this part of the largest. */
-const FLOOR = 1e-6;
 
 /** The polynomial with these coefficients, the constant first. */
 function polynomial(coefficients, s) {
@@ -268,6 +265,27 @@ function vectorField(params, x, out) {
   out[2] = y * t4 + x_ * t3;
 }
 
+/** So short that coefficients are finite */
+const PROBE_STEP = 1e-100;
+
+/** Components of y are measured no finer than by this part of the largest */
+const FLOOR = 1e-6;
+
+/** Corrections below this have reached the level of rounding, ... */
+const NEARLY_SOLVED = 1e-8;
+/** ... if one is more than this part of the one before */
+const SHRINKING = 0.25;
+
+/** How far any step may lead, in sizes of the state and of its motion */
+const PLAUSIBLE = 1.5;
+/** Part of the energy that one which leads farther must not lose */
+const LOST = 0.5;
+
+/** How far from the last value a prediction may be, in sizes of that value */
+const REACH = 4.0;
+/** That are stored: those of higher order amplify rounding more than they gain */
+const DIFFERENCES = 9;
+
 // ---- Errors ----
 
 /** What statuses mean. */
@@ -333,7 +351,7 @@ function admitted(given) {
     if (!allowed) throw new StepError("BAD_ARGUMENT", 0, `the parameter ${name} is ${value}`);
   }
   const [table] = emptyTables();
-  prepare(params, 1e-100, table);
+  prepare(params, PROBE_STEP, table);
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
   }
@@ -562,10 +580,6 @@ export class Solver {
 
 // ---- The implicit step, by Newton's method ----
 
-/** Corrections below the first that shrink by less than the second have reached the level of rounding. */
-const NEARLY_SOLVED = 1e-8;
-const SHRINKING = 0.25;
-
 /**
  * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it
  * is NaN.
@@ -719,12 +733,6 @@ function draw(solver, given) {
 
 // ---- Starting guesses, and whether a solution may be right ----
 
-/** Differences that are kept: extrapolation of more than order 8 amplifies rounding more than it gains. */
-const DIFFERENCES = 9;
-
-/** How far from the last value a guess may be, in sizes of that value. */
-const REACH = 4;
-
 /**
  * The last value of the unknown and its backward differences, which the next is extrapolated by. For
  * speed only.
@@ -799,15 +807,6 @@ class History {
     if (this.count < DIFFERENCES) this.count++;
   }
 }
-
-/**
- * How far a step may lead, in sizes of the state and of what the vector field says, if the energy is
- * lost.
- */
-const PLAUSIBLE = 1.5;
-
-/** The part of the energy that counts as lost. */
-const LOST = 0.5;
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);

@@ -8,7 +8,7 @@
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
  * Contents: The model; Rows of sites; The lattice; The solver; The flows; What is seen at sites
- * body-sha256: 4f6a3c467b39cc9a603a23cddc072ed60df0574ff9d1066079e0bb40fb528a82
+ * body-sha256: 65c4474c4ef60b1f98d14858e638b9b9a34f8407f351d726844102d83f27a16b
  */
 #include "toda.h"
 #include <float.h>
@@ -230,6 +230,8 @@ static void toda_vector_field_row(const toda_row *row, double *restrict out)
 }
 
 /* ---- The lattice ---- */
+#define toda_PROBE_STEP 1e-100 /* so short that coefficients are finite */
+
 enum { toda_STRETCH = 32 }; /* steps between looks at the state: what is not finite stays so */
 enum { toda_BUFFER = 256 }; /* densities that are added in one go */
 
@@ -288,7 +290,7 @@ toda_status toda_init(toda_solver *s, const toda_params *params, const size_t si
     if (rows == 0 || !toda_finite(x0, toda_DIM * sites) || !toda_allowed(&own, sites))
         return toda_BAD_ARGUMENT;
     double coef[toda_COEFFICIENTS];
-    toda_prepare_step(&own, 1e-100, coef);
+    toda_prepare_step(&own, toda_PROBE_STEP, coef);
     if (!toda_finite(coef, toda_COEFFICIENTS)) return toda_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);

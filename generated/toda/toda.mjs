@@ -7,7 +7,7 @@
  *   step: explicit; one step of one site: 13 additions, 33 multiplications, 6 functions
  * DO NOT EDIT: the checksum below notices; to regenerate: phigen build toda
  * SPDX-License-Identifier: 0BSD
- * body-sha256: 9973c63c32d512d0a8b4d35f1fb463dfe846a7a54898cdae6324089b79a12a81
+ * body-sha256: 0f442f1af0ae5bd4b5bf42dc93b583038a1a1e5aef00888049f4d05f28868fce
  */
 /*
  * import { Solver, StepError } from './toda.mjs';
@@ -138,6 +138,9 @@ function vectorField(params, x, sites, out) {
   }
 }
 
+/** So short that coefficients are finite */
+const PROBE_STEP = 1e-100;
+
 // ---- Errors ----
 
 /** What statuses mean. */
@@ -182,6 +185,17 @@ function march(solver, h, count) {
 }
 
 // ---- The solver ----
+
+/** The sum of values, compensated after A. Neumaier. */
+function sumOf(values) {
+  let sum = 0, rest = 0;
+  for (const value of values) {
+    const total = sum + value;
+    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
+    sum = total;
+  }
+  return sum + rest;
+}
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
@@ -236,7 +250,7 @@ export class Solver {
     this.sites = new Sites(sizes, options);
     this.x = finite(x0, DIM * this.sites.count, "x0");
     this.before = Float64Array.from(this.x);
-    const rows = prepareStep(this.sites.params, 1e-100, this.rows);
+    const rows = prepareStep(this.sites.params, PROBE_STEP, this.rows);
     if (!rows.every((row) => row.every(Number.isFinite))) {
       throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
     }
@@ -310,13 +324,7 @@ export class Solver {
 
   /** The Hamiltonian, of x or of another state. */
   hamiltonian(...at) {
-    let sum = 0, rest = 0;
-    for (const value of this.density(...at)) { // compensated, after A. Neumaier
-      const total = sum + value;
-      rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
-      sum = total;
-    }
-    return sum + rest;
+    return sumOf(this.density(...at));
   }
 
   /**

@@ -1,1 +1,1 @@
-"""The group element that a step on the dual of a Lie algebra is the coadjoint action of: attitude and position."""
+"""Attitude and position: the group element whose coadjoint action is a step on the dual of a Lie algebra."""

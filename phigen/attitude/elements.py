@@ -43,8 +43,8 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
     """exp(p, t), or its Cayley transform; ``t`` may be empty."""
     s = dot(p, p)
     if cayley:
-        found = with_phi(p, t, ZERO)
-        return replace(found, length=sqrt(found.length))
+        increment = with_phi(p, t, ZERO)
+        return replace(increment, length=sqrt(increment.length))
     phi, u = call("phi0", s / 4), s / 16
     c = ONE - s / 4 * phi
     square = c**2
@@ -54,7 +54,7 @@ def direction(p: Vector, t: Vector, *, cayley: bool) -> Direction:
 
 
 def with_phi(p: Vector, t: Vector, phi: Expression) -> Direction:
-    """The same by φ(s) for any value of that, with the square of the length: ((1 − sφ), p/2). 0 makes it Cayley's."""
+    """The element for a given value of φ(s), with the square of its length: ((1 − sφ), p/2). φ = 0: Cayley."""
     s = dot(p, p)
     c = ONE - s * phi
     return Direction((c, *(pi / 2 for pi in p)), _shift(p, t, (c, _HALF, (ONE - 4 * c * phi) / 4)), c**2 + s / 4)
@@ -70,11 +70,11 @@ def _shift(p: Vector, t: Vector, factors: Vector) -> tuple[Expression, ...]:
 
 def element(p: Vector, t: Vector, *, cayley: bool) -> tuple[Expression, ...]:
     """The quaternion of p less 1, and what it translates by if ``t`` is not empty."""
-    found = direction(p, t, cayley=cayley)
-    per = ONE / found.length
+    increment = direction(p, t, cayley=cayley)
+    per = ONE / increment.length
     s = dot(p, p)
-    shorter = s / 4 * per / (ONE + found.length) if cayley else s / 8 * per
-    return (-shorter, *(per * v for v in found.turn[1:]), *(per**2 * a for a in found.shift))
+    shorter = s / 4 * per / (ONE + increment.length) if cayley else s / 8 * per
+    return (-shorter, *(per * v for v in increment.turn[1:]), *(per**2 * a for a in increment.shift))
 
 
 def rotation_by(r: Vector, t: Vector) -> tuple[Expression, ...]:

@@ -1,4 +1,4 @@
-"""Which group a step moves in: the rotations of so(3), the motions of se(3), or the matrices of a representation.
+"""The group of a step: the rotations of so(3), the motions of se(3), or the matrices of a representation.
 
 On the dual of a Lie algebra a step x₀ → x₁ is the coadjoint action of one group element, τ of the covector p. Its
 product along a trajectory is the attitude g. Two conventions, by the sign of the bracket:
@@ -21,7 +21,7 @@ from phigen.realisations.cayley import closed_representation
 from phigen.spec.model import LieAlgebraForm
 from phigen.symbolic.expression import ONE, ZERO, Expression, total
 
-#: What can be asked for.
+#: The values of ``reconstruct``.
 QUATERNION, MATRIX = "quaternion", "matrix"
 
 Triple = tuple[int, int, int]
@@ -30,7 +30,7 @@ Dense = tuple[tuple[Expression, ...], ...]
 
 @dataclass(frozen=True)
 class Group:
-    """How a covector of ``dimension`` components acts.
+    """A group and its algebra, with covectors of ``dimension`` components.
 
     ``spatial`` tells that x are momenta in space: elements are multiplied from the left. ``matrices``, one for each
     component, are there for an attitude that is a matrix; else the components of ``rotation`` make quaternions, and
@@ -55,12 +55,12 @@ class Group:
 
     @property
     def rows(self) -> int:
-        """Of a matrix; 0 for quaternions."""
+        """Number of rows of a matrix; 0 for quaternions."""
         return len(self.matrices[0]) if self.matrices else 0
 
     @property
     def size(self) -> int:
-        """Numbers that an element consists of: 4, 4 + 3, or those of a square matrix."""
+        """Number of entries of an element: 4, 4 + 3, or those of a square matrix."""
         return self.rows**2 or (7 if self.translation else 4)
 
     @property
@@ -78,14 +78,14 @@ class Group:
         ]
 
 
-def group_of(system: System, wanted: str, kind: str) -> Group:
+def group_of(system: System, requested: str, kind: str) -> Group:
     """The group of a Lie–Poisson π; ``kind`` is that of the bi-realisation. Raises `SpecError` where there is none."""
     algebra = system.lie_algebra
     if algebra is None:
-        hint = "attitudes belong to Lie–Poisson structures, as those of rigid bodies and tops"
-        raise refused(system, f"reconstruct: {wanted} needs a linear π, the dual of a Lie algebra; this π is "
+        hint = "attitudes need a Lie–Poisson structure, as that of a rigid body or a top"
+        raise refused(system, f"reconstruct: {requested} needs a linear π, the dual of a Lie algebra; this π is "
                       f"{system.shape}", hint)  # fmt: skip
-    return _rotations(system, algebra) if wanted == QUATERNION else _matrices(system, algebra, kind)
+    return _rotations(system, algebra) if requested == QUATERNION else _matrices(system, algebra, kind)
 
 
 def refused(system: System, message: str, hint: str = "") -> SpecError:
@@ -95,27 +95,27 @@ def refused(system: System, message: str, hint: str = "") -> SpecError:
 
 def _rotations(system: System, algebra: LieAlgebra) -> Group:
     """Three coordinates of so(3); with three of its vectors, and nothing else, se(3)."""
-    found = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
-    if len(found) != 1:
-        many = "there are several" if found else "there are none"
+    triples = [(r, s) for r in combinations(range(algebra.dimension), 3) if (s := _sign(algebra, r))]
+    if len(triples) != 1:
+        many = "there are several" if triples else "there are none"
         raise refused(
             system,
             f"reconstruct: quaternion needs three coordinates with the brackets of so(3), {{a, b}} = ±c and cyclic, "
             f"and all others together an ideal; {many} in {algebra.name}",
             "reconstruct: matrix takes every algebra with known matrices",
         )
-    rotation, sign = found[0]
+    rotation, sign = triples[0]
     return Group(sign > 0, rotation, _vectors(algebra, rotation, sign), algebra.dimension)
 
 
 def _sign(algebra: LieAlgebra, triple: tuple[int, ...]) -> int:
     """±1 if x ↦ (x_i, x_j, x_k) is a homomorphism to so(3) with [L_1, L_2] = ±L_3, else 0."""
-    wanted = {(0, 1): 2, (1, 2): 0, (0, 2): 1}
+    products = {(0, 1): 2, (1, 2): 0, (0, 2): 1}
     for sign in (1, -1):
         signs = {(0, 1): sign, (1, 2): sign, (0, 2): -sign}
         if all(
             _components(algebra, i, j, triple)
-            == ({wanted[at]: signs[at]} if (at := (_place(triple, i), _place(triple, j))) in wanted else {})
+            == ({products[at]: signs[at]} if (at := (_place(triple, i), _place(triple, j))) in products else {})
             for i, j in combinations(range(algebra.dimension), 2)
         ):
             return sign
@@ -140,12 +140,12 @@ def _numbers(row: Mapping[int, Expression], triple: Sequence[int]) -> dict[int, 
 def _vectors(algebra: LieAlgebra, rotation: Triple, sign: int) -> tuple[Triple, ...]:
     """The coordinates of the vectors that are rotated."""
     left = [i for i in range(algebra.dimension) if i not in rotation]
-    found: list[Triple] = []
+    vectors: list[Triple] = []
     for a, b, c in permutations(left, 3):
         if {a, b, c} <= set(left) and _is_vector(algebra, rotation, (a, b, c), sign):
-            found.append((a, b, c))
+            vectors.append((a, b, c))
             left = [i for i in left if i not in (a, b, c)]
-    return tuple(found)
+    return tuple(vectors)
 
 
 def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int], sign: int) -> bool:
@@ -163,25 +163,25 @@ def _is_vector(algebra: LieAlgebra, rotation: Triple, translation: Sequence[int]
 
 
 def _matrices(system: System, algebra: LieAlgebra, kind: str) -> Group:
-    """Those of the named algebra, in its sign; so(3) typed in any way has the rotations of its sign."""
-    found = closed_representation(algebra) if kind == "cayley" else known_representation(algebra)
-    if found is None:
+    """The matrices of the named algebra, with its sign; for so(3) in any notation the rotations of its sign."""
+    representation = closed_representation(algebra) if kind == "cayley" else known_representation(algebra)
+    if representation is None:
         raise refused(
             system,
             f"reconstruct: matrix: no faithful matrices of {algebra.name} are known" + " that are closed under the "
             "Cayley transform" * (kind == "cayley"),
             "give them as lie_algebra: {matrices: […]}, or choose birealisation: exponential",
         )
-    size = range(found.size)
+    size = range(representation.size)
     spatial = _is_spatial(system, algebra)
     matrices = tuple(
-        tuple(tuple(_signed(m.get((i, j), ZERO), spatial) for j in size) for i in size) for m in found.matrices
+        tuple(tuple(_signed(m.get((i, j), ZERO), spatial) for j in size) for i in size) for m in representation.matrices
     )
     return Group(spatial, matrices=matrices)
 
 
 def _is_spatial(system: System, algebra: LieAlgebra) -> bool:
-    """By the sign that the spec gives; where it gives none, momenta are in the body unless so(3) says otherwise."""
+    """Whether momenta are in space: by the sign in the spec; without one, by brackets of so(3), else in the body."""
     if isinstance(system.form, LieAlgebraForm):
         return system.form.sign > 0
     return algebra.dimension == 3 and _sign(algebra, (0, 1, 2)) > 0

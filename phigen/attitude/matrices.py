@@ -20,7 +20,7 @@ from phigen.attitude.group import Dense, Group
 from phigen.symbolic.expression import ONE, ZERO, Expression, call, number, total
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Terms of the series of exp that are enough where the largest eigenvalue is no larger than 1/2.
+#: Terms of the series of exp for double precision where the largest eigenvalue is at most 1/2.
 TERMS = 14
 
 _HALF = number(Fraction(1, 2))
@@ -35,7 +35,7 @@ def size_of(group: Group, p: Sequence[Expression]) -> Expression:
 
 
 def exponential(group: Group, p: Sequence[Expression]) -> Flat:
-    """The entries of exp(P) − 1, by as many terms as are enough for `size_of` up to 1/4."""
+    """The entries of exp(P) − 1, by a series that is accurate for `size_of` up to 1/4."""
     powers, (first, *recurrence) = _powers(group, p), [*_symmetric(group, p)]
     assert first is ONE
     rows = len(powers) + 1
@@ -66,10 +66,10 @@ def cayley(group: Group, p: Sequence[Expression]) -> Flat:
 def _powers(group: Group, p: Sequence[Expression]) -> list[Flat]:
     """P, …, P^{N−1}."""
     rows = group.rows
-    found = [group.generator(p)]
-    while len(found) < rows - 1:
-        found.append(multiplied(found[-1], found[0]))
-    return found
+    powers = [group.generator(p)]
+    while len(powers) < rows - 1:
+        powers.append(multiplied(powers[-1], powers[0]))
+    return powers
 
 
 def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
@@ -77,14 +77,14 @@ def _symmetric(group: Group, p: Sequence[Expression]) -> Iterator[Expression]:
     powers = _powers(group, p)
     rows = len(powers) + 1
     traces = [ZERO, *(_trace(m, rows) for m in powers), _trace_of_product(powers[-1], powers[0], rows)]
-    found = [ONE]
+    symmetric = [ONE]
     for k in range(1, rows + 1):
         if group.orthogonal and k % 2:
-            found.append(ZERO)
+            symmetric.append(ZERO)
             continue
-        signed = [(found[k - i] * traces[i], i) for i in range(1, k + 1) if not (group.orthogonal and i % 2)]
-        found.append(total(a if i % 2 else -ONE * a for a, i in signed) / k)
-    yield from found
+        signed = [(symmetric[k - i] * traces[i], i) for i in range(1, k + 1) if not (group.orthogonal and i % 2)]
+        symmetric.append(total(a if i % 2 else -ONE * a for a, i in signed) / k)
+    yield from symmetric
 
 
 def _trace(matrix: Flat, rows: int) -> Expression:
@@ -115,12 +115,12 @@ def flow_exponential(group: Group, p: Sequence[Expression], positive: Sequence[s
     basis = [(pi, m) for pi, m in zip(p, group.matrices, strict=True) if not pi.is_zero]
     ratios = [_ratio(m) for _, m in basis]
     if all(r is not None for r in ratios) and all(_commute(a, b) for (_, a), (_, b) in combinations(basis, 2)):
-        made = [_of_constant(pi, m, r) for (pi, m), r in zip(basis, ratios, strict=True) if r is not None]
+        exponentials = [_of_constant(pi, m, r) for (pi, m), r in zip(basis, ratios, strict=True) if r is not None]
     else:
         whole = _of_plane(group.generator(p), positive)
-        made = [] if whole is None else [whole]
+        exponentials = [] if whole is None else [whole]
     result: Flat | None = None
-    for e in made:
+    for e in exponentials:
         result = e if result is None else product_less_1(result, e)
     return result
 

@@ -4,13 +4,14 @@ A part is written as c C + Q + R with a Casimir C, Q = ½c′|m|² for the angul
 gradients of Q and of R are constant along the flows of both. Then the flow of the part is, in the group,
 exp(t∇Q) exp(t∇R) and what C turns: x does not feel that, and over a step all its times add up to h, so it is put back
 once for all. Where that would be no uniform motion, with forces, a monitor, the time in H, and for noise, C has an
-element in each flow, as Q and R have.
+element in each flow, as Q and R have. A flow that is composed of commuting ones has the product of their elements.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, permutations
 
 from phigen.attitude.elements import dot, product, rotated, rotation_by
 from phigen.attitude.group import Group, refused
@@ -35,30 +36,35 @@ from phigen.symbolic.expression import (
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.verdict import PROVED, Statement, decide_zero
 
+#: Most commuting flows of one part whose orders are all tried.
+MOST_PIECES = 4
+
 
 @dataclass(frozen=True)
 class Turning:
-    """A part as ``casimir`` + ``round`` + ``rest``; the first two may be 0. ``put_back`` says whether the first is."""
+    """A part as ``casimir`` + the sum of ``terms``, whose flows are made in turn.
+
+    ``put_back`` says whether what the Casimir turns is put back once a step.
+    """
 
     casimir: Expression
-    round: Expression
-    rest: Expression
+    terms: tuple[Expression, ...]
     put_back: bool = True
 
     @property
     def factors(self) -> list[Expression]:
-        """What has an element of its own."""
-        own = (self.round, self.rest) if self.put_back else (self.casimir, self.round, self.rest)
-        return [e for e in own if not e.is_zero]
+        """The summands that have a group element of their own."""
+        turning = self.terms if self.put_back else (self.casimir, *self.terms)
+        return [e for e in turning if not e.is_zero]
 
     @property
     def left(self) -> Expression:
-        """What has none."""
+        """The summands that have none."""
         return self.casimir if self.put_back else ZERO
 
 
 def by_angles(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> tuple[Flow, ...]:
-    """The same flows by the functions that their elements need in any case: those of half the angles."""
+    """The flows written with functions of half the angles, which their group elements need in any case."""
     turned = turnings(system, group, flows, put_back=put_back)
     return tuple(_by_angles(system, group, flow, turning) for flow, turning in zip(flows, turned, strict=True))
 
@@ -98,31 +104,37 @@ def _of_square(function: str, square: Expression) -> Expression:
 
 def turnings(system: System, group: Group, flows: Sequence[Flow], *, put_back: bool) -> list[Turning]:
     """Each part in this form. Raises `SpecError` that names the first that has none."""
-    return [turning_of(system, group, f.hamiltonian, f"H_{k}", put_back=put_back) for k, f in enumerate(flows, 1)]
+    return [
+        turning_of(system, group, f.hamiltonian, f"H_{k}", [p.hamiltonian for p in f.pieces], put_back=put_back)
+        for k, f in enumerate(flows, 1)
+    ]
 
 
-def turning_of(system: System, group: Group, h: Expression, name: str, *, put_back: bool) -> Turning:
-    """A function in this form. Raises `SpecError` that names it if there is none."""
-    for candidate in _candidates(system, group, h):
+def turning_of(
+    system: System, group: Group, h: Expression, name: str, pieces: Sequence[Expression] = (), *, put_back: bool
+) -> Turning:
+    """A function in this form; ``pieces`` are commuting summands. Raises `SpecError` that names it if there is none."""
+    orders = permutations(pieces) if len(pieces) <= MOST_PIECES else iter([tuple(pieces)])
+    for candidate in chain(_candidates(system, group, h), (Turning(ZERO, order) for order in orders if order)):
         if constancy(system, candidate, "").verdict == PROVED:
             return replace(candidate, put_back=put_back)
     raise refused(
         system,
-        f"reconstruct: the part {name} = {shortened(h)} of the splitting turns about an axis that moves "
-        "along its own flow, and phigen does not know by what element",
+        f"reconstruct: the part {name} = {shortened(h)} of the splitting rotates about an axis that changes "
+        "along its own flow, and phigen knows no group element for that",
         "scheme: series takes every H",
     )
 
 
 def _candidates(system: System, group: Group, h: Expression) -> Iterator[Turning]:
-    yield Turning(ZERO, ZERO, h)
+    yield Turning(ZERO, (h,))
     if not group.matrices and group.vectors:
         m = [symbol(system.coordinates[i]) for i in group.rotation]
         for c in _curvatures(system, h, dot(m, m) / 2):
-            yield Turning(ZERO, c * (dot(m, m) / 2), h - c * (dot(m, m) / 2))
+            yield Turning(ZERO, (c * (dot(m, m) / 2), h - c * (dot(m, m) / 2)))
     for casimir in system.casimirs.values():
         for c in _curvatures(system, h, casimir):
-            yield Turning(c * casimir, ZERO, h - c * casimir)
+            yield Turning(c * casimir, (h - c * casimir,))
 
 
 def _curvatures(system: System, h: Expression, q: Expression) -> Iterator[Expression]:
@@ -155,26 +167,26 @@ def factor_elements(
 
     `SpecError` for matrices whose exponential has no closed form.
     """
-    t, found = t or symbol(TIME), []
+    t, elements = t or symbol(TIME), []
     for factor in turning.factors:
         p = [t * slope for slope in gradient(factor, system.coordinates)]
         if group.matrices:
-            made = flow_exponential(group, p, system.positive)
-            if made is None:
+            exponential = flow_exponential(group, p, system.positive)
+            if exponential is None:
                 what = f"reconstruct: exp(t∇H) has no closed form that phigen knows for the part {shortened(factor)}"
                 raise refused(system, what, "scheme: series takes every H")
-            found.append(made)
+            elements.append(exponential)
         else:
             r, shift = [p[i] for i in group.rotation], [p[i] for i in group.translation]
             trivial = all(e.is_zero for e in r)
-            found.append([ZERO] * 4 + shift if trivial else list(rotation_by(r, shift)))
-    return found
+            elements.append([ZERO] * 4 + shift if trivial else list(rotation_by(r, shift)))
+    return elements
 
 
 def joined(group: Group, elements: Sequence[Sequence[Expression]]) -> list[Expression]:
     """The element of the factors, one after the other, less 1 as they are."""
-    made, *others = elements
-    result = list(made)
+    leading, *others = elements
+    result = list(leading)
     for later in others:
         first, second = (later, result) if group.spatial else (result, later)
         if group.matrices:

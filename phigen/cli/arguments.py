@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
@@ -24,7 +24,7 @@ ORDER = click.IntRange(1, limits.ORDER)
 #: The type of ``--modified``.
 CORRECTIONS = click.IntRange(0, limits.CORRECTIONS)
 
-order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method, instead of the spec's.")
+order_option = click.option("--order", metavar="K", type=ORDER, help="Order of the method; overrides the spec.")
 
 #: Which random numbers a run with noise takes.
 SEED = click.IntRange(0, limits.SEED)
@@ -35,30 +35,33 @@ target_option = click.option(
 )
 
 settings_option = click.option(
-    "--set", "settings", metavar="NAME=VALUE", multiple=True, help="A parameter, or an initial coordinate."
+    "--set", "settings", metavar="NAME=VALUE", multiple=True, help="Value of a parameter or of an initial coordinate."
 )
 
 #: How the one-step map is made, instead of the spec's way.
-scheme_option = click.option(
-    "--scheme", type=click.Choice(SCHEMES), help="How steps are made, instead of the spec's scheme."
-)
+scheme_option = click.option("--scheme", type=click.Choice(SCHEMES), help="Scheme of the steps; overrides the spec.")
 
 #: The profile of code that phigen runs itself; ``profile:`` of a spec is about code that ``phigen build`` writes.
 profile_option = click.option(
     "--profile",
     type=click.Choice(PROFILES),
-    help="How much the C does for speed.  [default: fast]",
+    help="Optimisation of the C for speed or for size.  [default: fast]",
 )
 
 #: Which run of a spec; the argument SPEC stands before it.
 run_option = click.option(
-    "--run", "name", metavar="NAME", shell_complete=runs, help="Which run of the spec.  [default: the first]"
+    "--run", "name", metavar="NAME", shell_complete=runs, help="The run of the spec to use.  [default: the first]"
 )
 
 one_spec = click.argument("spec_file", metavar="SPEC", type=click.Path(), shell_complete=specs)
 many_specs = click.argument(
     "spec_files", metavar="SPEC...", nargs=-1, required=True, type=click.Path(), shell_complete=specs
 )
+
+
+def _one_of(words: Sequence[str]) -> str:
+    """The words as in "a, b or c"."""
+    return " or ".join([", ".join(words[:-1]), words[-1]]) if len(words) > 1 else words[0]
 
 
 def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str | None], Path | None]:
@@ -68,7 +71,7 @@ def file_ending(*suffixes: str) -> Callable[[click.Context, click.Parameter, str
         if value is None:
             return None
         if Path(value).suffix.lower() not in suffixes:
-            raise click.BadParameter(f"{value!r} must end in {' or '.join(suffixes)}")
+            raise click.BadParameter(f"{value!r} must end in {_one_of(suffixes)}")
         expect_writable(Path(value))
         return Path(value)
 

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING
 import click
 
 from phigen.cli.arguments import many_specs
+from phigen.cli.bindings import LANGUAGES, with_bindings
 from phigen.cli.console import Console, counted, indented, mend, out, pass_console, verbosity
 from phigen.cli.failures import Collector
+from phigen.cli.fmu import PLATFORMS, units_of, write_unit
 from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
 from phigen.cli.sources import found, load_all
 from phigen.errors import CheckError
@@ -30,10 +32,27 @@ STRICT = ("-Wall", "-Wextra", "-Werror")
 
 @click.command("build")
 @many_specs
-@click.option("-o", "--output", metavar="DIR", default=DIRECTORY, show_default=True, help="Files go to DIR/NAME/.")
+@click.option("-o", "--output", metavar="DIR", default=DIRECTORY, show_default=True, help="Write files to DIR/NAME/.")
 @output_options
-@click.option("--compile", "compiling", is_flag=True, help="Compile the C as well, to DIR/NAME/libNAME.so.")
-@click.option("--certify", is_flag=True, help="Verify the solvers as well, and write DIR/NAME/NAME.certificate.json.")
+@click.option("--compile", "compiling", is_flag=True, help="Also compile the C, to DIR/NAME/libNAME.so.")
+@click.option(
+    "--fmu", is_flag=True, help="Also write DIR/NAME/NAME.fmu (FMI 3.0) and NAME-fmi2.fmu, for co-simulation."
+)
+@click.option(
+    "--platform",
+    "platforms",
+    multiple=True,
+    type=click.Choice(list(PLATFORMS)),
+    help="With --fmu: a binary for this machine instead of for all; may be repeated.",
+)
+@click.option(
+    "--binding",
+    "bindings",
+    multiple=True,
+    type=click.Choice(LANGUAGES),
+    help="Also write a module that calls the C from another language; may be repeated.",
+)
+@click.option("--certify", is_flag=True, help="Also verify the solvers, and write DIR/NAME/NAME.certificate.json.")
 @click.option(
     "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what would be written."
 )
@@ -56,6 +75,9 @@ def command(
     modified: int | None,
     real: str | None,
     compiling: bool,
+    fmu: bool,
+    platforms: tuple[str, ...],
+    bindings: tuple[str, ...],
     certify: bool,
     checking: bool,
     diff: bool,
@@ -63,12 +85,15 @@ def command(
 ) -> None:
     """Write the solvers of specs: DIR/NAME/NAME.h, NAME.c, NAME.py and NAME.mjs.
 
-    SPEC is a file, a folder that is searched for *.yaml, or the name of a bundled spec. What the spec claims is
-    proved first; nothing is written if there is an error in any spec. Files that were edited by hand are not
-    overwritten.
+    SPEC is a file, a folder that is searched for *.yaml, or the name of a bundled spec. The statements of the spec
+    are proved first; nothing is written if any spec has an error. Files that were edited by hand are not overwritten.
     """
-    if (checking or diff) and (compiling or certify):
-        raise click.UsageError("--compile and --certify write files; --check and --diff write nothing")
+    if (checking or diff) and (compiling or certify or fmu or bindings):
+        writing = "--compile, --fmu, --binding and --certify write files"
+        message = f"{writing}, --check and --diff do not: leave out one or the other"
+        raise click.UsageError(message)
+    if platforms and not fmu:
+        raise click.UsageError("--platform needs --fmu")
     options = Options(
         Path(output),
         tuple(dict.fromkeys(targets)),
@@ -83,7 +108,9 @@ def command(
         real,
     )
     compilations = _compile_all(console, spec_files, options)
+    units = units_of(compilations, options) if fmu else {}
     planned = _plan(console, compilations, options)
+    planned = with_bindings(planned, options, bindings) if bindings else planned
     if checking or diff:
         lone = _orphans(spec_files, compilations, options)
         _compare([*(c for _, changes in planned for c in changes), *lone], options.command(spec_files), diff)
@@ -91,6 +118,8 @@ def command(
         console.note(f"{counted(len(planned), 'system')} up to date in {options.directory}")
         return
     _write(console, planned, options, force, compiling)
+    for name, unit in units.items():
+        write_unit(console, options.directory / name, unit, platforms)
     if certify:
         _certify(console, compilations, options)
 
@@ -155,7 +184,7 @@ def _complaint(change: Change) -> str:
         return change.obstacle.removeprefix(f"{change.path} ")
     return {
         "missing": "missing",
-        "different": "differs from what its spec gives",
+        "different": "differs from what phigen generates from its spec",
         "stale": "no spec produces it any more",
     }[change.state]
 
@@ -215,12 +244,12 @@ def _expect_certificates(planned: Sequence[tuple[Compilation, list[Change]]], op
     """Raise CheckError for a certificate that is there and about other files; there need not be one."""
     from phigen.cli import certificate
 
-    found = []
+    complaints = []
     for compilation, _ in planned:
         path = certificate.path_of(options.directory / compilation.spec.name, compilation.spec.name)
-        found.append(certificate.obsolete(path, compilation, files_of(compilation, options)))
-    if any(found):
-        lines = ["certificates out of date", *indented([f for f in found if f])]
+        complaints.append(certificate.obsolete(path, compilation, files_of(compilation, options)))
+    if any(complaints):
+        lines = ["certificates out of date", *indented([f for f in complaints if f])]
         raise CheckError("\n".join([*lines, "  hint: build with --certify, or remove them"]))
 
 
@@ -234,22 +263,22 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
     console.note(f"{folder}: {'; '.join(said) or 'unchanged'} ({method})")
     library = folder / _library(compilation.spec.name)
     if written and library.exists():
-        console.note(f"{library} is older than its sources; --compile makes it anew")
+        console.note(f"{library} is older than its sources; --compile builds it again")
 
 
 def _compile_library(console: Console, folder: Path, name: str) -> None:
     from phigen.runtime import toolchain
     from phigen.writing import write
 
-    found, start = toolchain.find(), time.perf_counter()
-    compiler = replace(found, tuning=found.tuning + STRICT)
+    installed, start = toolchain.find(), time.perf_counter()
+    compiler = replace(installed, tuning=installed.tuning + STRICT)
     library = folder / _library(name)
     with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:
         fresh = Path(scratch) / library.name
         toolchain.compile_library([folder / f"{name}.c"], fresh, compiler)
         write(library, fresh.read_bytes())
         library.chmod(fresh.stat().st_mode)
-    console.note(f"compiled {library} with {found.command[0]} in {time.perf_counter() - start:.2f} s")
+    console.note(f"compiled {library} with {installed.command[0]} in {time.perf_counter() - start:.2f} s")
 
 
 def _library(name: str) -> str:

@@ -29,12 +29,14 @@ def _text(system: str, solvers: Mapping[str, Collection[str]]) -> str:
     from phigen.targets.rendering import render
 
     file, suffix = FILES[system]
-    found = [(name, sorted(f for f in files if f.endswith(suffix))) for name, files in sorted(solvers.items())]
-    found = [(name, sources) for name, sources in found if sources]
-    names = [name for name, _ in found]
+    sources_of_solvers = [
+        (name, sorted(f for f in files if f.endswith(suffix))) for name, files in sorted(solvers.items())
+    ]
+    sources_of_solvers = [(name, sources) for name, sources in sources_of_solvers if sources]
+    names = [name for name, _ in sources_of_solvers]
     values = {
-        "solvers": [(name, " ".join(sources)) for name, sources in found],
-        "quoted_solvers": [(name, _quoted(sources)) for name, sources in found],
+        "solvers": [(name, " ".join(sources)) for name, sources in sources_of_solvers],
+        "quoted_solvers": [(name, _quoted(sources)) for name, sources in sources_of_solvers],
         "names": names,
         "listed": ", ".join(names),
         "quoted": _quoted(names),

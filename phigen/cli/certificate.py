@@ -21,7 +21,7 @@ def path_of(folder: Path, name: str) -> Path:
 
 
 def identity(compilation: Compilation, files: Mapping[str, str]) -> dict[str, Any]:
-    """What a certificate is about: the version, the spec, and the checksum of the body of each file."""
+    """Identity that a certificate states: the version, the spec, and the checksum of the body of each file."""
     return {
         "phigen": __version__,
         "name": compilation.spec.name,
@@ -46,7 +46,7 @@ def obsolete(path: Path, compilation: Compilation, files: Mapping[str, str]) -> 
         return ""
     except (OSError, ValueError):
         return f"{path} cannot be read"
-    wanted = identity(compilation, files)
-    if not isinstance(data, dict) or any(data.get(key) != value for key, value in wanted.items()):
+    expected = identity(compilation, files)
+    if not isinstance(data, dict) or any(data.get(key) != value for key, value in expected.items()):
         return f"{path} certifies other files"
     return ""

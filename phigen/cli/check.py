@@ -32,7 +32,7 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
     "--terms",
     metavar="K",
     type=ORDER,
-    help="With --independent: derive S_1 … S_K, whatever the method has.",
+    help="With --independent: derive S_1 … S_K instead of those of the method.",
 )
 @click.option(
     "--seconds",
@@ -40,7 +40,7 @@ _COLOURS = {"proved": "green", "refuted": "red", "checked numerically": "yellow"
     type=click.FloatRange(0, min_open=True),
     help="With --independent: time limit for each spec.  [default: 60]",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object for each spec.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, one object for each spec.")
 @verbosity
 @pass_console
 def command(
@@ -55,11 +55,11 @@ def command(
 ) -> None:
     """Prove the mathematics of specs, or refute it.
 
-    π is skew and satisfies the Jacobi identity; Casimirs and invariants are what they claim to be; α and β satisfy
-    the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; each flow of a splitting solves its
-    own equation. Each statement is proved in exact arithmetic, refuted with a residual, or checked at points. Exit
-    code 5 if anything is refuted. With -q only statements that do not hold are printed; with -v all triples that
-    fail the Jacobi identity.
+    The statements: π is skew and satisfies the Jacobi identity; Casimirs and invariants are conserved; α and β
+    satisfy the axioms of a bi-realisation; S_1 … S_k solve the Hamilton–Jacobi equation; each flow of a splitting
+    solves its equation. Each statement is proved in exact arithmetic, refuted with a residual, or checked at points.
+    Exit code 5 if any statement is refuted. With -q only statements that do not hold are printed; with -v all triples
+    that fail the Jacobi identity.
 
     With --independent sympy derives the S_i a second time, by another method, and checks α and β. Results are printed
     term by term. Exit code 3 if the time limit is reached.
@@ -68,22 +68,22 @@ def command(
 
     if not independent and (terms or seconds):
         raise click.UsageError("--terms and --seconds have a meaning only with --independent")
-    collector, found = Collector(), list[dict[str, object]]()
+    collector, descriptions = Collector(), list[dict[str, object]]()
     for spec in load_all(spec_files, collector):
         with collector.collecting():
             examination = examine(spec, order=order, scheme=scheme)
             described = _described(examination)
             if not as_json:
-                if found and not console.quiet:
+                if descriptions and not console.quiet:
                     out("")
                 _print(examination, console)
             _collect(examination, collector, console)
             if independent:
                 compared = _compared(examination, terms, seconds, console, collector, shown=not as_json)
                 described["independent"] = [_described_comparison(c) for c in compared]
-            found.append(described)
+            descriptions.append(described)
     if as_json:
-        out_json(found)
+        out_json(descriptions)
     collector.finish()
 
 
@@ -96,36 +96,36 @@ def _compared(
     *,
     shown: bool,
 ) -> list[Comparison]:
-    """What the second derivation says, shown line by line as it comes."""
+    """Compare with the second derivation; each comparison is shown as soon as it is known."""
     from phigen.proofs.independent import SECONDS, compare
     from phigen.symbolic.verdict import REFUTED
 
-    compilation, found = examination.compilation, []
+    compilation, comparisons = examination.compilation, []
     if compilation is None:
         return []
     if compilation.realisation is None:
-        console.warn(f"{examination.spec.file}: {compilation.label} has no S_i to be derived a second time")
+        console.warn(f"{examination.spec.file}: {compilation.label} has no S_i to derive a second time")
         return []
     if shown:
         out("  Second derivation, by sympy alone")
     with collector.collecting():
         for comparison in compare(compilation, terms, seconds or SECONDS):
-            found.append(comparison)
+            comparisons.append(comparison)
             if shown:
                 out("\n".join(_lines(comparison.timed)))
-    refuted = [c.statement.name for c in found if c.statement.verdict == REFUTED]
+    refuted = [c.statement.name for c in comparisons if c.statement.verdict == REFUTED]
     if refuted:
         message = f"{examination.spec.file}: refuted by the second derivation: {', '.join(refuted)}"
         collector.errors.append(CheckError(message))
-    return found
+    return comparisons
 
 
 def _collect(examination: Examination, collector: Collector, console: Console) -> None:
     from phigen.proofs.examination import hint_of
 
     counts = Counter(s.verdict for s in examination.statements)
-    told = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
-    console.note(f"{examination.spec.file}: {told or 'nothing was proved'}")
+    summary = ", ".join(f"{n} {verdict}" for verdict, n in counts.items())
+    console.note(f"{examination.spec.file}: {summary or 'nothing was proved'}")
     for note in examination.compilation.notes if examination.compilation else ():
         console.note(f"{examination.spec.file}: {note}")
     mistakes = [s.name for _, s in examination.mistakes]
@@ -140,7 +140,7 @@ def _collect(examination: Examination, collector: Collector, console: Console) -
 
 
 def _expect_targets(spec: Spec, compilation: Compilation, collector: Collector) -> None:
-    """What the targets that the spec asks for refuse."""
+    """Collect the refusals of the targets that the spec names."""
     from phigen import registry
 
     for name in spec.targets:
@@ -169,7 +169,7 @@ def _print(examination: Examination, console: Console) -> None:
             for part, residual in statement.failing if console.verbose else ():
                 out(f"    {'':<19}  {part}: {residual}")
     if examination.unexamined:
-        out(f"  Not examined, since they rest on it: {examination.unexamined}")
+        out(f"  Not examined, because they depend on it: {examination.unexamined}")
 
 
 def _lines(statement: Statement) -> list[str]:

@@ -25,14 +25,16 @@ if TYPE_CHECKING:
 @click.option("--orders", metavar="N,…", default="2,4", show_default=True, help="Orders of the methods.")
 @click.option(
     "--equal", type=click.Choice(["step", "work"]), default="step", show_default=True,
-    help="All take the step of the run, or the step that costs what that step costs with the setting of the spec.",
+    help="Compare at the step of the run, or at the CPU time of the spec's setting with that step.",
 )  # fmt: skip
-@click.option("--horizon", type=float, metavar="T", help="How long the run is.  [default: as in the spec]")
+@click.option("--horizon", type=float, metavar="T", help="Length of the run in time.  [default: as in the spec]")
 @settings_option
-@click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to build.")
+@click.option(
+    "--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="Time limit for building solvers."
+)
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw errors against cost: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="For machines: everything that was measured.")
+@click.option("--json", "as_json", is_flag=True, help="Print all measurements as JSON.")
 @verbosity
 @pass_console
 def command(
@@ -47,10 +49,10 @@ def command(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Set bi-realisations, schemes and classical methods side by side on a run of a spec.
+    """Compare bi-realisations, schemes and classical methods on a run of a spec.
 
-    For each: steps, CPU time, the errors of energy and Casimirs, the distance from the solution, and the Poisson
-    defect, the largest entry of DΦ π DΦᵀ − π∘Φ with the exact derivative DΦ of a step. Methods that do not apply to
+    The table lists steps, CPU time, the errors of energy and Casimirs, the distance from the solution, and the Poisson
+    defect: the largest entry of DΦ π DΦᵀ − π∘Φ with the exact derivative DΦ of a step. Methods that do not apply to
     the system are left out.
     """
     from phigen.compiler import compile_proved
@@ -96,20 +98,23 @@ def _expect_comparable(spec: Spec) -> None:
             raise SpecError([spec.diagnostic(place, message, "phigen verify and phigen run measure one setting")])
 
 
-def _print(found: Comparison, spec: Spec, run: Run) -> None:
+def _print(comparison: Comparison, spec: Spec, run: Run) -> None:
     from phigen.tuning.building import LATE
 
-    said = "the same step" if found.equal == "step" else "the same CPU time"
-    out(heading(f"{spec.name}, run {run.name}") + f": {said}, up to {found.clock} = {found.horizon:.9g}\n")
+    said = "the same step" if comparison.equal == "step" else "the same CPU time"
+    out(heading(f"{spec.name}, run {run.name}") + f": {said}, up to {comparison.clock} = {comparison.horizon:.9g}\n")
     rows = [["", "steps", "ns/step", "run, ms", "energy error", "Casimir error", "orbit error", "Poisson defect"]]
-    rows += [_row(entry) for entry in found.entries if not entry.refusal]
+    rows += [_row(entry) for entry in comparison.entries if not entry.refusal]
     for line in table(rows, right=range(1, 8)):
         out(f"  {line}")
-    out(f"\n  * the setting of the spec. Energy errors are {found.unit}; the orbit error is relative to the largest")
+    out(
+        f"\n  * the setting of the spec. Energy errors are {comparison.unit}; "
+        "the orbit error is relative to the largest"
+    )
     out(
         "  coordinate, where DOP853 with small steps knows the orbit. The Poisson defect is relative to |DΦ| |π| |DΦ|ᵀ."
     )
-    refused = [entry for entry in found.entries if entry.refusal]
+    refused = [entry for entry in comparison.entries if entry.refusal]
     for reason in dict.fromkeys(entry.refusal for entry in refused):
         titles = "; ".join(entry.title for entry in refused if entry.refusal == reason)
         more = "; a larger --budget builds them" * (reason == LATE)
@@ -123,12 +128,18 @@ def _row(entry: Entry) -> list[str]:
     return [title, str(entry.steps), f"{entry.nanoseconds:.3g}", f"{1e3 * entry.seconds:.3g}", *numbers]
 
 
-def _described(found: Comparison, spec: Spec, run: Run) -> dict[str, object]:
+def _described(comparison: Comparison, spec: Spec, run: Run) -> dict[str, object]:
     from dataclasses import asdict
 
     from phigen.cli.run_summary import finite
 
-    entries = [{**asdict(entry), "seconds": entry.seconds} for entry in found.entries]
-    about = {"name": spec.name, "run": run.name, "equal": found.equal, "horizon": found.horizon, "unit": found.unit}
+    entries = [{**asdict(entry), "seconds": entry.seconds} for entry in comparison.entries]
+    about = {
+        "name": spec.name,
+        "run": run.name,
+        "equal": comparison.equal,
+        "horizon": comparison.horizon,
+        "unit": comparison.unit,
+    }
     described: dict[str, object] = finite({**about, "methods": entries})
     return described

@@ -1,4 +1,4 @@
-"""What the shell offers for names: bundled specs, and the runs of the spec that was given."""
+"""Completion of names in the shell: bundled specs, and the runs of the spec on the command line."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def bundled_names(ctx: click.Context, parameter: click.Parameter, begun: str) ->
 
 def runs(ctx: click.Context, parameter: click.Parameter, begun: str) -> list[str]:
     """The runs of the specs given so far; none of a spec with errors, which a shell has no place for."""
-    found: list[str] = []
+    run_names: list[str] = []
     # click stops at an option without value, before it has told which parameter the other words belong to.
-    for given in ctx.args:
+    for source in ctx.args:
         try:
-            found += load_one(given).runs
+            run_names += load_one(source).runs
         except PhigenError:
             continue
-    return [name for name in dict.fromkeys(found) if name.startswith(begun)]
+    return [name for name in dict.fromkeys(run_names) if name.startswith(begun)]

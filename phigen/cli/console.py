@@ -45,12 +45,12 @@ class Console:
             self._say(_coloured(f"warning: {message}"))
 
     def note(self, message: str) -> None:
-        """What is being done."""
+        """Report progress, unless the console is quiet."""
         if not self.quiet:
             self._say(message)
 
     def detail(self, message: str) -> None:
-        """What only -v asks for."""
+        """Report a detail that is shown with -v only."""
         if self.verbose:
             self._say(message)
 
@@ -106,8 +106,8 @@ def verbosity(command: F) -> F:
         return callback
 
     for short, name, text in (
-        ("-v", "verbose", "Print more: the stages and their seconds, tracebacks of internal errors."),
-        ("-q", "quiet", "Print data and errors only."),
+        ("-v", "verbose", "Print more: the stages with their seconds; tracebacks of internal errors."),
+        ("-q", "quiet", "Print results and errors only."),
     ):
         command = click.option(short, f"--{name}", is_flag=True, expose_value=False, callback=store(name), help=text)(
             command

@@ -31,9 +31,9 @@ _ROWS_AT = (0.1, 0.2, 0.24, 0.25, 0.254, 0.255)
 @verbosity
 @pass_console
 def command(console: Console, target: str) -> None:
-    """Compile the paper's Lotka–Volterra system, run it up to just before its singularity, compare.
+    """Compile the paper's Lotka–Volterra system, run it up to just before its singularity, and compare.
 
-    The system has a closed form that leaves to infinity in finite time. The table shows the errors of phigen's
+    The solution has a closed form and becomes infinite in finite time. The table shows the errors of phigen's
     solvers and of RK2, with the same step, against the closed form, and the error of the Casimir.
     """
     import numpy as np

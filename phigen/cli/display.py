@@ -17,7 +17,7 @@ PATIENCE, PERIOD = 1.0, 0.2
 
 
 class Display:
-    """What shows the stages: ``shows`` says whether the line is wanted, ``began`` is called when a stage begins."""
+    """Status line of the stages: ``shows`` tells whether to draw it, ``began`` is called when a stage begins."""
 
     def __init__(self, shows: Callable[[], bool], began: Callable[[str], None]) -> None:
         self._shows, self._began = shows, began

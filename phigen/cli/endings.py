@@ -30,7 +30,7 @@ def ended(experiment: Experiment, solver: Solver, console: Console) -> Experimen
         span = float(run.until) - experiment.begin
         if span * h <= 0:
             message = f"the end, {float(run.until)!r}, is never reached from {experiment.begin!r} by steps of {h!r}"
-            raise click.UsageError(f"{message}: --until T gives another")
+            raise click.UsageError(f"{message}; --until T sets another end")
         end = at_time(begun(solver, experiment), h, span)
     if run.stop is not None:
         end = _stopped(experiment, solver, console, end) or end
@@ -46,21 +46,21 @@ def _stopped(experiment: Experiment, solver: Solver, console: Console, end: End 
     assert run.stop is not None
     g = function_of(run.stop, names.coordinates, experiment.parameters, names.time)
     most = end.steps + 1 if end else run.steps
-    found = where_zero(begun(solver, experiment), h, most, g, experiment.begin, timed=bool(names.time))
-    if found is None:
+    zero = where_zero(begun(solver, experiment), h, most, g, experiment.begin, timed=bool(names.time))
+    if zero is None:
         console.note("stop: is not met")
         return None
-    if end is None or found.steps < end.steps:
-        return found
+    if end is None or zero.steps < end.steps:
+        return zero
     try:
         last = _count(experiment, solver, end)
     except BackendError:  # the part of a step fails that the run would make without a stop before it
-        return found
-    return found if _count(experiment, solver, found) < last else None
+        return zero
+    return zero if _count(experiment, solver, zero) < last else None
 
 
 def _count(experiment: Experiment, solver: Solver, end: End) -> float:
-    """How many steps there are up to an end, with the part of one. Raises `BackendError`."""
+    """Count the steps up to an end, including the fraction of the last. Raises `BackendError`."""
     if not end.part:
         return float(end.steps)
     session = begun(solver, experiment)
@@ -69,7 +69,7 @@ def _count(experiment: Experiment, solver: Solver, end: End) -> float:
 
 
 def length(experiment: Experiment, solver: Solver) -> float:
-    """How long a run with its end is in what its steps are equal in: in τ, or in t. Raises `StepError`."""
+    """Length of a run up to its end, in the variable of equal steps, τ or t. Raises `StepError`."""
     if experiment.end is None:
         return abs(experiment.h) * experiment.run.steps
     try:
@@ -112,19 +112,19 @@ def _regular(experiment: Experiment, solver: Solver, every: float) -> list[float
         raise click.BadParameter("the time between states must be positive", param_hint="--every")
     count = abs(end - experiment.t0) / every * (1 + 1e-12)
     if count > _MOST_TIMES:
-        raise click.UsageError(f"states at times {every!r} apart would be {count:.3g}: --every DT takes fewer")
+        raise click.UsageError(f"--every {every!r} would store {count:.3g} states, the limit is {_MOST_TIMES:.3g}")
     times = [experiment.t0 + sign * every * k for k in range(1, int(count) + 1)]
     _expect_whole(experiment, solver, times, "--every")
     return [t for t in times if (t - begin) * sign > 0]
 
 
 def _expect_whole(experiment: Experiment, solver: Solver, times: Sequence[float], option: str) -> None:
-    """That a path of the noise is known at these times: at the ends of its steps, and nowhere between."""
+    """Check that all times are ends of steps: the path of the noise is known nowhere else."""
     for time in times if solver.interface.noise else ():
         steps = (time - experiment.begin) / experiment.h
         if abs(steps - round(steps)) > 1e-9 * max(1.0, abs(steps)):
-            message = f"with noise states are known after whole steps of {abs(experiment.h)!r}, and {time!r} is not"
-            raise click.BadParameter(f"{message} at the end of one", param_hint=option)
+            message = f"with noise, states are known only after whole steps of {abs(experiment.h)!r}; the time"
+            raise click.BadParameter(f"{message} {time!r} is between two", param_hint=option)
 
 
 def _listed(at: str) -> list[float]:
@@ -132,7 +132,7 @@ def _listed(at: str) -> list[float]:
     try:
         times = [float(word) for word in text.replace(",", " ").split()]
     except ValueError as error:
-        raise click.BadParameter(f"times are numbers, or a file of them: {error}", param_hint="--at") from None
+        raise click.BadParameter(f"expected times or a file of times: {error}", param_hint="--at") from None
     if not times or not all(map(math.isfinite, times)):
-        raise click.BadParameter("times are finite numbers, at least one", param_hint="--at")
+        raise click.BadParameter("expected at least one time, and finite numbers only", param_hint="--at")
     return times

@@ -31,7 +31,7 @@ def energy_warning(spec: Spec, error: float, unit: Unit, h: float, order: int) -
     """The warning about an energy error, with a smaller step to try; empty if the error is not large."""
     if not math.isfinite(error):
         said = "H is not a finite number on all of this run: do not trust these states"
-        return f"{said}\n  hint: the run begins where H is not defined, or gets there"
+        return f"{said}\n  hint: the run begins where H is not defined, or reaches such a point"
     if unit.kind not in _SCALES or not error > LARGE_ENERGY_ERROR:
         return ""
     said = f"the energy error reaches {_multiple(error)} {_SCALES[unit.kind]}: do not trust these states"

@@ -25,11 +25,16 @@ def expanded_text(spec: Spec, sizes: str) -> str:
     from phigen.spec.yaml_text import spec_text
 
     if spec.lattice is None:
-        message = f"{spec.name} is no lattice, and has nothing to expand"
+        message = f"{spec.name} is not a lattice, so there is nothing to expand"
         raise click.BadParameter(message, param_hint=OPTION)
     cell = cell_from_spec(spec)
     expansion = _expansion(spec, cell, sizes)
-    runs = {name: made for name, run in spec.runs.items() for made in [_run(spec, expansion, run)] if made}
+    runs = {
+        name: expanded_run
+        for name, run in spec.runs.items()
+        for expanded_run in [_run(spec, expansion, run)]
+        if expanded_run
+    }
     title = f"{spec.title or spec.name}, {' × '.join(map(str, expansion.sizes))}"
     return spec_text(replace(expansion.spec(), title=title, runs=runs, order=spec.order))
 
@@ -39,51 +44,51 @@ def lattice_text(spec: Spec) -> str:
     from phigen.lattice.recognition import LEAST, written_out
     from phigen.spec.yaml_text import spec_text
 
-    found = None if spec.lattice else written_out(spec, least=LEAST)
-    if found is None:
+    lattice_spec = None if spec.lattice else written_out(spec, least=LEAST)
+    if lattice_spec is None:
         message = f"{spec.name} is not recognised as a lattice"
         hint = f"names such as x1, x2, … or x_0_0, … of at least {LEAST} sites along each axis, all with the same terms"
         raise SpecError([spec.diagnostic(("coordinates",), message, hint)])
-    return spec_text(found)
+    return spec_text(lattice_spec)
 
 
-def typed_sizes(given: str) -> tuple[int, ...] | None:
+def typed_sizes(text: str) -> tuple[int, ...] | None:
     """Sizes as they are typed, ``3x3``; None for another text."""
-    found = re.fullmatch(r"[1-9][0-9]{0,9}(x[1-9][0-9]{0,9})*", given)
-    return tuple(map(int, given.split("x"))) if found else None
+    match = re.fullmatch(r"[1-9][0-9]{0,9}(x[1-9][0-9]{0,9})*", text)
+    return tuple(map(int, text.split("x"))) if match else None
 
 
-def too_small(cell: Cell, sizes: Sequence[int], given: str) -> str:
-    """What is said of sizes that the stencil does not fit in, nothing of others."""
+def too_small(cell: Cell, sizes: Sequence[int], text: str) -> str:
+    """Refusal of sizes that are too small for the stencil; empty if they are large enough."""
     from phigen.lattice.building import least_sizes
 
     least = least_sizes(cell)
     if all(size >= room for size, room in zip(sizes, least, strict=False)):
         return ""
-    return f"{given} is too small for the stencil; sizes are at least {'x'.join(map(str, least))}"
+    return f"{text} is too small for the stencil; sizes are at least {'x'.join(map(str, least))}"
 
 
-def _expansion(spec: Spec, cell: Cell, given: str) -> Expansion:
+def _expansion(spec: Spec, cell: Cell, choice: str) -> Expansion:
     from phigen.lattice.expansion import expand, ring
     from phigen.lattice.states import start_of
     from phigen.spec import limits
 
-    if given in spec.runs:
-        start = start_of(spec, spec.runs[given])
+    if choice in spec.runs:
+        start = start_of(spec, spec.runs[choice])
         sizes, bonds = start.sizes, [(int(a), int(b)) for a, b in start.bonds]
-    elif typed := typed_sizes(given):
+    elif typed := typed_sizes(choice):
         sizes = typed
         bonds = ring(sizes[0]) if cell.relation == "graph" else []
     else:
         runs = f", or the name of a run: {', '.join(spec.runs)}" if spec.runs else ""
-        raise click.BadParameter(f"{given!r} is not sizes such as 3x3{runs}", param_hint=OPTION)
+        raise click.BadParameter(f"{choice!r} is not sizes such as 3x3{runs}", param_hint=OPTION)
     count = len(cell.fields)
     for size in sizes:
         count *= size
     if count > limits.COORDINATES:
         message = f"{count} coordinates; an ordinary spec has at most {limits.COORDINATES}"
-        raise LimitError([Diagnostic(f"{spec.file}: {OPTION} {given}: {message}")])
-    if small := too_small(cell, sizes, given):
+        raise LimitError([Diagnostic(f"{spec.file}: {OPTION} {choice}: {message}")])
+    if small := too_small(cell, sizes, choice):
         raise SpecError([Diagnostic(f"{spec.file}: {small}")])
     try:
         return expand(cell, sizes, bonds)

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from phigen.cli.console import Console
-from phigen.errors import Diagnostic, SpecError
+from phigen.errors import Diagnostic, LimitError, SpecError
+from phigen.spec import limits
 
 if TYPE_CHECKING:
     from phigen.cli.past import Past
@@ -57,7 +58,7 @@ class Experiment:
 
     @property
     def made(self) -> int:
-        """How many steps of the noise the past has used up: a part of one counts as one."""
+        """Number of steps of the noise that the past has used; a part of a step counts as one."""
         steps = (self.begin - self.t0) / self.h
         return math.ceil(steps - 1e-9 * max(1.0, steps))
 
@@ -73,7 +74,7 @@ class Experiment:
 
     @property
     def rows(self) -> int:
-        """How many states are stored: those of every stride-th step or at given times, and the last."""
+        """Number of states that are stored: those of every stride-th step or at given times, and the last."""
         begun = len(self.past.rows) if self.past else 1
         if self.times is not None:
             last = self.times[-1] if self.times else self.begin
@@ -120,6 +121,7 @@ def prepared(
             raise click.BadParameter(
                 f"{until!r} is never reached by steps of {float(run.step)!r}", param_hint="--until"
             )
+        _expect_few((until - run.start) / run.step, "--until")
         run = replace(run, until=Fraction(until))
     initial = dict(zip(spec.coordinates, map(float, run.initial), strict=True))
     parameters = spec.parameters_of(run)
@@ -144,6 +146,7 @@ def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> R
     from phigen.spec.runs import with_step
 
     if steps is not None:
+        _expect_few(steps, "--steps")
         run = replace(run, steps=steps, stride=min(run.stride, steps), duration=None, until=None)
     if step is None:
         return run
@@ -152,7 +155,14 @@ def with_steps(spec: Spec, run: Run, step: float | None, steps: int | None) -> R
     try:
         return with_step(run, Fraction(step), parts=spec.monitor is None and spec.lattice is None)
     except ValueError as error:
-        raise click.BadParameter(f"{error}; --steps N makes so many", param_hint="--step") from None
+        raise click.BadParameter(f"{error}; --steps N sets the number of steps", param_hint="--step") from None
+
+
+def _expect_few(steps: float | Fraction, option: str) -> None:
+    """Refuse more steps than a spec may ask for."""
+    if steps > limits.STEPS:
+        message = f"{option}: {float(steps):.9g} steps, more than the limit of {limits.STEPS}"
+        raise LimitError([Diagnostic(message, hint="fewer or larger steps")])
 
 
 def with_seed(spec: Spec, run: Run, seed: int | None) -> Run:

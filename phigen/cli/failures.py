@@ -125,8 +125,8 @@ def _internal(error: BaseException, console: Console) -> int:
     console.error(f"internal error: {summary}")
     if console.verbose:
         _show_traceback(error, console)
-    wanted = "" if console.verbose else ", and what the same command prints with -v"
-    console.error(f"  This is a bug of phigen {__version__}, not of your spec. Please report it with the spec{wanted}.")
+    more = "" if console.verbose else ", and what the same command prints with -v"
+    console.error(f"  This is a bug of phigen {__version__}, not of your spec. Please report it with the spec{more}.")
     return PhigenError.exit_code
 
 

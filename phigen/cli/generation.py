@@ -1,4 +1,4 @@
-"""What commands generate: the options that decide it, and the files they give."""
+"""Files that commands generate, and the options that decide them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Options:
 
     def __post_init__(self) -> None:
         if self.real == "float" and self.profile == "fast":
-            raise click.UsageError("single precision has the profile small only: leave out --profile fast")
+            raise click.UsageError("single precision needs the profile small: leave out --profile fast")
 
     def compiled(self, spec: Spec) -> Compilation:
         """The compilation of a spec with these options, proved; see `phigen.compiler.compile_proved`."""
@@ -91,14 +91,16 @@ def output_options(command: F) -> F:
     """The options that decide what is generated: those of `Options`."""
     for option in (
         click.option(
-            "--modified", type=CORRECTIONS, metavar="N", help="Generate modified_hamiltonian, N corrections, too."
+            "--modified", type=CORRECTIONS, metavar="N", help="Also generate modified_hamiltonian, with N corrections."
         ),
-        click.option("--adjoint", is_flag=True, help="Generate step_adjoint and pullback, gradients of runs, too."),
-        click.option("--tangent", is_flag=True, help="Generate step_tangent, the derivative of a step, too."),
+        click.option("--adjoint", is_flag=True, help="Also generate step_adjoint and pullback, gradients of runs."),
+        click.option("--tangent", is_flag=True, help="Also generate step_tangent, the derivative of a step."),
         click.option(
-            "--profile", type=click.Choice(PROFILES), help="How much the code does for speed, instead of the spec's."
+            "--profile",
+            type=click.Choice(PROFILES),
+            help="Optimisation of the code for speed or for size; overrides the spec.",
         ),
-        click.option("--real", type=click.Choice(REALS), help="The numbers of the C, instead of the spec's."),
+        click.option("--real", type=click.Choice(REALS), help="Number type of the C; overrides the spec."),
         click.option(
             "--without", multiple=True, type=click.Choice(PARTS), help="Leave out a part of the code; may be repeated."
         ),
@@ -111,7 +113,7 @@ def output_options(command: F) -> F:
             "targets",
             multiple=True,
             type=click.Choice(list(TARGETS)),
-            help="Instead of the spec's targets.",
+            help="Target languages; overrides the spec. May be repeated.",
         ),
     ):
         command = option(command)

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 @click.option(
     "--path", "name", metavar="NAME", shell_complete=bundled_names, help="Print only the path of the bundled spec NAME."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object for each spec.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, one object for each spec.")
 @verbosity
 def command(name: str | None, as_json: bool) -> None:
     """List the bundled specs: name, dimension, kind of π, title.
 
-    Commands take their names: phigen run kepler. To start from one: cp "$(phigen list --path kepler)" .
+    Commands accept these names: phigen run kepler. To copy one as a start: cp "$(phigen list --path kepler)" .
     """
     from phigen import resources, spec
 

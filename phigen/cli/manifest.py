@@ -59,14 +59,14 @@ class Entry:
 
     def described(self) -> dict[str, Any]:
         """The entry as plain data; options that were not given are left out."""
-        given = {
+        changed_options = {
             key: value for key, value in asdict(self.options).items() if key != "directory" and value != _UNSET[key]
         }
         spec = {"sha256": sha256(self.spec_text), "text": self.spec_text.split("\n")}
         return {
             "phigen": self.version,
             "command": self.command,
-            "options": given,
+            "options": changed_options,
             "license": self.licence,
             "spec": {"file": self.spec_file, **spec} if self.spec_file else spec,
             "files": dict(sorted(self.files.items())),
@@ -96,8 +96,8 @@ def relative(spec_file: str, folder: Path) -> str | None:
 def text_of(entries: Mapping[str, Entry], builds: Collection[str] = ()) -> str:
     """The manifest as JSON; ``builds`` are the build systems that have files in the folder."""
     solvers = {name: entry.described() for name, entry in sorted(entries.items())}
-    wanted = {"build_files": sorted(builds)} if builds else {}
-    data = {"manifest": FORMAT, "about": _ABOUT, **wanted, "solvers": solvers}
+    build_files = {"build_files": sorted(builds)} if builds else {}
+    data = {"manifest": FORMAT, "about": _ABOUT, **build_files, "solvers": solvers}
     return json.dumps(data, indent=2, ensure_ascii=False) + "\n"
 
 
@@ -133,18 +133,18 @@ def _entry(name: str, part: Mapping[str, Any]) -> Entry:
         raise ValueError(f"{name}: the text of its spec was changed")
     # Names from here are opened, written and removed.
     if not re.fullmatch(SPEC_NAME, name) or not (spec_file is None or isinstance(spec_file, str)):
-        raise ValueError(f"{name!r} is no name of a solver, or its spec no file")
+        raise ValueError(f"{name!r} is not the name of a solver, or its spec is not a file")
     files = {str(file): str(digest) for file, digest in part["files"].items()}
     for file in files:
         if file not in {f"{name}{suffix}" for suffix in suffixes()}:
-            raise ValueError(f"{name}: {file!r} is no file of that solver")
+            raise ValueError(f"{name}: {file!r} is not a file of that solver")
     return Entry(name, _options(name, options), spec_file, text, str(part["license"]), files, str(part["phigen"]))
 
 
-def _options(name: str, given: dict[str, Any]) -> Options:
-    targets = tuple(_list_of_texts(given.pop("targets", [])))
-    without = tuple(_list_of_texts(given.pop("without", [])))
-    options = Options(targets=targets, without=without, **given)
+def _options(name: str, raw: dict[str, Any]) -> Options:
+    targets = tuple(_list_of_texts(raw.pop("targets", [])))
+    without = tuple(_list_of_texts(raw.pop("without", [])))
+    options = Options(targets=targets, without=without, **raw)
     order, modified = options.order, options.modified
     if (
         not set(targets) <= set(TARGETS)
@@ -154,19 +154,19 @@ def _options(name: str, given: dict[str, Any]) -> Options:
         or options.scheme not in (None, *SCHEMES)
         or options.profile not in (None, *PROFILES)
         or options.real not in (None, *REALS)
-        or "directory" in given
+        or "directory" in raw
         or not all(isinstance(flag, bool) for flag in (options.single_file, options.tangent, options.adjoint))
     ):
-        raise ValueError(f"{name}: options that do not exist: {given}")
+        raise ValueError(f"{name}: options that do not exist: {raw}")
     return options
 
 
 def _list_of_texts(value: Any) -> list[str]:
     if not isinstance(value, list) or not all(isinstance(v, str) for v in value):
-        raise TypeError(f"{value!r} is no list of texts")
+        raise TypeError(f"{value!r} is not a list of texts")
     return value
 
 
 def _damaged(path: Path, why: str) -> CheckError:
-    hint = f"take {FILE} from version control, or remove it and vendor the solvers anew"
+    hint = f"restore {FILE} from version control, or remove it and vendor the solvers again"
     return CheckError(f"{path} cannot be used: {why}\n  hint: {hint}")

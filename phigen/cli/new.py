@@ -12,15 +12,15 @@ from phigen.writing import write
 
 @click.command("new")
 @click.argument("name")
-@click.option("--lattice", is_flag=True, help="A lattice of identical sites, instead of one system.")
+@click.option("--lattice", is_flag=True, help="Write a lattice of identical sites instead of one system.")
 @click.option("-o", "--output", metavar="FILE", help="The file to write; - is stdout.  [default: NAME.yaml]")
 @verbosity
 @pass_console
 def command(console: Console, name: str, lattice: bool, output: str | None) -> None:
     """Write NAME.yaml, a commented spec to start from.
 
-    It is the free rigid body, or a chain of spins, ready to run: change it into your system. Existing files are left
-    alone.
+    The spec describes the free rigid body, or with --lattice a chain of spins, and is ready to run. Replace it by your
+    system. Existing files are not overwritten.
     """
     from phigen import spec
     from phigen.errors import SpecError

@@ -50,7 +50,7 @@ class Change:
 
 
 def changes(folder: Path, name: str, files: Mapping[str, str], targets: Iterable[str]) -> list[Change]:
-    """What building NAME means for its folder: its files, and files of the same targets it no longer has."""
+    """Changes that building NAME makes in its folder: files to write, and obsolete files of the same targets."""
     _expect_own_folder(folder)
     result = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
     for suffix in suffixes(targets):

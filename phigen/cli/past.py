@@ -48,8 +48,18 @@ def columns_of(names: Interface) -> list[Column]:
     return trajectory_columns(names.coordinates, names.casimirs, turned, names.observables, monitored=names.monitored)
 
 
+def recorded_columns(names: Interface, record: Sequence[str]) -> list[Column]:
+    """Return the columns that a run records: the times, and what it names; all if it names nothing."""
+    if not record:
+        return columns_of(names)
+    turned = [column.key for column in element_columns(names.attitude, position=names.position)]
+    keys = {"t", "tau"} | ({"x", *turned} if "state" in record else set())
+    keys |= {form.format(name) for name in record for form in ("{}", "casimir_{}", "observable_{}")}
+    return [column for column in columns_of(names) if column.key in keys]
+
+
 def past_of(path: Path, names: Interface, option: str) -> Past:
-    """What is in a file that a run has written."""
+    """Read the rows of a file that a run has written."""
     try:
         past = _of_npz(path, names) if path.suffix.lower() == ".npz" else _of_csv(path)
         if len(past.rows):
@@ -57,7 +67,7 @@ def past_of(path: Path, names: Interface, option: str) -> Past:
             return past
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         why = f"it has no column {error}" if isinstance(error, KeyError) else str(error)
-        raise click.BadParameter(f"{path} is no file of a run of {names.name}: {why}", param_hint=option) from None
+        raise click.BadParameter(f"{path} does not hold a run of {names.name}: {why}", param_hint=option) from None
     raise click.BadParameter(f"{path} has no rows", param_hint=option)
 
 
@@ -66,7 +76,7 @@ def _expect_rows(past: Past, needed: Sequence[str]) -> None:
     if past.rows.dtype != np.float64 or past.rows.ndim != 2 or past.rows.shape[1] != len(past.columns):
         raise ValueError(f"it has {len(past.columns)} names of columns, and rows of another length")
     if len(set(past.columns)) < len(past.columns):
-        raise ValueError("two columns have one name")
+        raise ValueError("two columns have the same name")
     if not np.isfinite(past.last(needed)).all():
         raise ValueError("its last state is not finite")
 
@@ -81,13 +91,13 @@ def _of_csv(path: Path) -> Past:
 
 def _of_npz(path: Path, names: Interface) -> Past:
     with opened(path) as file, np.load(file, allow_pickle=False) as stored:
-        found = [(column, stored[column.key]) for column in columns_of(names) if column.key in stored]
-    for column, values in found:
+        stored_columns = [(column, stored[column.key]) for column in columns_of(names) if column.key in stored]
+    for column, values in stored_columns:
         shape = values.shape[:1] if column.flat else (*values.shape[:1], len(column.names))
         if values.dtype.kind not in "fiu" or not values.ndim or values.shape != shape:
-            raise ValueError(f"{column.key} is no array of {len(column.names)} real numbers in each row")
-    header = tuple(name for column, _ in found for name in column.names)
-    return Past(header, np.column_stack([values for _, values in found]).astype(np.float64))
+            raise ValueError(f"{column.key} is not an array of {len(column.names)} real numbers in each row")
+    header = tuple(name for column, _ in stored_columns for name in column.names)
+    return Past(header, np.column_stack([values for _, values in stored_columns]).astype(np.float64))
 
 
 def started_from(experiment: Experiment, past: Past, solver: Solver) -> Experiment:
@@ -125,16 +135,21 @@ def begun(solver: Solver, experiment: Experiment) -> Session:
 def extended(experiment: Experiment, path: Path, solver: Solver) -> Experiment:
     """The experiment after the rows of a finished run of it."""
     names = solver.interface
+    if experiment.run.record:
+        message = f"the run {experiment.run.name} has record:, and its file not all that goes on with it"
+        raise click.UsageError(f"--extend: {message}; --from starts at a file with the state")
     past = past_of(path, names, "--extend")
-    wanted = [name for column in columns_of(names) for name in column.names]
+    expected = [name for column in columns_of(names) for name in column.names]
     state = names.dimension + 1 + names.monitored
     begin = past.rows[0, :state].tolist()
-    if list(past.columns) != wanted or begin != [experiment.t0, *[0.0] * names.monitored, *experiment.initial]:
+    if list(past.columns) != expected or begin != [experiment.t0, *[0.0] * names.monitored, *experiment.initial]:
         message = f"{path} is of another run: its first row is {', '.join(map(repr, begin))}"
         raise click.BadParameter(message, param_hint="--extend")
-    found = replace(experiment, past=past)
-    missed = past.t - found.t0 - found.made * found.h
-    if found.run.members > 1 and abs(missed) > _EQUAL * found.made * abs(found.h):
-        message = f"{path} ends with a part of a step, at t = {past.t!r}, which the means of members are not told of"
-        raise click.BadParameter(f"{message}: make the run anew, to its new end", param_hint="--extend")
-    return found
+    continued = replace(experiment, past=past)
+    missed = past.t - continued.t0 - continued.made * continued.h
+    if continued.run.members > 1 and abs(missed) > _EQUAL * continued.made * abs(continued.h):
+        message = (
+            f"{path} ends with a shorter step, at t = {past.t!r}, from which means over members cannot be continued"
+        )
+        raise click.BadParameter(f"{message}; run it again from the start, to the new end", param_hint="--extend")
+    return continued

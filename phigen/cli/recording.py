@@ -1,4 +1,4 @@
-"""What becomes of a run while it is integrated: rows in files, errors, sketches for figures, and checkpoints."""
+"""Records of a run, written while it is integrated: rows in files, errors, sketches for figures, and checkpoints."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from phigen._version import __version__
 from phigen.cli.console import Console
 from phigen.cli.experiment import Experiment
 from phigen.cli.interruption import interruptible
-from phigen.cli.past import begun, columns_of
+from phigen.cli.past import begun, columns_of, recorded_columns
 from phigen.compilation import Compilation
 from phigen.errors import FileError, StepError
 from phigen.runtime import checkpoint
@@ -36,7 +36,7 @@ from phigen.study.sketch import POINTS, Sketch, Thinned
 from phigen.study.summary import Watch
 from phigen.symbolic.readable import readable
 
-_NO_FILES = "--resume goes on with files: give those of the interrupted run by --output or --section"
+_NO_FILES = "--resume continues the files of an interrupted run: name them by --output or --section"
 
 #: Seconds between two checkpoints.
 CHECKPOINT_SECONDS = 2.0
@@ -67,6 +67,9 @@ class Recorder:
         self.watch = Watch(self.label, compilation.system, run, parameters, experiment.rows)
         self.sketch = Sketch(names.dimension, len(names.casimirs), experiment.rows)
         self.averages = averages_of(run, len(names.observables))
+        listed = [name for column in columns_of(names) for name in column.names]
+        self._columns = recorded_columns(names, run.record)
+        self._places = [listed.index(name) for column in self._columns for name in column.names]
         self.growth = FrameGrowth(names.dimension, experiment.h) if lyapunov else None
         self.points = Thinned(1 + names.dimension, POINTS)
         self.finder = None
@@ -84,6 +87,7 @@ class Recorder:
             "step": experiment.h,
             "steps": run.steps,
             "stride": run.stride,
+            "record": list(run.record),
             "times": None if experiment.times is None else [*experiment.times[-1:], len(experiment.times)],
             "end": experiment.end.span if experiment.end else None,
             "past": len(experiment.past.rows) if experiment.past else 0,
@@ -110,8 +114,8 @@ class Recorder:
     def time(self) -> float:
         """The physical time of the state."""
         monitored, about = self.solver.interface.monitored, self.experiment
-        made = about.h * (self.number if self._whole is not None else self.session.steps)
-        return about.begin + (self.session.time() if monitored else made)
+        elapsed = about.h * (self.number if self._whole is not None else self.session.steps)
+        return about.begin + (self.session.time() if monitored else elapsed)
 
     @property
     def steps(self) -> int:
@@ -152,7 +156,7 @@ class Recorder:
         try:
             self._open(arrays)
         except (OSError, ValueError) as error:
-            raise MismatchError(f"cannot go on: {error}") from None
+            raise MismatchError(f"cannot resume: {error}") from None
 
     def see(self, piece: Piece) -> None:
         """Take in what a piece of the integration gave."""
@@ -170,12 +174,12 @@ class Recorder:
         worked = self.watch.see(t, piece.x)
         self.sketch.see(np.column_stack([t, piece.x, energy - worked, casimirs]))
         if "output" in self._tables:
-            self._tables["output"].append(rows)
+            self._tables["output"].append(rows[:, self._places])
         self._cross(piece.crossings)
 
-    def _cross(self, found: Sequence[tuple[float, Floats]]) -> None:
+    def _cross(self, section_points: Sequence[tuple[float, Floats]]) -> None:
         """Take in crossings, times and states."""
-        crossings = np.array([[t, *x] for t, x in found]).reshape(-1, 1 + self.solver.interface.dimension)
+        crossings = np.array([[t, *x] for t, x in section_points]).reshape(-1, 1 + self.solver.interface.dimension)
         self.points.see(crossings)
         if "section" in self._tables:
             self._tables["section"].append(crossings)
@@ -204,9 +208,9 @@ class Recorder:
         for start in range(0, len(rows), _ROWS):
             part = rows[start : start + _ROWS]
             worked = self.watch.see(part[:, 0], part[:, state])
-            told = np.column_stack([part[:, 0], part[:, seen]])
-            told[:, 1 + names.dimension] -= worked
-            self.sketch.see(told)
+            samples = np.column_stack([part[:, 0], part[:, seen]])
+            samples[:, 1 + names.dimension] -= worked
+            self.sketch.see(samples)
             if self.files.output and not self._goes_on(self.files.output):
                 self._tables["output"].append(part)
 
@@ -279,8 +283,8 @@ class Recorder:
     def trajectory(self, broken: bool) -> Trajectory:
         """As many rows as a figure can show; ``broken`` marks the end of a run that failed."""
         names, about = self.solver.interface, self.experiment
-        made = about.h, self.steps, about.parameters
-        return self.sketch.trajectory(names.coordinates, names.casimirs, *made, broken)
+        settings = about.h, self.steps, about.parameters
+        return self.sketch.trajectory(names.coordinates, names.casimirs, *settings, broken)
 
     def _parts(self) -> dict[str, Any]:
         parts = {"watch": self.watch, "sketch": self.sketch, "points": self.points, "growth": self.growth}
@@ -289,7 +293,7 @@ class Recorder:
 
     def _open(self, arrays: Mapping[str, Any]) -> None:
         names = self.solver.interface
-        columns = {"output": columns_of(names), "section": section_columns(names.coordinates)}
+        columns = {"output": self._columns, "section": section_columns(names.coordinates)}
         for name, path in (("output", self.files.output), ("section", self.files.section)):
             if path:
                 size = int(arrays[f"size.{name}"]) if arrays else None
@@ -313,7 +317,7 @@ def opened_recorder(recorder: Recorder, resume: bool, console: Console) -> Recor
             recorder.resume(path)
         except MismatchError as error:
             raise click.UsageError(str(error)) from None
-        console.note(f"going on after {recorder.steps} of {recorder.experiment.run.steps} steps")
+        console.note(f"resuming after {recorder.steps} of {recorder.experiment.run.steps} steps")
         return recorder
     try:
         recorder.start()
@@ -333,7 +337,7 @@ def _kept(recorder: Recorder) -> Iterator[None]:
     except OSError as error:
         if recorder.files.checkpoint is None:
             raise
-        hint = "its last checkpoint is kept; make room, and the same command with --resume goes on from there"
+        hint = "the last checkpoint is intact; free some space and repeat the command with --resume"
         raise FileError(f"{error.filename}: {error.strerror}\n  hint: {hint}") from error
 
 
@@ -376,7 +380,7 @@ def record(recorder: Recorder, console: Console) -> tuple[StepError | None, bool
 
 
 def _at_times(recorder: Recorder, session: Session, see_tangent: Callable[[Floats], None] | None) -> Iterator[Piece]:
-    """What is stored at given times, from where a session stands."""
+    """Pieces of a trajectory at requested times, from the current state of a session."""
     about = recorder.experiment
     if not recorder.watch.begun:
         yield standing(session, 0.0)
@@ -424,10 +428,10 @@ def compared(
 
     with console.progress(method, run.steps) as progress:
         x0 = np.array(experiment.initial)
-        for numbers, found in classical.pieces_of(
+        for numbers, states in classical.pieces_of(
             method, field_of(solver, parameters), extended(solver, x0, experiment.t0), h, rows.numbers
         ):
-            x = found[:, : len(x0)]
+            x = states[:, : len(x0)]
             t = experiment.t0 + h * numbers
             worked = watch.see(t, x)
             energy, casimirs = solver.energies(x, t, parameters), backend.casimirs(x, parameters)

@@ -21,8 +21,8 @@ from phigen.writing import write
 @run_option
 @order_option
 @scheme_option
-@click.option("--lyapunov", is_flag=True, help="Lyapunov exponents of the run as well.")
-@click.option("--quick", is_flag=True, help="Fewer steps, fewer repetitions.")
+@click.option("--lyapunov", is_flag=True, help="Also compute Lyapunov exponents of the run.")
+@click.option("--quick", is_flag=True, help="Use fewer steps and fewer repetitions.")
 @verbosity
 @pass_console
 def command(
@@ -37,10 +37,10 @@ def command(
 ) -> None:
     """Write one self-contained HTML page about a spec, to be read by anyone.
 
-    The solver, running in the page beside RK4; formulas; what the compiler chose and why; what was proved, as
-    `phigen check` does; what was measured, as `phigen verify` does; figures of a run; errors against step and time,
-    with classical methods beside them. The page needs no network. Nothing is written if the mathematics of the spec is
-    refuted. Exit code 5 if the solver falls short of what it promises: the page says where.
+    The page has the solver, running beside RK4; formulas; the choices of the compiler with their reasons; the proofs of
+    `phigen check`; the measurements of `phigen verify`; figures of a run; errors against step and time, compared with
+    classical methods. It needs no network. Nothing is written if the mathematics of the spec is refuted. Exit code 5 if
+    a measurement misses its bound; the page shows which.
     """
     from phigen.cli.report_lattice import gathered_of_lattice
     from phigen.cli.report_material import gathered
@@ -57,18 +57,22 @@ def command(
     if run is None:
         console.warn(f"{spec.file}: the spec has no runs, so the page has no measurements and no figures")
     experiment = prepared(spec, name) if run and not spec.lattice else None
-    found = examine(spec.for_running(order=order, scheme=scheme, tangent=True))
-    if found.refuted:
-        raise CheckError(refutation(found))
-    if found.compilation is None:
-        raise found.obstacle or AssertionError("an examination without compilation has an obstacle")
-    console.note(f"{spec.name}: {len(found.statements)} statements examined, none refuted")
+    examination = examine(spec.for_running(order=order, scheme=scheme, tangent=True))
+    if examination.refuted:
+        raise CheckError(refutation(examination))
+    if examination.compilation is None:
+        raise examination.obstacle or AssertionError("an examination without compilation has an obstacle")
+    console.note(f"{spec.name}: {len(examination.statements)} statements examined, none refuted")
     written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
     if spec.lattice:
-        cell, failures = gathered_of_lattice(found, found.compilation, run, written, scheme, lyapunov, quick, console)
+        cell, failures = gathered_of_lattice(
+            examination, examination.compilation, run, written, scheme, lyapunov, quick, console
+        )
         page, figures = lattice_document(cell), cell.trajectory is not None
     else:
-        material, failures = gathered(found, found.compilation, experiment, written, scheme, lyapunov, quick, console)
+        material, failures = gathered(
+            examination, examination.compilation, experiment, written, scheme, lyapunov, quick, console
+        )
         page, figures = document(material), bool(material.methods)
     write_page(page, figures, output, target, console)
     if failures:
@@ -79,8 +83,8 @@ def command_of(
     spec_file: str, target: str, name: str | None, order: int | None, scheme: str | None, lyapunov: bool, quick: bool
 ) -> str:
     """The command that makes the page again."""
-    given = {"run": name, "order": order, "scheme": scheme}
-    options = [part for key, value in given.items() if value for part in (f"--{key}", str(value))]
+    chosen = {"run": name, "order": order, "scheme": scheme}
+    options = [part for key, value in chosen.items() if value for part in (f"--{key}", str(value))]
     options += ["--lyapunov"] * lyapunov + ["--quick"] * quick
     return shlex.join(["phigen", "report", Path(spec_file).name, *options, "-o", Path(target).name])
 

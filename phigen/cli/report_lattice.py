@@ -1,4 +1,4 @@
-"""What ``phigen report`` puts on the page of a lattice: one run integrated and verified."""
+"""Material of ``phigen report`` for the page of a lattice: one run, integrated and verified."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def gathered_of_lattice(
-    found: Examination,
+    examination: Examination,
     compilation: Compilation,
     run: Run | None,
     written: str,
@@ -24,10 +24,10 @@ def gathered_of_lattice(
     quick: bool,
     console: Console,
 ) -> tuple[LatticeMaterial, list[PhigenError]]:
-    """What the page is made of, with a run and what was verified on it, and what failed on the way."""
+    """Collect the material of the page, with one run and its verification, and the failures on the way."""
     from phigen.report.lattice import LatticeMaterial
 
-    material = LatticeMaterial(found, compilation, written)
+    material = LatticeMaterial(examination, compilation, written)
     if run is None:
         return material, []
     material, failure = _measured(material, compilation, run, scheme, lyapunov, quick, console)
@@ -64,7 +64,7 @@ def _measured(
     failure: PhigenError | None = None
     begin = float(run.start) if spec.time else None
     try:
-        made = solver.integrate(
+        trajectory = solver.integrate(
             start.state,
             float(run.step),
             run.steps,
@@ -74,16 +74,16 @@ def _measured(
             parameters=start.arguments,
         )
     except StepError as error:
-        failure, made = error, error.trajectory
+        failure, trajectory = error, error.trajectory
     assert compilation.cell is not None
     energies = np.array(
         [
             solver.density(x, t if spec.time else None, parameters=start.arguments)
-            for x, t in zip(made.x, made.t, strict=True)
+            for x, t in zip(trajectory.x, trajectory.t, strict=True)
         ]
     )
     material = replace(
-        material, run=run, trajectory=made, errors=errors_of(compilation.cell, made), energies=energies,
+        material, run=run, trajectory=trajectory, errors=errors_of(compilation.cell, trajectory), energies=energies,
         failure=f"The run could not be completed: {failure}." if failure else "",
         live=gathered_lattice(compilation, scheme, run, start),
     )  # fmt: skip

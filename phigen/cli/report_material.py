@@ -1,4 +1,4 @@
-"""What ``phigen report`` puts on its page: one run integrated, verified, and its errors studied."""
+"""Material of ``phigen report`` for its page: one run, integrated and verified, and a study of its errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _OPENING = 4_000
 
 
 def gathered(
-    found: Examination,
+    examination: Examination,
     compilation: Compilation,
     experiment: Experiment | None,
     written: str,
@@ -37,10 +37,10 @@ def gathered(
     quick: bool,
     console: Console,
 ) -> tuple[Material, list[PhigenError]]:
-    """What the page is made of, and what failed on the way."""
+    """Collect the material of the page, and the failures on the way."""
     from phigen.cli.endings import ended, timed
 
-    material = Material(found, compilation, written)
+    material = Material(examination, compilation, written)
     if experiment is None:
         note = "The spec has no runs: nothing was measured. Add one under runs: with initial, step and steps."
         return replace(material, notes=(note,)), []
@@ -63,7 +63,7 @@ def gathered(
 
 
 def _live(compilation: Compilation, experiment: Experiment, scheme: str | None, console: Console) -> Live:
-    """What runs in the page."""
+    """Solver that runs in the page, with its start."""
     from phigen.report import live
 
     console.note(f"{compilation.spec.name}: compiling for the page")
@@ -88,7 +88,7 @@ def _integrated(
         watch, methods[method] = compared(compilation, solver, experiment, method, console, recorder.time)
         summaries.append(watch.summary())
     opening = _opening(compilation, solver, experiment, list(methods)[1:2], console) if failure is None else {}
-    made = replace(
+    integrated = replace(
         material,
         run=run,
         steps=told_steps(recorder),
@@ -99,7 +99,7 @@ def _integrated(
         spectrum=recorder.spectrum,
         notes=(f"The run could not be completed: {failure}.",) if failure else (),
     )
-    return made, [failure] if failure else []
+    return integrated, [failure] if failure else []
 
 
 def _recorded(recorder: Recorder, console: Console) -> StepError | None:

@@ -1,4 +1,4 @@
-"""What ``phigen report`` says of errors against step and time, and of the machine they were measured on."""
+"""Errors against step and time for ``phigen report``, and the machine on which they were measured."""
 
 from __future__ import annotations
 
@@ -47,12 +47,12 @@ def studied(
     solution, casimirs = _closed_form(compilation, experiment, x0), _casimirs(compilation, experiment, x0)
     rounds = _FEW_ROUNDS if quick else _ROUNDS
     try:
-        found = precision.study(
+        study = precision.study(
             compared, compilation.order.order, experiment.h, steps, solution, casimirs, rounds=rounds
         )
     except ArithmeticError as error:
         return None, f"Errors against step and time could not be measured: {error}."
-    return found, ""
+    return study, ""
 
 
 def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -> Callable[[float], Floats] | None:
@@ -66,8 +66,8 @@ def _closed_form(compilation: Compilation, experiment: Experiment, x0: Floats) -
         return None
 
     def solution(t: float) -> Floats:
-        found = exact_solution(system, run, experiment.parameters, x0, np.array([experiment.t0 + t]))
-        return np.array([float(found[c][0]) for c in system.coordinates])
+        values = exact_solution(system, run, experiment.parameters, x0, np.array([experiment.t0 + t]))
+        return np.array([float(values[c][0]) for c in system.coordinates])
 
     return solution
 
@@ -97,7 +97,7 @@ def _casimirs(compilation: Compilation, experiment: Experiment, x0: Floats) -> C
 
 
 def environment() -> dict[str, str]:
-    """What measured times depend on."""
+    """Environment on which measured times depend."""
     import platform
 
     from phigen.runtime import toolchain

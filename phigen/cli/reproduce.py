@@ -16,17 +16,17 @@ if TYPE_CHECKING:
 @click.command("reproduce")
 @click.argument("what", type=click.Choice(["paper"]))
 @click.option("-o", "--output", "folder", metavar="DIR", type=click.Path(path_type=Path), default=Path("paper"),
-              show_default=True, help="Where the figures go.")  # fmt: skip
+              show_default=True, help="Folder for the figures.")  # fmt: skip
 @click.option("--format", "suffix", type=click.Choice(["svg", "png", "pdf"]), default="svg", show_default=True)
 @click.option("--figure", "names", metavar="NAME", multiple=True, help="Make this figure only.  [default: all]")
-@click.option("--json", "as_json", is_flag=True, help="The numbers for machines.")
+@click.option("--json", "as_json", is_flag=True, help="Print the numbers as JSON.")
 @verbosity
 @pass_console
 def command(console: Console, what: str, folder: Path, suffix: str, names: tuple[str, ...], as_json: bool) -> None:
-    """Make the figures of the paper (arXiv:2303.15883), and print what was measured beside what it says.
+    """Draw the figures of the paper (arXiv:2303.15883), and print measured numbers beside those of the paper.
 
-    Files are DIR/NAME.svg, and overwritten. It needs matplotlib and a C compiler, and takes half a minute: the rigid
-    body makes 10^8 steps with each of three methods.
+    Files DIR/NAME.svg are overwritten. This needs matplotlib and a C compiler, and takes half a minute: the rigid body
+    makes 10^8 steps with each of three methods.
     """
     from phigen.drawing.palette import require_matplotlib, save
     from phigen.paper.plates import PLATES

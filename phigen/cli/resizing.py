@@ -17,35 +17,35 @@ if TYPE_CHECKING:
 OPTION = "--sizes"
 
 sizes_option = click.option(
-    OPTION, metavar="SIZES", help="Of a lattice: other sizes than those of the run, such as 64x64."
+    OPTION, metavar="SIZES", help="For a lattice: other sizes than those of the run, such as 64x64."
 )
 
 
-def resized(spec: Spec, name: str | None, given: str | None) -> Spec:
+def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
     """The spec with other sizes in the run of that name, the first by default; the same spec without sizes.
 
     Raises `click.BadParameter` for what is no size, for systems that have none, and for sizes that the stencil does
     not fit in.
     """
-    if given is None:
+    if text is None:
         return spec
     if not spec.lattice:
-        raise click.BadParameter(f"{spec.name} is no lattice, and has no sizes", param_hint=OPTION)
+        raise click.BadParameter(f"{spec.name} is not a lattice, so it has no sizes", param_hint=OPTION)
     if spec.lattice.graph:
         raise click.BadParameter(f"{spec.name} is a graph, whose sites are those of its bonds", param_hint=OPTION)
-    sizes = typed_sizes(given)
+    sizes = typed_sizes(text)
     if sizes is None:
-        raise click.BadParameter(f"{given!r} is not sizes such as 64x64", param_hint=OPTION)
+        raise click.BadParameter(f"{text!r} is not sizes such as 64x64", param_hint=OPTION)
     run = run_of(spec, name)
     assert run.lattice is not None
     axes = spec.lattice.axes
     if len(sizes) != len(axes or ("sites",)):
-        wanted = f"the axes {', '.join(axes)}" if len(axes) > 1 else "one axis" if axes else "sites alone"
+        expected = f"the axes {', '.join(axes)}" if len(axes) > 1 else "one axis" if axes else "sites alone"
         many = counted(len(sizes), "size")
-        raise click.BadParameter(f"{given} has {many}; {spec.name} has {wanted}", param_hint=OPTION)
+        raise click.BadParameter(f"{text} has {many}; {spec.name} has {expected}", param_hint=OPTION)
     from phigen.lattice.building import cell_from_spec
 
-    if small := too_small(cell_from_spec(spec), sizes, given):
+    if small := too_small(cell_from_spec(spec), sizes, text):
         raise click.BadParameter(small, param_hint=OPTION)
     other = replace(run, lattice=replace(run.lattice, sizes=sizes))
     # what is said of these sizes points at no line of the spec, which has others

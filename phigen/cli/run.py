@@ -48,9 +48,9 @@ _TABLES = (".csv", ".npz")
     "--step",
     metavar="H",
     type=float,
-    help="Step size, instead of the run's; a duration of the run stays.",
+    help="Step size; overrides that of the run, whose duration stays.",
 )
-@click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps, instead of the run's.")
+@click.option("--steps", metavar="N", type=click.IntRange(min=1), help="Number of steps; overrides that of the run.")
 @sizes_option
 @click.option(
     "--until", metavar="T", type=float, help="Time at which the run ends, by a shorter last step if necessary."
@@ -59,7 +59,9 @@ _TABLES = (".csv", ".npz")
     "--every", metavar="DT", type=float, help="Store states at intervals DT of time, instead of every stride-th step."
 )
 @click.option("--at", metavar="T,…", help="Store states at these times, or at the times listed in a file.")
-@click.option("--seed", metavar="N", type=SEED, help="Seed of the random numbers of the noise, instead of the run's.")
+@click.option(
+    "--seed", metavar="N", type=SEED, help="Seed of the random numbers of the noise; overrides that of the run."
+)
 @click.option("--from", "source", metavar="FILE", type=click.Path(exists=True, dir_okay=False, path_type=Path),
               help="Start at the last state of another run: FILE.csv or FILE.npz.")  # fmt: skip
 @click.option("--extend", is_flag=True, help="Continue the finished run in the file of --output beyond its end.")
@@ -111,9 +113,9 @@ def command(
 ) -> None:
     """Integrate a run of a spec, and summarise the errors of energy, Casimirs, invariants and solution.
 
-    The code is that of the profile fast unless --profile names another; the spec's is that of code that is built.
-    The classical methods that the run names under "compare:" are run as well, with the same step size. Files are
-    written during the run; an interrupted run keeps its results so far, and --resume continues it.
+    The solver is compiled with profile fast, unless --profile says otherwise; "profile:" in a spec is for built code.
+    The classical methods that the run lists under "compare:" are run too, with the same step size. Files are written
+    during the run; the results of an interrupted run are kept, and --resume continues it.
     """
     from phigen.api import compilation_of
     from phigen.cli.endings import ended, timed
@@ -127,15 +129,16 @@ def command(
         require_matplotlib()
     spec = resized(load_one(spec_file), name, sizes)
     if spec.lattice:
-        expect_no(section=section, until=until, every=every, at=at, extend=extend)
-        expect_no(**{"from": source})
+        expect_no(section=section, every=every, at=at, extend=extend)
+        _expect_together({"--until": until, "--steps": steps})
         chosen = with_seed(spec, with_steps(spec, run_of(spec, name), step, steps), seed)
         method: Any = {"target": target, "order": order, "scheme": scheme, "profile": profile, "lyapunov": lyapunov}
         written: Any = {"output": output, "plot": plot, "resume": resume, "as_json": as_json}
+        written |= {"source": source, "until": until}
         run_lattice(console, spec, chosen, settings=settings, **method, **written)
         return
     if plot and plot.suffix.lower() in FILMS:
-        raise click.BadParameter(f"films are of lattices, and {spec.name} is none", param_hint="--plot")
+        raise click.BadParameter(f"films are for lattices, and {spec.name} is not a lattice", param_hint="--plot")
     _expect_together(
         {"--until": until, "--every": every, "--at": at, "--extend": extend},
         {"--steps": steps, "--from": source, "--section": section, "--lyapunov": lyapunov},
@@ -143,14 +146,14 @@ def command(
     experiment = prepared(spec, name, step, steps, settings, until)
     experiment = replace(experiment, run=with_seed(spec, experiment.run, seed))
     if section and experiment.run.section is None:
-        raise click.BadParameter(f"the run {experiment.run.name} has no section: in the spec", param_hint="--section")
+        raise click.BadParameter(f"the run {experiment.run.name} of the spec has no section", param_hint="--section")
     compilation = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
     solver = loaded(compilation, target, console)
     if source:
         experiment = started_from(experiment, past_of(source, solver.interface, "--from"), solver)
     if extend:
         if output is None or not output.exists():
-            raise click.UsageError("--extend goes on with a finished run: name its file by --output")
+            raise click.UsageError("--extend continues a finished run: name its file by --output")
         experiment = extended(experiment, output, solver)
     experiment = timed(ended(experiment, solver, console), solver, every, at)
     recorder = Recorder(compilation, solver, experiment, Files(output, section), lyapunov)
@@ -186,16 +189,16 @@ _APART += [("--extend", "--section"), ("--extend", "--lyapunov")]
 
 
 def _expect_together(*options: dict[str, object]) -> None:
-    """Refuse options that do not go together."""
-    given = {name for part in options for name, value in part.items() if value}
+    """Refuse options that exclude each other."""
+    used_options = {name for part in options for name, value in part.items() if value}
     for first, second in _APART:
-        if {first, second} <= given:
-            raise click.UsageError(f"{first} and {second} do not go together")
+        if {first, second} <= used_options:
+            raise click.UsageError(f"{first} and {second} exclude each other")
 
 
 def _told(recorder: Recorder) -> str:
     done = f"interrupted after {recorder.steps} of {recorder.experiment.run.steps} steps"
-    return f"{done}; the same command with --resume goes on" if recorder.files.checkpoint else done
+    return f"{done}; repeat the command with --resume to continue" if recorder.files.checkpoint else done
 
 
 def _draw(path: Path, recorder: Recorder, drawn: dict[str, Trajectory], casimirs: Any, summary: Summary) -> None:

@@ -1,4 +1,4 @@
-"""What ``phigen run`` tells at the end: a table for people, or plain data."""
+"""Summary that ``phigen run`` prints at the end: a table for people, or plain data."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from phigen.cli.console import counted, heading, out, table
 if TYPE_CHECKING:
     from phigen.cli.recording import Recorder
     from phigen.compilation import Compilation
+    from phigen.study.averages import Averages
     from phigen.study.lyapunov import Spectrum
     from phigen.study.summary import Drift, Summary
 
@@ -35,9 +36,9 @@ def print_summary(compilation: Compilation, recorder: Recorder, summaries: Seque
         power = "∂H/∂t" if not compilation.system.forces else "(∂H/∂t + the power of the forces)"
         out(f"  The energy balance is H − ∫ {power} dt, integrated along the stored states by a rule of order 8.")
         if any(s.off > 0.01 for s in summaries):
-            out("  They are too far apart for it to say much: a shorter --every, or stride, brings them closer.")
+            out("  The stored states are too far apart for an accurate integral: use a shorter --every, or stride.")
     if solver.interface.observables:
-        _print_averages(recorder)
+        print_averages(solver.interface.observables, recorder.averages)
     if recorder.experiment.run.members > 1:
         _print_means(recorder)
     if recorder.finder:
@@ -82,15 +83,14 @@ def _rows(summaries: Sequence[Summary]) -> list[list[str]]:
     return rows
 
 
-def _print_averages(recorder: Recorder) -> None:
-    """Print the time averages of the observables over the rows of the run."""
-    averages = recorder.averages
+def print_averages(names: Sequence[str], averages: Averages) -> None:
+    """Print the time averages of the observables over the rows of a run."""
     first, last = averages.times
     out(f"\n  observables, means over {counted(averages.count, 'row')} from t = {first:.9g} to {last:.9g}")
     header = ["", "mean", "standard error", "least", "largest", "correlation time"]
     rows = [
         [name, f"{a.mean:.6g}", f"{a.error:.1g}", f"{a.least:.6g}", f"{a.largest:.6g}", f"{a.correlation_time:.2g}"]
-        for name, a in zip(recorder.solver.interface.observables, averages.results(), strict=True)
+        for name, a in zip(names, averages.results(), strict=True)
     ]
     for line in table([header, *rows], right=range(1, 6)):
         out(f"  {line}")
@@ -98,9 +98,9 @@ def _print_averages(recorder: Recorder) -> None:
 
 def _print_means(recorder: Recorder) -> None:
     """The means over all members where the run ended, with their statistical errors."""
-    run, found = recorder.experiment.run, recorder.means()
+    run, means = recorder.experiment.run, recorder.means()
     out(f"\n  means over {run.members} members at t = {recorder.time:.9g}")
-    for line in table([[name, f"{mean:.6g}", f"± {error:.1g}"] for name, (mean, error) in found.items()], right=[1]):
+    for line in table([[name, f"{mean:.6g}", f"± {error:.1g}"] for name, (mean, error) in means.items()], right=[1]):
         out(f"  {line}")
 
 
@@ -113,7 +113,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
     from dataclasses import asdict
 
     experiment, solver, session = recorder.experiment, recorder.solver, recorder.session
-    told = {
+    description = {
         "name": compilation.spec.name,
         "run": experiment.run.name,
         "target": solver.target,
@@ -132,17 +132,23 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "methods": [asdict(s) for s in summaries],
     }
     if solver.interface.observables:
-        results = zip(solver.interface.observables, recorder.averages.results(), strict=True)
-        told["observables"] = {name: asdict(average) for name, average in results}
+        description["observables"] = described_averages(solver.interface.observables, recorder.averages)
     if solver.interface.noise:
-        told |= {"seed": experiment.run.seed, "members": experiment.run.members}
+        description |= {"seed": experiment.run.seed, "members": experiment.run.members}
         if experiment.run.members > 1:
-            told["means"] = {name: {"mean": m, "error": e} for name, (m, e) in recorder.means().items()}
+            description["means"] = {name: {"mean": m, "error": e} for name, (m, e) in recorder.means().items()}
     if recorder.finder:
-        told["section"] = {"expression": recorder.section_text, "crossings": recorder.points.seen}
+        description["section"] = {"expression": recorder.section_text, "crossings": recorder.points.seen}
     if spectrum := recorder.spectrum:
-        told["lyapunov"] = described_spectrum(spectrum)
-    return told
+        description["lyapunov"] = described_spectrum(spectrum)
+    return description
+
+
+def described_averages(names: Sequence[str], averages: Averages) -> dict[str, Any]:
+    """Return time averages of observables as JSON has them."""
+    from dataclasses import asdict
+
+    return {name: asdict(average) for name, average in zip(names, averages.results(), strict=True)}
 
 
 def described_spectrum(spectrum: Spectrum) -> dict[str, Any]:

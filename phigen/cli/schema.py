@@ -12,7 +12,7 @@ from phigen.cli.console import out_json, verbosity
 def command() -> None:
     """Print the JSON Schema of spec files, for completion and checks in editors.
 
-    With the YAML extension of an editor: phigen schema > phigen.schema.json, and as first line of a spec
+    For the YAML extension of an editor, run phigen schema > phigen.schema.json and begin a spec with
     # yaml-language-server: $schema=phigen.schema.json
     """
     from phigen import spec

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @one_spec
 @order_option
 @scheme_option
-@click.option("--full", is_flag=True, help="All terms of long formulas.")
+@click.option("--full", is_flag=True, help="Print all terms of long formulas.")
 @click.option(
     "--modified", metavar="N", type=CORRECTIONS, default=0, help="Show N corrections of the modified Hamiltonian."
 )
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
     "--expand",
     "sizes",
     metavar="SIZES",
-    help="For a lattice: a small one, of sizes 3x3 or of a named run, as an ordinary spec.",
+    help="Print a lattice of small sizes, such as 3x3 or those of a named run, as an ordinary spec.",
 )
 @click.option(
     "--lattice",
     "as_lattice",
     is_flag=True,
-    help="For identical sites written out: the spec of a lattice of any size.",
+    help="Print a spec of identical sites as the spec of a lattice of any size.",
 )
-@click.option("--latex", "as_latex", is_flag=True, help="The formulas as LaTeX, ready for \\input.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object of texts.")
+@click.option("--latex", "as_latex", is_flag=True, help="Print the formulas as LaTeX, ready for \\input.")
+@click.option("--json", "as_json", is_flag=True, help="Print the formulas as JSON.")
 @verbosity
 def command(
     spec_file: str,
@@ -138,7 +138,7 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
-    """What functions in these lines are that go by no name of their own in books."""
+    """Definitions of the functions in these lines that have no standard name."""
     from phigen.symbolic.readable import UNFAMILIAR
 
     met = [said for name, said in UNFAMILIAR.items() if any(re.search(rf"\b{name}\(", line) for line in lines)]
@@ -157,9 +157,9 @@ def _forces(system: System, most: int | None) -> list[tuple[str, str]]:
     """ζ without the damping, which has a line of its own, f, and the damping."""
     from phigen.spec.model import SpecForces
 
-    given = system.spec.forces if system.spec else SpecForces()
-    listed = {f"ζ_{c}": e for c, e in given.covector.items()} | {f"f_{c}": e for c, e in given.vector.items()}
-    damping = [("λ", f"{readable_one(given.damping, most)}, and ζ has λ π∇H beside that")] if given.damping else []
+    forces = system.spec.forces if system.spec else SpecForces()
+    listed = {f"ζ_{c}": e for c, e in forces.covector.items()} | {f"f_{c}": e for c, e in forces.vector.items()}
+    damping = [("λ", f"{readable_one(forces.damping, most)}, and ζ has λ π∇H beside that")] if forces.damping else []
     return [*_named(listed, most), *damping]
 
 
@@ -227,19 +227,19 @@ def _modified(compilation: Compilation, count: int, most: int | None) -> list[tu
 
 
 def _gauged(compilation: Compilation) -> list[str]:
-    """What H stands for in S_h, if Casimirs are subtracted."""
+    """Hamiltonian that S_h belongs to, if Casimirs are subtracted."""
     gauge = compilation.gauge
-    taken = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
-    return [f"of H - {' - '.join(taken)}, which has the same flow as H"] if taken else []
+    subtracted = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
+    return [f"of H - {' - '.join(subtracted)}, which has the same flow as H"] if subtracted else []
 
 
 def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
     from phigen.notation.generating import series_formulas
 
-    found = series_formulas(compilation, most)
-    names = [*(f"{_power(i)} S_{i}" for i, _ in found.listed), *(["…"] if found.beyond else [])]
-    rows = [("S_h", " + ".join(names)), *((f"S_{i}", str(f)) for i, f in found.listed)]
-    return [*rows, ("…", found.missing)] if found.beyond else rows
+    formulas = series_formulas(compilation, most)
+    names = [*(f"{_power(i)} S_{i}" for i, _ in formulas.listed), *(["…"] if formulas.beyond else [])]
+    rows = [("S_h", " + ".join(names)), *((f"S_{i}", str(f)) for i, f in formulas.listed)]
+    return [*rows, ("…", formulas.missing)] if formulas.beyond else rows
 
 
 def _power(exponent: int) -> str:
@@ -296,7 +296,7 @@ def _described_series(compilation: Compilation) -> dict[str, object]:
     from phigen.symbolic.readable import readable
 
     realisation, plan = compilation.chart, compilation.order
-    found = series_formulas(compilation, None)
+    formulas = series_formulas(compilation, None)
     return {
         "scheme": "series",
         "birealisation": {
@@ -309,9 +309,9 @@ def _described_series(compilation: Compilation) -> dict[str, object]:
         },
         "terms": compilation.stage.terms,
         "stages": list(compilation.program.fractions),
-        "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in found.listed},
-        "series_not_written_from": found.beyond,
+        "series": {f"S_{i}": {"formula": str(f), "terms": f.size} for i, f in formulas.listed},
+        "series_not_written_from": formulas.beyond,
         "modified_hamiltonian": None
-        if found.leading is None
-        else {"power": plan.order, "coefficient": str(found.leading)},
+        if formulas.leading is None
+        else {"power": plan.order, "coefficient": str(formulas.leading)},
     }

@@ -17,32 +17,32 @@ if TYPE_CHECKING:
 SUFFIXES = (".yaml", ".yml")
 
 
-def load_one(given: str) -> Spec:
+def load_one(source: str) -> Spec:
     """The spec in a file, or the bundled one of that name if there is no such file."""
     from phigen import spec
 
-    path = found(given)
+    path = found(source)
     if Path(path).is_dir():
         raise SpecError([Diagnostic(f"{path!r} is a folder; this command takes one spec file")])
     return spec.load(path)
 
 
-def found(given: str) -> str:
+def found(source: str) -> str:
     """The path itself if there is a file or a folder with specs; else that of the bundled spec of that name.
 
     Raises `SpecError` if there is none of these.
     """
-    path = Path(given)
+    path = Path(source)
     # What `phigen build kepler -o .` makes is no reason not to find kepler any more.
-    if given in resources.bundled() and (not path.exists() or (path.is_dir() and not any(_below(given)))):
-        return str(resources.bundled()[given])
+    if source in resources.bundled() and (not path.exists() or (path.is_dir() and not any(_below(source)))):
+        return str(resources.bundled()[source])
     if path.exists():
-        return given
-    raise SpecError([resources.missing(given)])
+        return source
+    raise SpecError([resources.missing(source)])
 
 
 def as_given(spec: Spec) -> str:
-    """What names a spec on a command line: its file, or the name of a bundled one."""
+    """Name of a spec on a command line: its file, or the name of a bundled one."""
     return resources.bundled_name(spec.file) or spec.file
 
 
@@ -51,7 +51,7 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
 
     Two specs of one name are an error: their output would be in the same place.
     """
-    taken: dict[str, Spec] = {}
+    specs: dict[str, Spec] = {}
     files: list[str] = []
     for path in paths:
         with collector.collecting():
@@ -59,17 +59,17 @@ def load_all(paths: Sequence[str], collector: Collector) -> list[Spec]:
     for file in dict.fromkeys(files):
         with collector.collecting():
             spec = load_one(file)
-            if spec.name in taken:
+            if spec.name in specs:
                 hint = "names are prefixes of the generated code, and must differ"
-                message = f"the name {spec.name!r} is taken by {taken[spec.name].file}"
+                message = f"the name {spec.name!r} is taken by {specs[spec.name].file}"
                 raise SpecError([spec.diagnostic(("name",), message, hint)])
-            taken[spec.name] = spec
-    return list(taken.values())
+            specs[spec.name] = spec
+    return list(specs.values())
 
 
-def spec_files(given: str) -> Iterator[str]:
+def spec_files(source: str) -> Iterator[str]:
     """The spec file or the bundled spec itself, or the spec files below it if it is a folder, hidden ones left out."""
-    path = found(given)
+    path = found(source)
     if not Path(path).is_dir():
         yield path
         return

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @click.command("sweep")
 @one_spec
-@click.option("--sweep", "name", metavar="NAME", help="Which sweep of the spec.  [default: the first]")
+@click.option("--sweep", "name", metavar="NAME", help="The sweep of the spec to compute.  [default: the first]")
 @click.option(
     "-o", "--output", metavar="FOLDER", type=click.Path(path_type=Path), help="The Zarr store.  [default: NAME.zarr]"
 )
@@ -44,9 +44,7 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", metavar="FILE", callback=file_ending(*FIGURES), help="Draw the map: FILE.png, FILE.svg or FILE.pdf."
 )
-@click.option(
-    "--show", "shown", metavar="VARIABLE", help="The variable to draw.  [default: the first of those that are kept]"
-)
+@click.option("--show", "shown", metavar="VARIABLE", help="The variable to draw.  [default: the first of keep]")
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @verbosity
 @pass_console
@@ -65,9 +63,9 @@ def command(
     shown: str | None,
     as_json: bool,
 ) -> None:
-    """Make a run for many parameters, initial values or steps, and store the results in a Zarr store.
+    """Repeat a run for many parameters, initial values or steps, and write the results to a Zarr store.
 
-    If the store exists, only the members that it lacks are made. xarray opens it (xarray.open_zarr).
+    If the store exists, only missing members are computed. xarray.open_zarr reads the store.
     """
     from phigen.cli.energy_warning import sweep_warning
     from phigen.progress import stage
@@ -84,8 +82,8 @@ def command(
     spec = load_one(spec_file)
     sweep = _sweep_of(spec, name)
     if shown and shown not in sweep.keep:
-        kept = ", ".join(sweep.keep)
-        raise click.BadParameter(f"{shown!r} is not kept; the sweep keeps {kept}", param_hint="--show")
+        stored = ", ".join(sweep.keep)
+        raise click.BadParameter(f"{shown!r} is not stored; the sweep stores {stored}", param_hint="--show")
     setting = Setting(output or Path(f"{sweep.name}.zarr"), scheduler, workers, target, order, scheme, profile)
     with console.watching(), stage(f"sweep {sweep.name}") as progress:
 
@@ -120,8 +118,8 @@ def _sweep_of(spec: Spec, name: str | None) -> Sweep:
     if not spec.sweeps:
         hint = "add one under sweeps:, with over and keep; docs/sweeps.md has examples"
         raise SpecError([Diagnostic(f"{spec.file}: the spec has no sweeps", hint=hint)])
-    found = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()))
-    if found is None:
+    sweep = spec.sweeps.get(name) if name else next(iter(spec.sweeps.values()))
+    if sweep is None:
         known = ", ".join(spec.sweeps)
         raise click.BadParameter(f"there is no sweep {name!r}; the spec has {known}", param_hint="--sweep")
-    return found
+    return sweep

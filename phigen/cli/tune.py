@@ -32,16 +32,21 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @click.option(
     "--measure", type=click.Choice(["energy", "orbit"]), default="energy", show_default=True,
-    help="Error of the energy on the way, or distance from a reference solution.",
+    help="Error of the energy, or distance from a reference solution.",
 )  # fmt: skip
 @click.option(
-    "--horizon", type=float, metavar="T", help="How long a run is, with a monitor in τ.  [default: as in the spec]"
+    "--horizon",
+    type=float,
+    metavar="T",
+    help="Length of the run in time, or in τ with a monitor.  [default: as in the spec]",
 )
 @settings_option
-@click.option("--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="How long to search.")
+@click.option(
+    "--budget", type=float, default=60.0, show_default=True, metavar="SECONDS", help="Time limit of the search."
+)
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw error against time: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="For machines: everything that was measured.")
+@click.option("--json", "as_json", is_flag=True, help="Print all measurements as JSON.")
 @verbosity
 @pass_console
 def command(
@@ -57,11 +62,11 @@ def command(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy, of lattices too.
+    """Find the cheapest bi-realisation, order, gauge, composition and step for an accuracy, for lattices too.
 
-    Builds candidates, compiles them as C (without a compiler: as NumPy), measures error and time of each over a piece
-    of a run of the spec, confirms the best over the whole horizon if that is affordable, and prints the lines to paste
-    into the spec. Classical methods stand beside them. Exit code 5 if nothing reaches the accuracy.
+    phigen builds candidates as C (without a compiler: as NumPy), measures error and time of each over a part of a run,
+    confirms the best over the whole horizon if the time limit allows, and prints lines to paste into the spec.
+    Classical methods are measured for comparison. Exit code 5 if nothing reaches the accuracy.
     """
     from phigen.api import chosen_target
     from phigen.compiler import compile_proved
@@ -82,25 +87,25 @@ def command(
         raise SpecError([spec.diagnostic(("time",), message, "phigen verify and phigen run measure what is chosen")])
     if spec.forces and measure == "energy":
         place = ("damping",) if ("damping",) in spec.locations else ("forces",)
-        message = "forces change the energy, whose error is none of the method"
+        message = "forces change the energy, so its change is not an error of the method"
         raise SpecError([spec.diagnostic(place, message, "--measure orbit compares with a reference solution")])
     compilation = compile_proved(spec.for_running(profile=profile))
     chosen_target("auto", console.note)
     run, problem = initial_value_problem(console, compilation, name, settings, horizon, measure)
-    found = tune(compilation, problem, measure, accuracy, budget, console.note)
+    tuning = tune(compilation, problem, measure, accuracy, budget, console.note)
     if as_json:
-        out_json(described(found, spec, run))
-    elif found.winner:
-        print_tuning(found, spec, run)
-    elif found.monitors:
-        print_monitors(found.monitors, found, run)
+        out_json(described(tuning, spec, run))
+    elif tuning.winner:
+        print_tuning(tuning, spec, run)
+    elif tuning.monitors:
+        print_monitors(tuning.monitors, tuning, run)
     if plot:
         from phigen.drawing import figures
 
-        figures.save(figures.tuning_figure(found, f"{spec.name}, run {run.name}"), str(plot))
+        figures.save(figures.tuning_figure(tuning, f"{spec.name}, run {run.name}"), str(plot))
         console.note(f"wrote {plot}")
-    if not found.winner:
-        raise CheckError(unreached(found))
+    if not tuning.winner:
+        raise CheckError(unreached(tuning))
 
 
 def _expect_positive(value: float | None, option: str) -> None:
@@ -126,7 +131,7 @@ def initial_value_problem(
 
 
 def problem_of(compilation: Compilation, experiment: Experiment, horizon: float | None, console: Console) -> Problem:
-    """The initial value problem of an experiment, as long as its run is unless that is given; with a monitor in τ."""
+    """The initial value problem of an experiment, over its run by default; with a monitor in τ."""
     import numpy as np
 
     from phigen.cli.endings import ended, length
@@ -151,16 +156,16 @@ def _of_lattice(
     changed = {s.partition("=")[0].strip() for s in settings}
     values = parameters_of(compilation.spec, start_of(compilation.spec, run), settings)
     chosen = {name: value for name, value in values.items() if name in changed}
-    found = lattice_problem(compilation, run, chosen, *_times(run, horizon))
-    if found.sizes != found.whole:
-        few, many = ("×".join(map(str, sizes)) for sizes in (found.sizes, found.whole))
+    problem = lattice_problem(compilation, run, chosen, *_times(run, horizon))
+    if problem.sizes != problem.whole:
+        few, many = ("×".join(map(str, sizes)) for sizes in (problem.sizes, problem.whole))
         console.note(f"measured on {few} of the {many} sites: errors are relative, and times in proportion")
-    if measure == "orbit" and len(found.start) > MOST_COMPARED:
-        message = f"orbits are compared up to {MOST_COMPARED} numbers, and this run has {len(found.start)}"
+    if measure == "orbit" and len(problem.start) > MOST_COMPARED:
+        message = f"orbits are compared up to {MOST_COMPARED} numbers, and this run has {len(problem.start)}"
         raise SpecError(
             [compilation.spec.diagnostic(("runs", run.name), message, "--measure energy, or smaller sizes")]
         )
-    return found
+    return problem
 
 
 def _times(run: Run, horizon: float | None) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""What ``phigen tune`` tells: a table and the lines to paste, or plain data."""
+"""Summary of ``phigen tune``: a table and the lines to paste, or plain data."""
 
 from __future__ import annotations
 
@@ -26,44 +26,47 @@ _SHOWN, _GAINING, _LONGEST = 5, 2.0, 60
 _ROWS = 1000
 
 
-def print_tuning(found: Tuning, spec: Spec, run: Run) -> None:
+def print_tuning(tuning: Tuning, spec: Spec, run: Run) -> None:
     """The table, what it rests on, and the lines to paste."""
-    what = "energy error" if found.measure == "energy" else "error of the orbit"
-    bound = f"{what} at most {found.accuracy:g} up to {found.clock} = {found.horizon:.9g}"
+    what = "energy error" if tuning.measure == "energy" else "error of the orbit"
+    bound = f"{what} at most {tuning.accuracy:g} up to {tuning.clock} = {tuning.horizon:.9g}"
     out(heading(f"{spec.name}, run {run.name}") + f": {bound}\n")
     rows = [["", "order", "gauge", "scheme", "step", "error", "ns/step", "run, ms", "ratio"]]
-    rows += [_row(f, label, found) for label, f in listed(found)]
+    rows += [_row(f, label, tuning) for label, f in listed(tuning)]
     for line in table(rows, right=[1, 4, 5, 6, 7, 8]):
         out(f"  {line}")
     out("")
-    for remark in remarks(found):
+    for remark in remarks(tuning):
         out(f"  {remark}")
-    if others := _other_rows(found):
+    if others := _other_rows(tuning):
         out("")
         for line in table([["by the scans, for", "error", "step", "run, ms"], *others], right=[1, 2, 3]):
             out(f"  {line}")
-    assert found.winner is not None
+    assert tuning.winner is not None
     out("\nTo paste into the spec, instead of lines with the same keys" + (" and of terms:\n" if spec.terms else ":\n"))
-    out("\n".join(lines_of(found.winner)))
+    out("\n".join(lines_of(tuning.winner)))
     out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
-    out("\n".join(f"    {line}" for line in run_lines_of(found, run)))
-    if found.monitors:
-        print_monitors(found.monitors, found, run)
+    out("\n".join(f"    {line}" for line in run_lines_of(tuning, run)))
+    if tuning.monitors:
+        print_monitors(tuning.monitors, tuning, run)
 
 
-def print_monitors(monitors: Monitors, found: Tuning, run: Run) -> None:
-    """What monitors would gain, and the lines that ask for the best."""
+def print_monitors(monitors: Monitors, tuning: Tuning, run: Run) -> None:
+    """Print the gain of each monitor, and the lines that select the best."""
     from phigen.tuning.search import rounded_down
 
     gaining = [t for t in monitors.found if monitors.gain(t) > _GAINING]
-    out(f"\nThe motion is fast at times. Steps up to t = {monitors.span:.6g}, for the same error of the energy:\n")
+    out(
+        f"\nThe motion is much faster at some times than at others. Steps up to t = {monitors.span:.6g} "
+        "with the same energy error:\n"
+    )
     rows = [["monitor", "scheme", "steps", "fewer", "run, ms"]]
     for trial in [*monitors.found[:_SHOWN], monitors.plain]:
         gain = monitors.gain(trial)
-        told = [f"{trial.steps:.0f}", f"{gain:.3g} times", f"{1e3 * trial.seconds:.3g}"]
-        told = told if math.isfinite(trial.steps) else ["more than can be made", "", ""]
-        told[1] = told[1] * (trial is not monitors.plain and math.isfinite(gain))
-        rows.append([_cut(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *told])
+        cells = [f"{trial.steps:.0f}", f"{gain:.3g} times", f"{1e3 * trial.seconds:.3g}"]
+        cells = cells if math.isfinite(trial.steps) else ["more than can be made", "", ""]
+        cells[1] = cells[1] * (trial is not monitors.plain and math.isfinite(gain))
+        rows.append([_cut(trial.setting.monitor or "none"), f"{trial.label}, order {trial.order}", *cells])
     for line in table(rows, right=[2, 3, 4]):
         out(f"  {line}")
     out("\n  With a monitor steps are equal in τ, and still Poisson maps.")
@@ -72,13 +75,13 @@ def print_monitors(monitors: Monitors, found: Tuning, run: Run) -> None:
         out(f"  Not measured: {'; '.join(names)}: {reason}.")
     if gaining:
         best = gaining[0]
-        out("\nTo paste into the spec" + ", in place of what is above" * bool(found.winner) + ":\n")
+        out("\nTo paste into the spec" + ", in place of what is above" * bool(tuning.winner) + ":\n")
         out("\n".join(monitored_lines(best)))
         out(f"\nand into its run {run.name}, instead of step, stride, every, and steps, duration or until:\n")
-        step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(found.horizon, run.step)
+        step, end = math.copysign(rounded_down(best.step), run.step), math.copysign(tuning.horizon, run.step)
         out(f"    step: {step!r}\n    until: {end!r}")
     else:
-        out("  None of them gains what a step with it costs.")
+        out("  No monitor saves as much as its steps cost.")
 
 
 def _cut(text: str) -> str:
@@ -90,29 +93,29 @@ def monitored_lines(trial: Trial) -> list[str]:
     return replace(trial.setting, order=trial.order).lines()
 
 
-def listed(found: Tuning) -> Iterator[tuple[str, Finalist]]:
+def listed(tuning: Tuning) -> Iterator[tuple[str, Finalist]]:
     """All rows of the table with their labels."""
-    for finalist in found.finalists:
-        yield finalist.curve.label + (", the spec's" if finalist is found.own else ""), finalist
-    for peer in found.peers:
+    for finalist in tuning.finalists:
+        yield finalist.curve.label + (", the spec's" if finalist is tuning.own else ""), finalist
+    for peer in tuning.peers:
         yield peer.curve.label, peer
-    if found.present:
-        yield "the spec and its run as they are", found.present
+    if tuning.present:
+        yield "the spec and its run as they are", tuning.present
 
 
-def _row(finalist: Finalist, label: str, found: Tuning) -> list[str]:
-    curve, point, best = finalist.curve, finalist.point, found.winner
+def _row(finalist: Finalist, label: str, tuning: Tuning) -> list[str]:
+    curve, point, best = finalist.curve, finalist.point, tuning.winner
     assert best is not None
     cells = [label, str(curve.order), gauge_of(curve), scheme_of(curve), f"{point.step:.6g}"]
-    error = f"{point.error:.1e}" if is_measured(finalist, found) else f"~{point.error:.1e}"
+    error = f"{point.error:.1e}" if is_measured(finalist, tuning) else f"~{point.error:.1e}"
     ratio = finalist.cost / best.cost
-    times = [f"{1e9 * finalist.cost * point.step:.0f}", f"{1e3 * finalist.cost * found.horizon:.3g}"]
+    times = [f"{1e9 * finalist.cost * point.step:.0f}", f"{1e3 * finalist.cost * tuning.horizon:.3g}"]
     return [*cells, error, *times, f"{ratio:.2f}" if ratio < 100 else f"{ratio:.0f}"]
 
 
-def is_measured(finalist: Finalist, found: Tuning) -> bool:
+def is_measured(finalist: Finalist, tuning: Tuning) -> bool:
     """Whether the error was measured over the horizon, and not extrapolated."""
-    return finalist.point.time > min(0.99 * found.horizon, found.horizon - finalist.point.step)
+    return finalist.point.time > min(0.99 * tuning.horizon, tuning.horizon - finalist.point.step)
 
 
 def gauge_of(curve: Curve) -> str:
@@ -123,7 +126,7 @@ def gauge_of(curve: Curve) -> str:
 
 
 def scheme_of(curve: Curve) -> str:
-    """How the order is reached."""
+    """Name of the construction that reaches the order."""
     if curve.setting is None:
         return "explicit"
     composition = curve.composition or curve.setting.composition
@@ -132,59 +135,59 @@ def scheme_of(curve: Curve) -> str:
     return f"{composition}, {curve.stages} stages" if composition not in ("none", "auto") else "direct"
 
 
-def remarks(found: Tuning) -> Iterator[str]:
-    """What the numbers rest on, and what they do not say."""
+def remarks(tuning: Tuning) -> Iterator[str]:
+    """Remarks on how the numbers were obtained, and on their limits."""
     from phigen.study.conservation import ENERGY, stated
 
-    best = found.winner
+    best = tuning.winner
     assert best is not None
-    over, whole = f"{found.clock} = {best.point.time:.4g}", f"{found.clock} = {found.horizon:.6g}"
-    if is_measured(best, found):
-        yield "Errors were measured up to there" + _extrapolated(found)
-    elif found.measure == "energy" and not best.curve.bounded:
-        yield f"Errors were measured up to {over}, and extrapolated (~) as they were seen to grow."
-    elif found.measure == "energy":
+    over, whole = f"{tuning.clock} = {best.point.time:.4g}", f"{tuning.clock} = {tuning.horizon:.6g}"
+    if is_measured(best, tuning):
+        yield "Errors were measured up to there" + _extrapolated(tuning)
+    elif tuning.measure == "energy" and not best.curve.bounded:
+        yield f"Errors were measured up to {over}, and extrapolated (~) by their observed growth."
+    elif tuning.measure == "energy":
         yield f"Errors were measured up to {over}. Beyond, phigen's stay bounded but for rounding (~)."
     else:
         yield f"Errors were measured up to {over}; phigen's grow linearly, and so does ~ up to {whole}."
-    if found.measure == "energy":
-        yield stated({ENERGY: found.unit})
-    if best.point.error * _SLACK < found.accuracy and best.point.step > 0.9 * best.curve.largest:
-        yield "The accuracy would allow a larger step, but none can be made, or it would not show the motion."
-    if found.orbit_error is not None:
+    if tuning.measure == "energy":
+        yield stated({ENERGY: tuning.unit})
+    if best.point.error * _SLACK < tuning.accuracy and best.point.step > 0.9 * best.curve.largest:
+        yield "The accuracy would allow a larger step, but larger steps fail or do not resolve the motion."
+    if tuning.orbit_error is not None:
         yield (
-            f"The orbit itself is off by {found.orbit_error:.1e} of its size at most up to {found.clock} = "
-            f"{found.piece:.4g}: --measure orbit bounds that."
+            f"The orbit itself is off by {tuning.orbit_error:.1e} of its size at most up to {tuning.clock} = "
+            f"{tuning.piece:.4g}: --measure orbit bounds that."
         )
-    if found.sizes:
-        sites = "×".join(map(str, found.sizes))
+    if tuning.sizes:
+        sites = "×".join(map(str, tuning.sizes))
         yield f"Measured on {sites} sites. Classical methods are in NumPy, with the vector field of the solver."
-    for label, peer in ((p.curve.label, p) for p in found.peers if p.cost < best.cost):
+    for label, peer in ((p.curve.label, p) for p in tuning.peers if p.cost < best.cost):
         share = peer.cost / best.cost
-        yield f"{label} is cheaper: {share:.2g} of the time. It keeps neither Casimirs nor the geometry of phase space."
-    for reason in dict.fromkeys(found.refused.values()):
-        settings = [s.described() for s, why in found.refused.items() if why == reason]
+        yield f"{label} is cheaper: {share:.2g} of the time. It conserves neither Casimirs nor the Poisson structure."
+    for reason in dict.fromkeys(tuning.refused.values()):
+        settings = [s.described() for s, why in tuning.refused.items() if why == reason]
         yield f"Not measured: {'; '.join(settings)}: {reason}."
-    if not found.finished:
-        yield "The budget ended before all promising candidates were tried; --budget takes more seconds."
+    if not tuning.finished:
+        yield "The time budget ended before all promising candidates were tried; a larger --budget tries more."
 
 
-def _extrapolated(found: Tuning) -> str:
-    rest = [label for label, f in listed(found) if not is_measured(f, found)]
+def _extrapolated(tuning: Tuning) -> str:
+    rest = [label for label, f in listed(tuning) if not is_measured(f, tuning)]
     return f"; those with ~ are extrapolated ({', '.join(rest)})." if rest else "."
 
 
-def _other_rows(found: Tuning) -> list[list[str]]:
+def _other_rows(tuning: Tuning) -> list[list[str]]:
     """The cheapest candidate at other accuracies, those that the scans reached."""
     from phigen.tuning.search import cheapest_step
 
     rows = []
-    for accuracy in (found.accuracy * factor for factor in _OTHERS):
-        curves = [c for c in found.curves if c.setting and any(p.error <= accuracy for p in c.points)]
+    for accuracy in (tuning.accuracy * factor for factor in _OTHERS):
+        curves = [c for c in tuning.curves if c.setting and any(p.error <= accuracy for p in c.points)]
         curve = min(curves, key=lambda c: c.cost(accuracy), default=None)
         step, cost = cheapest_step(curve.points, accuracy, curve.order) if curve else (0.0, math.inf)
         if curve and math.isfinite(cost):
-            rows.append([curve.title, f"{accuracy:.0e}", f"{step:.2g}", f"{1e-6 * cost * found.horizon:.2g}"])
+            rows.append([curve.title, f"{accuracy:.0e}", f"{step:.2g}", f"{1e-6 * cost * tuning.horizon:.2g}"])
     return rows
 
 
@@ -195,58 +198,58 @@ def lines_of(finalist: Finalist) -> list[str]:
     return replace(setting, order=finalist.curve.order).lines()
 
 
-def run_lines_of(found: Tuning, run: Run) -> list[str]:
+def run_lines_of(tuning: Tuning, run: Run) -> list[str]:
     """The lines of the run, up to the horizon, and a step beyond it where a ``stop`` is to be met there.
 
     Long enough strides let a solver take its steps in blocks.
     """
-    assert found.winner is not None
-    step = found.winner.point.step
-    steps = max(1, round(found.horizon / step)) + (run.stop is not None)
-    rows = max(1, run.steps // run.stride) if found.sizes else _ROWS  # states of lattices are large
+    assert tuning.winner is not None
+    step = tuning.winner.point.step
+    steps = max(1, round(tuning.horizon / step)) + (run.stop is not None)
+    rows = max(1, run.steps // run.stride) if tuning.sizes else _ROWS  # states of lattices are large
     return [f"step: {math.copysign(step, run.step)!r}", f"steps: {steps}", f"stride: {max(1, steps // rows)}"]
 
 
-def unreached(found: Tuning) -> str:
+def unreached(tuning: Tuning) -> str:
     """Why nothing reaches the accuracy, and how near to it one came."""
     from phigen.tuning.search import at_floor
 
-    curve, point = found.closest
-    told = curve.title
-    if point.rounding > found.accuracy or any(at_floor(c.points) for c in found.curves if c.setting):
+    curve, point = tuning.closest
+    title = curve.title
+    if point.rounding > tuning.accuracy or any(at_floor(c.points) for c in tuning.curves if c.setting):
         why = "smaller steps do not help: what is left is rounding"
         hint = "ask for less accuracy" + (" or a shorter --horizon" if point.error > 2 * point.measured else "")
     else:
         why = "smaller steps would take longer than the budget allows"
         hint = "a larger --budget, or less accuracy"
     return (
-        f"no setting reaches {found.accuracy:g} up to {found.clock} = {found.horizon:.6g}: the smallest error is "
-        f"{point.error:.1e} ({told}, step {point.step:.3g}); {why}\n  hint: {hint}"
+        f"no setting reaches {tuning.accuracy:g} up to {tuning.clock} = {tuning.horizon:.6g}: the smallest error is "
+        f"{point.error:.1e} ({title}, step {point.step:.3g}); {why}\n  hint: {hint}"
     )
 
 
-def described(found: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
+def described(tuning: Tuning, spec: Spec, run: Run) -> dict[str, Any]:
     """Everything that was measured, as plain data."""
     data: dict[str, Any] = {
         "name": spec.name,
         "run": run.name,
-        "measure": found.measure,
-        "accuracy": found.accuracy,
-        "unit": asdict(found.unit),
-        "horizon": found.horizon,
-        **({"sizes": found.sizes} if found.sizes else {}),
-        "scanned": found.piece,
-        "finished": found.finished,
-        "orbit_error": found.orbit_error,
-        "winner": _finalist(found.winner) if found.winner else None,
-        "lines": lines_of(found.winner) if found.winner else [],
-        "run_lines": run_lines_of(found, run) if found.winner else [],
-        "finalists": [_finalist(f) for f in found.finalists],
-        "classical": [_finalist(f) for f in found.peers],
-        "present": _finalist(found.present) if found.present else None,
-        "curves": [_curve(c) for c in found.curves],
-        "not_measured": {s.described(): why for s, why in found.refused.items()},
-        "monitors": _monitors(found.monitors) if found.monitors else None,
+        "measure": tuning.measure,
+        "accuracy": tuning.accuracy,
+        "unit": asdict(tuning.unit),
+        "horizon": tuning.horizon,
+        **({"sizes": tuning.sizes} if tuning.sizes else {}),
+        "scanned": tuning.piece,
+        "finished": tuning.finished,
+        "orbit_error": tuning.orbit_error,
+        "winner": _finalist(tuning.winner) if tuning.winner else None,
+        "lines": lines_of(tuning.winner) if tuning.winner else [],
+        "run_lines": run_lines_of(tuning, run) if tuning.winner else [],
+        "finalists": [_finalist(f) for f in tuning.finalists],
+        "classical": [_finalist(f) for f in tuning.peers],
+        "present": _finalist(tuning.present) if tuning.present else None,
+        "curves": [_curve(c) for c in tuning.curves],
+        "not_measured": {s.described(): why for s, why in tuning.refused.items()},
+        "monitors": _monitors(tuning.monitors) if tuning.monitors else None,
     }
     cleaned: dict[str, Any] = finite(data)
     return cleaned

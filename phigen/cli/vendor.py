@@ -44,8 +44,8 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Made:
-    """What belongs in the folder for one order."""
+class VendoredSolver:
+    """Files that belong in the folder for one order."""
 
     order: Order
     compilation: Compilation
@@ -62,9 +62,9 @@ class Made:
 @click.command("vendor")
 @click.argument("paths", metavar="[SPEC...] DEST", nargs=-1, required=True, type=click.Path(), shell_complete=specs)
 @output_options
-@click.option("--cmake", is_flag=True, help="Write a CMakeLists.txt for the folder, too.")
-@click.option("--meson", is_flag=True, help="Write a meson.build for the folder, too.")
-@click.option("--python", is_flag=True, help="Write an __init__.py, which makes the folder a package, too.")
+@click.option("--cmake", is_flag=True, help="Also write a CMakeLists.txt for the folder.")
+@click.option("--meson", is_flag=True, help="Also write a meson.build for the folder.")
+@click.option("--python", is_flag=True, help="Also write an __init__.py, which makes the folder a package.")
 @click.option(
     "--check", "checking", is_flag=True, help="Write nothing; fail if a file differs from what would be written."
 )
@@ -92,11 +92,11 @@ def command(
 ) -> None:
     """Copy solvers into the folder DEST of another project, and check them there later.
 
-    The files NAME.h, NAME.c, NAME.py are those of `phigen build`. DEST/phigen-vendor.json tells from which spec,
-    options and version they were made. Without SPEC, the solvers that are in DEST already are made again.
+    The files NAME.h, NAME.c, NAME.py are those of `phigen build`. DEST/phigen-vendor.json records the spec,
+    options and version of each. Without SPEC, the solvers in DEST are generated again.
 
-    With --check: whether they are unmodified and what phigen makes of their specs now; without SPEC, all of DEST.
-    Where a spec is not there any more, whether it has changed cannot be told, and that is said.
+    --check tests that the files are unmodified and agree with their specs and this version; without SPEC, all files of
+    DEST. If a spec is missing, phigen says that its changes cannot be checked.
     """
     *spec_files, last = paths
     folder = Path(last)
@@ -117,27 +117,27 @@ def command(
         raise click.UsageError("options that change what is generated need the SPEC; without it, the manifest decides")
     (entries, known), collector = manifest.read(folder), Collector()
     asked = {"cmake": cmake, "meson": meson, "python": python}
-    wanted = [system for system in FILES if asked[system] or system in known]
+    build_systems = [system for system in FILES if asked[system] or system in known]
     orders = _from_specs(spec_files, folder, options, entries, checking, collector)
     if not spec_files:
         orders = _from_manifest(folder, entries, collector)
-    made = [m for m in (_made(order, collector) for order in orders) if m]
+    vendored = [m for m in (_made(order, collector) for order in orders) if m]
     if checking:
-        problems = [p for m in made for p in _problems(folder, entries, m, spec_files)]
-        problems += [] if spec_files else [*_extra(folder, entries), *_wrong_builds(folder, entries, wanted)]
+        problems = [p for m in vendored for p in _problems(folder, entries, m, spec_files)]
+        problems += [] if spec_files else [*_extra(folder, entries), *_wrong_builds(folder, entries, build_systems)]
         with collector.collecting():
             _judge(folder, problems)
         collector.finish()
-        _report_check(console, folder, made)
+        _report_check(console, folder, vendored)
         return
     collector.finish()
-    _write(console, folder, entries, made, wanted, force)
+    _write(console, folder, entries, vendored, build_systems, force)
 
 
 def _expect_folder(folder: Path, spec_files: Sequence[str], checking: bool) -> None:
     if folder.is_file() or (folder.suffix in SUFFIXES and not folder.is_dir()):
         words = shlex.join(["phigen", "vendor", *spec_files, str(folder), "DEST"])
-        raise click.UsageError(f"{folder} is no folder; the last argument is where the solvers go: {words}")
+        raise click.UsageError(f"{folder} is not a folder; the last argument is the folder for the solvers: {words}")
     if (folder / manifest.FILE).is_file():
         return
     message = f"{folder} holds no solvers that were vendored: there is no {folder / manifest.FILE}"
@@ -195,11 +195,11 @@ def _path_of_spec(folder: Path, entry: Entry) -> Path | None:
     return path if path.is_file() else None
 
 
-def _made(order: Order, collector: Collector) -> Made | None:
+def _made(order: Order, collector: Collector) -> VendoredSolver | None:
     options = order.options
     with collector.collecting():
         compilation = options.compiled(order.spec)
-        return Made(order, compilation, files_of(compilation, options))
+        return VendoredSolver(order, compilation, files_of(compilation, options))
     return None
 
 
@@ -210,20 +210,20 @@ def _write(
     console: Console,
     folder: Path,
     entries: dict[str, Entry],
-    made: Sequence[Made],
+    vendored: Sequence[VendoredSolver],
     builds: Sequence[str],
     force: bool,
 ) -> None:
     from phigen.cli.outputs import Change, apply, read
 
-    planned: list[tuple[Made, list[Change]]] = []
-    for m in made:
+    planned: list[tuple[VendoredSolver, list[Change]]] = []
+    for m in vendored:
         known = entries.get(m.order.spec.name)
         changes = [Change(folder / file, read(folder / file), text) for file, text in m.files.items()]
         left = [folder / file for file in (known.files if known else ()) if file not in m.files]
         changes += [Change(path, before, None) for path in left if (before := read(path)) is not None]
         planned.append((m, changes))
-    listed = {**entries, **{m.order.spec.name: m.entry for m in made}}
+    listed = {**entries, **{m.order.spec.name: m.entry for m in vendored}}
     texts = build_files(builds, {name: entry.files for name, entry in listed.items()})
     for system in sources_lack(builds, {name: entry.files for name, entry in listed.items()}):
         file, suffix = FILES[system]
@@ -253,15 +253,15 @@ def _obstacle(change: Change, known: Entry | None) -> str:
     return f"{change.path} was edited by hand after phigen generated it" if edited else ""
 
 
-def _done(folder: Path, made: Made, changes: Sequence[Change]) -> str:
+def _done(folder: Path, vendored: VendoredSolver, changes: Sequence[Change]) -> str:
     written = [c.path.name for c in changes if c.state in ("missing", "different")]
     removed = [c.path.name for c in changes if c.state == "stale"]
     said = [f"wrote {', '.join(written)}"] if written else []
     said += [f"removed {', '.join(removed)}"] if removed else []
-    said = said or [f"{made.order.spec.name} unchanged"]
-    if not made.order.found:
-        said.append("from the manifest's copy of the spec, whose file is not there")
-    return f"{folder}: {'; '.join(said)} (order {made.compilation.program.order}, {made.compilation.label})"
+    said = said or [f"{vendored.order.spec.name} unchanged"]
+    if not vendored.order.found:
+        said.append("from the manifest's copy of the spec, whose file was not found")
+    return f"{folder}: {'; '.join(said)} (order {vendored.compilation.program.order}, {vendored.compilation.label})"
 
 
 # -- checking
@@ -276,22 +276,24 @@ class Problem:
     remedy: str
 
 
-def _problems(folder: Path, entries: Mapping[str, Entry], made: Made, spec_files: Sequence[str]) -> Iterator[Problem]:
-    """What is wrong with the files of one solver."""
-    order = made.order
+def _problems(
+    folder: Path, entries: Mapping[str, Entry], vendored: VendoredSolver, spec_files: Sequence[str]
+) -> Iterator[Problem]:
+    """Problems with the files of one solver."""
+    order = vendored.order
     words = [as_given(order.spec), str(folder), *order.options.words] if spec_files else [str(folder)]
     known = entries.get(order.spec.name)
-    for file in sorted({*made.files, *(known.files if known else ())}):
+    for file in sorted({*vendored.files, *(known.files if known else ())}):
         path = folder / file
-        what, edited = _complaint(path, known, made)
+        what, edited = _complaint(path, known, vendored)
         if what:
             yield Problem(path, what, shlex.join(["phigen", "vendor", *words, *(["--force"] if edited else [])]))
 
 
-def _complaint(path: Path, known: Entry | None, made: Made) -> tuple[str, bool]:
-    """What is wrong with a file, empty if nothing; and whether it holds work of somebody's own."""
+def _complaint(path: Path, known: Entry | None, vendored: VendoredSolver) -> tuple[str, bool]:
+    """Problem with a file, empty if there is none; and whether the file was edited by hand."""
     content = path.read_bytes() if path.is_file() else None
-    stated, expected = known.files.get(path.name) if known else None, made.files.get(path.name)
+    stated, expected = known.files.get(path.name) if known else None, vendored.files.get(path.name)
     if content is None:
         return ("missing", False) if expected is not None else ("missing, and its spec no longer gives it", False)
     if stated is None:
@@ -302,17 +304,17 @@ def _complaint(path: Path, known: Entry | None, made: Made) -> tuple[str, bool]:
         return "edited by hand", True
     if expected is None:
         return "its spec no longer gives it", False
-    return ("" if content == expected.encode() else f"stale: {_cause(known, made)}"), False
+    return ("" if content == expected.encode() else f"stale: {_cause(known, vendored)}"), False
 
 
-def _cause(known: Entry | None, made: Made) -> str:
+def _cause(known: Entry | None, vendored: VendoredSolver) -> str:
     """Why phigen makes something else now."""
     causes = []
-    if known and known.spec_text != made.order.spec.source:
+    if known and known.spec_text != vendored.order.spec.source:
         causes.append("its spec has changed")
     if known and known.version != __version__:
         causes.append(f"it was generated by phigen {known.version}, and this is {__version__}")
-    if known and known.options != made.order.options:
+    if known and known.options != vendored.order.options:
         causes.append("it was generated with other options")
     return "; ".join(causes) or "phigen makes something else of its spec"
 
@@ -347,18 +349,18 @@ def _judge(folder: Path, problems: Sequence[Problem]) -> None:
     lines = [f"{p.path}: {p.what}" for p in problems]
     remedies = list(dict.fromkeys(p.remedy for p in problems))
     remedies = [r for r in remedies if f"{r} --force" not in remedies]
-    head = f"{counted(len(problems), 'vendored file')} not as it should be in {folder}"
+    head = f"{counted(len(problems), 'vendored file')} in {folder} modified, missing or stale"
     raise CheckError("\n".join([head, *indented(lines), *mend(remedies)]))
 
 
-def _report_check(console: Console, folder: Path, made: Sequence[Made]) -> None:
-    gone = [m.order for m in made if not m.order.found]
+def _report_check(console: Console, folder: Path, vendored: Sequence[VendoredSolver]) -> None:
+    gone = [m.order for m in vendored if not m.order.found]
     for order in gone:
         where = os.path.normpath(folder / order.spec_file) if order.spec_file else "far from here"
         console.note(
-            f"{order.spec.name}: its spec ({where}) is not there: whether that has changed cannot be checked; "
-            "the files are what phigen makes of its copy in the manifest"
+            f"{order.spec.name}: its spec ({where}) was not found, so its changes cannot be checked; "
+            "the files agree with the copy of the spec in the manifest"
         )
-    files = counted(sum(len(m.files) for m in made), "file")
+    files = counted(sum(len(m.files) for m in vendored), "file")
     verdict = "unmodified" + ("" if gone else " and current")
-    console.note(f"{folder}: {counted(len(made), 'solver')}, {files}: {verdict}")
+    console.note(f"{folder}: {counted(len(vendored), 'solver')}, {files}: {verdict}")

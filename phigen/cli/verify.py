@@ -43,10 +43,10 @@ _NOT_FINITE = {math.inf: "∞", -math.inf: "-∞"}
 @profile_option
 @sizes_option
 @click.option("--adjoint", is_flag=True, help="Measure gradients, whether the spec asks for them or not.")
-@click.option("--quick", is_flag=True, help="Fewer steps.")
+@click.option("--quick", is_flag=True, help="Use fewer steps.")
 @click.option("--plot", metavar="FILE", callback=file_ending(*FIGURES),
               help="Draw the constancy of one modified Hamiltonian: FILE.png, FILE.svg or FILE.pdf.")  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print JSON: one object for each spec.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON, one object for each spec.")
 @verbosity
 @pass_console
 def command(
@@ -62,25 +62,26 @@ def command(
     plot: Path | None,
     as_json: bool,
 ) -> None:
-    """Build every target of specs, in the profile fast or in that of --profile, and measure what the solvers promise.
+    """Build every target of specs and measure whether the solvers keep their promises.
 
-    The observed order, drift of Casimirs and energy (the largest error, and that of the last tenth of the run over
-    that of the first), the Poisson identity with the exact tangent map, reversibility, agreement of the targets, and
-    the largest step that can be made. Classical methods stand beside it. Exit code 5 if something falls short.
+    Measured are the observed order, the errors of Casimirs and energy and their drift (the largest error in the last
+    tenth of the run over that in the first), the Poisson identity with the exact tangent map, reversibility, agreement
+    of the targets, and the largest step that converges. Classical methods are measured for comparison. Exit code 5 if
+    a measurement misses its bound.
     """
     from phigen.compiler import compile_proved
 
-    collector, found = Collector(), []
+    collector, verifications = Collector(), []
     specs = load_all(spec_files, collector)
     if plot:
         from phigen.drawing.palette import require_matplotlib
 
         require_matplotlib()
         if len(specs) > 1:
-            raise click.BadParameter(f"one spec is drawn, not {len(specs)}", param_hint="--plot")
-    for given in specs:
+            raise click.BadParameter(f"--plot takes one spec, not {len(specs)}", param_hint="--plot")
+    for source in specs:
         with collector.collecting():
-            spec = resized(given, name, sizes)
+            spec = resized(source, name, sizes)
             if plot:
                 expect_system(spec)
             compilation = compile_proved(
@@ -88,7 +89,7 @@ def command(
             )
             judged = verified_lattice if spec.lattice else verified
             verification = judged(compilation, name, quick, console)
-            found.append(verification)
+            verifications.append(verification)
             if not as_json:
                 print_table(verification)
             if plot:
@@ -96,7 +97,7 @@ def command(
             if verification.failures:
                 collector.errors.append(fallen_short(verification))
     if as_json:
-        out_json([described(v) for v in found])
+        out_json([described(v) for v in verifications])
     collector.finish()
 
 
@@ -113,7 +114,7 @@ def _draw(path: Path, compilation: Compilation, experiment: Experiment, console:
 
 
 def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
-    """How constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
+    """Measure how constant the modified Hamiltonian is on a run. Raises `NotOfferedError` and `StepError`."""
     import numpy as np
 
     from phigen.api import chosen_target, solver_of
@@ -123,9 +124,9 @@ def constancy_of(compilation: Compilation, experiment: Experiment) -> Constancy:
 
     parameters, x0 = experiment.parameters, np.array(experiment.initial)
     gauge = gauge_at(compilation, x0, parameters)
-    found = backward.modified(compilation, parameters, gauge)
+    modified = backward.modified(compilation, parameters, gauge)
     method = of_solver(solver_of(compilation, chosen_target("auto")), parameters, gauge)
-    return backward.constancy(found, method, x0, experiment.h)
+    return backward.constancy(modified, method, x0, experiment.h)
 
 
 def verified(

@@ -1,4 +1,4 @@
-"""How constant the modified Hamiltonian is: along a trajectory, and against the step size."""
+"""Changes of the modified Hamiltonian: along a trajectory, and against the step size."""
 
 from __future__ import annotations
 
@@ -12,35 +12,35 @@ from phigen.drawing.palette import MARK, SERIES
 from phigen.study.backward import Constancy
 
 
-def draw_along(axes: Any, found: Constancy) -> None:
+def draw_along(axes: Any, constancy: Constancy) -> None:
     """The error of H̃ with each number of corrections, over the time."""
-    for m, errors in enumerate(found.errors):
-        t, values = windowed_maxima(found.times, errors)
+    for m, errors in enumerate(constancy.errors):
+        t, values = windowed_maxima(constancy.times, errors)
         axes.plot(t, np.where(values > 0, values, np.nan), linewidth=1.0, **_style(m))
-    axes.set(xlabel="t", yscale="log", title=f"change of H̃ along steps of {found.step:.4g}")
+    axes.set(xlabel="t", yscale="log", title=f"change of H̃ along steps of {constancy.step:.4g}")
     _finish(axes)
 
 
-def draw_against_step(axes: Any, found: Constancy) -> None:
+def draw_against_step(axes: Any, constancy: Constancy) -> None:
     """The largest error up to a time against the step, with a thin line of the stated power beside each curve."""
-    for m, power in enumerate(found.powers):
-        changes = found.changes[:, m]
-        axes.plot(found.sizes, np.where(changes > 0, changes, np.nan), linewidth=1.0, marker="osD"[m % 3],
-                  markersize=3, markeredgewidth=0, **_style(m), label=_label(m, found))  # fmt: skip
+    for m, power in enumerate(constancy.powers):
+        changes = constancy.changes[:, m]
+        axes.plot(constancy.sizes, np.where(changes > 0, changes, np.nan), linewidth=1.0, marker="osD"[m % 3],
+                  markersize=3, markeredgewidth=0, **_style(m), label=_label(m, constancy))  # fmt: skip
         good = np.flatnonzero(changes > 30 * ROUNDING)
         if len(good) > 1:
-            ends = found.sizes[good[[0, -1]]]
+            ends = constancy.sizes[good[[0, -1]]]
             axes.plot(ends, 2.0 * changes[good[-1]] * (ends / ends[-1]) ** power,
                       color=SERIES[m], linewidth=0.6, alpha=0.7, zorder=1)  # fmt: skip
-    axes.set(xlabel="step h", xscale="log", yscale="log", title=f"largest change up to t = {found.end:.4g}")
+    axes.set(xlabel="step h", xscale="log", yscale="log", title=f"largest change up to t = {constancy.end:.4g}")
     _finish(axes)
     axes.axhline(ROUNDING, **MARK)
     axes.legend(loc="best")
 
 
-def _label(m: int, found: Constancy) -> str:
+def _label(m: int, constancy: Constancy) -> str:
     name = "H" if m == 0 else f"{m} correction{'s' * (m > 1)}"
-    slope = f"slope {found.observed[m]:.2f}" if math.isfinite(found.observed[m]) else "at rounding"
+    slope = f"slope {constancy.observed[m]:.2f}" if math.isfinite(constancy.observed[m]) else "at rounding"
     return f"{name}: {slope}"
 
 

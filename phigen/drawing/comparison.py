@@ -15,14 +15,14 @@ _MARKERS = "osD^vXP*"
 
 
 @styled
-def figure(found: Comparison, title: str) -> Figure:
+def figure(comparison: Comparison, title: str) -> Figure:
     """Return the figure: energy errors on the left, orbit errors on the right where they are known.
 
     Filled points are Poisson maps by construction.
     """
     from matplotlib.figure import Figure
 
-    entries = [entry for entry in found.entries if not entry.refusal]
+    entries = [entry for entry in comparison.entries if not entry.refusal]
     panels = [("energy error", [entry.error for entry in entries])]
     if any(entry.orbit for entry in entries):
         panels.append(("orbit error", [entry.orbit or float("nan") for entry in entries]))

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 WINDOWS = 400
 #: The height of a row of panels in inches.
 ROW = 2.3
-#: The unit in the last place, drawn as the level that nothing can be expected to stay below.
+#: The unit in the last place, drawn as the smallest error that can be expected.
 ROUNDING = 2.0**-52
 
 LINES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1.2, 1.2)), (0, (5, 1.2, 1.2, 1.2)), (0, (8, 2)), (0, (2.5, 1)))
 
 
 def windowed_maxima(t: Floats, values: Floats, windows: int = WINDOWS) -> tuple[Floats, Floats]:
-    """The largest value of each of so many windows of rows and the time it is at: no peak is lost.
+    """The largest value in each window of rows and its time, so that no peak is lost.
 
     A window with a value that is not finite gives NaN. Up to twice as many rows as windows are kept all.
     """

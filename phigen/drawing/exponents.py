@@ -21,7 +21,7 @@ def draw_exponents(axes: Any, spectrum: Spectrum) -> None:
     for values in spectrum.history.T[:0:-1]:
         axes.plot(spectrum.times, values, color=PALETTE["leaf"], linewidth=0.9, zorder=2)
     axes.plot(spectrum.times, spectrum.history[:, 0], color=SERIES[0], linewidth=1.4, zorder=3)
-    # What the exponents are at the beginning says nothing, and would flatten the rest.
+    # The first exponents are transient, and would flatten the rest of the curves.
     late = np.abs(spectrum.history[spectrum.times >= spectrum.t / 100])
     height = 1.2 * float(np.max(late)) or 1.0
     axes.set(xlim=(spectrum.t / 1000, 1.1 * spectrum.t), ylim=(-height, height))

@@ -99,22 +99,22 @@ def work_precision_figure(study: Study) -> Figure:
 
 
 @styled
-def tuning_figure(found: Tuning, title: str = "") -> Figure:
+def tuning_figure(tuning: Tuning, title: str = "") -> Figure:
     """The error of all candidates of a tuning against the time they take, and what was proposed."""
     figure = _figure(1.2 * _SQUARE, WIDTH)
     if title:
         figure.suptitle(title, fontsize=11)
-    tuning_curves.draw_tuning(figure.add_subplot(), found)
+    tuning_curves.draw_tuning(figure.add_subplot(), tuning)
     return figure
 
 
 @styled
-def constancy_figure(found: Constancy) -> Figure:
-    """How constant H and the modified Hamiltonian are: along a trajectory, and against the step size."""
+def constancy_figure(constancy: Constancy) -> Figure:
+    """Changes of H and of the modified Hamiltonian: along a trajectory, and against the step size."""
     figure = _figure(_SQUARE)
     along, against = figure.subplots(1, 2)
-    backward_curves.draw_along(along, found)
-    backward_curves.draw_against_step(against, found)
+    backward_curves.draw_along(along, constancy)
+    backward_curves.draw_against_step(against, constancy)
     return figure
 
 
@@ -129,7 +129,7 @@ def run_figure(
     *,
     balance: bool = False,
 ) -> Figure:
-    """All there is to see of a run on one page.
+    """All figures of a run on one page.
 
     The trajectory of the first method, the sections and the Lyapunov exponents if there are any, the errors of all.
     """
@@ -169,7 +169,7 @@ def run_figure(
 
 @styled
 def lyapunov_figure(spectrum: Spectrum) -> Figure:
-    """How the Lyapunov exponents of a trajectory converged."""
+    """Convergence of the Lyapunov exponents of a trajectory."""
     figure = _figure(exponents.HEIGHT, NARROW)
     exponents.draw_exponents(figure.add_subplot(), spectrum)
     return figure

@@ -51,7 +51,7 @@ def expect_writer(path: Path) -> None:
     from matplotlib.animation import FFMpegWriter
 
     if path.suffix.lower() != ".gif" and not FFMpegWriter.isAvailable():
-        raise MissingPackageError(f"{path.name} needs ffmpeg, which is not there; a film that ends in .gif does not")
+        raise MissingPackageError(f"{path.name} needs ffmpeg, which was not found; a .gif film does not")
 
 
 def _flat(values: Floats) -> Floats:
@@ -68,7 +68,7 @@ def _graph(axes: Any, name: str, run: LatticeTrajectory, places: Floats) -> Any:
 
 
 def _shown(axes: Any, name: str, values: Floats) -> Any:
-    """What is shown of a coordinate (frames, *sizes): the function that changes it."""
+    """The function that extracts the displayed values from a coordinate (frames, *sizes)."""
     first = _flat(values[0])
     axes.set_title(name)
     if first.ndim == 1:

@@ -1,4 +1,4 @@
-"""Which coordinates belong together in a picture, by their names: (q, p), (x1, y1), (P1, P2, P3), …"""
+"""Groups of coordinates for a picture, by their names: (q, p), (x1, y1), (P1, P2, P3), …"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Runs of lattices: space–time diagrams of chains, snapshots of planes and graphs, and what was conserved."""
+"""Runs of lattices: space–time diagrams of chains, snapshots of planes and graphs, errors of invariants."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from phigen.drawing.palette import SERIES, styled
 from phigen.drawing.shades import shades_of
 from phigen.lattice.placing import placed
 from phigen.runtime.lattice import LatticeTrajectory
+from phigen.runtime.lattice_series import LatticeSeries
 from phigen.symbolic.arrays import Floats
 
 if TYPE_CHECKING:
@@ -37,14 +38,15 @@ def lattice_figure(
 ) -> Figure:
     """The coordinates over space and time, and the ``errors`` (frames,) of what is conserved, by name.
 
-    Below are Lyapunov exponents, if there are any.
+    Below are the observables against the time, and Lyapunov exponents, if there are any.
 
-    A diagram has so many ``dots`` at most along the time.
+    A diagram has at most ``dots`` dots along the time.
     """
     from matplotlib.figure import Figure
 
     names = run.coordinates[:MOST_PANELS]
-    below = [1.8] if spectrum is None else [1.8, 1.8]
+    observed = run.solver.interface.observables[:MOST_PANELS]
+    below = [1.4] * len(observed) + ([1.8] if spectrum is None else [1.8, 1.8])
     figure = Figure(figsize=(8.2, 2.2 * len(names) + 0.6 + sum(below)), layout="constrained")
     if title:
         figure.suptitle(title, fontsize=10)
@@ -59,15 +61,30 @@ def lattice_figure(
             _draw_diagram(part, name, run, values, dots)
         else:
             _draw_snapshots(part, name, run, values)
-    _draw_errors(parts[len(names)].add_subplot(), run, errors)
+    for k, name in enumerate(observed):
+        _draw_series(parts[len(names) + k].add_subplot(), name, run.t, run.observed[:, k])
+    _draw_errors(parts[len(names) + len(observed)].add_subplot(), run, errors)
     if spectrum is not None:
         draw_exponents(parts[-1].add_subplot(), spectrum)
     return figure
 
 
 @styled
+def series_figure(run: LatticeSeries, title: str) -> Figure:
+    """The recorded numbers of a run without frames, against the time."""
+    from matplotlib.figure import Figure
+
+    names = [*run.columns][: 2 * MOST_PANELS]
+    figure = Figure(figsize=(8.2, 1.6 * len(names) + 0.6), layout="constrained")
+    figure.suptitle(title, fontsize=10)
+    for axes, name in zip(np.atleast_1d(figure.subplots(len(names), 1, sharex=True)), names, strict=True):
+        _draw_series(axes, name, run.t, run.columns[name])
+    return figure
+
+
+@styled
 def sites_figure(run: LatticeTrajectory, energies: Floats) -> Figure:
-    """The ``energies`` (frames, *sizes) of the sites, and how far the Casimirs of the sites went."""
+    """The ``energies`` (frames, *sizes) of the sites, and the changes of their Casimirs."""
     from matplotlib.figure import Figure
 
     local = {name: values for name, values in run.casimirs.items() if values.ndim > 1}
@@ -108,7 +125,7 @@ def _draw_diagram(part: Any, name: str, run: LatticeTrajectory, values: Floats, 
 
 
 def places_of(run: LatticeTrajectory) -> Floats | None:
-    """Where the sites of a graph are drawn (sites, 2); None of what is none, and of graphs of too many sites."""
+    """Positions of the sites of a graph in the picture (sites, 2); None for grids and for graphs that are too large."""
     if "bonds" not in run.parameters or run.x.shape[2] > MOST_DRAWN:
         return None
     return placed(run.parameters["bonds"], run.x.shape[2])
@@ -157,6 +174,13 @@ def _draw_snapshots(part: Any, name: str, run: LatticeTrajectory, values: Floats
         axes.set_xlabel(run.axes[-2])
     panels[0].set_ylabel(run.axes[-1])
     part.colorbar(shown, ax=list(panels), pad=0.02, label=name)
+
+
+def _draw_series(axes: Any, name: str, t: Floats, values: Floats) -> None:
+    """An observable against the time."""
+    axes.plot(t, values, color=SERIES[0], linewidth=1.0)
+    axes.set(xlabel="t", ylabel=name)
+    axes.grid(True)
 
 
 def _draw_errors(axes: Any, run: LatticeTrajectory, errors: Mapping[str, Floats]) -> None:

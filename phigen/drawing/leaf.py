@@ -26,8 +26,8 @@ class Leaf:
     def value_and_gradient(self, points: Floats) -> tuple[Floats, Floats]:
         """C − level of points (…, 3), shape (…), and ∇C, shape (…, 3)."""
         values = {**self.parameters, **{name: points[..., i] for i, name in enumerate(self.names)}}
-        found = evaluate([self.casimir, *gradient(self.casimir, self.names)], values)
-        value, *slopes = (np.broadcast_to(a, points.shape[:-1]) for a in found)
+        arrays = evaluate([self.casimir, *gradient(self.casimir, self.names)], values)
+        value, *slopes = (np.broadcast_to(a, points.shape[:-1]) for a in arrays)
         return value - self.level, np.stack(slopes, axis=-1)
 
 
@@ -79,8 +79,8 @@ def _cut(leaf: Leaf, box: Floats, axis: int, place: float) -> list[Floats]:
     grid = np.insert(np.stack(np.meshgrid(u, v), axis=-1), axis, place, axis=-1)
     values, _ = leaf.value_and_gradient(grid)
     # Where C is not defined there is no leaf.
-    found = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
-    return [np.insert(np.asarray(line, dtype=np.float64), axis, place, axis=-1) for line in found]
+    lines = contour_generator(u, v, np.ma.masked_invalid(values)).lines(0.0)
+    return [np.insert(np.asarray(line, dtype=np.float64), axis, place, axis=-1) for line in lines]
 
 
 def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Floats]:
@@ -95,4 +95,4 @@ def _on_surface(leaf: Leaf, line: Floats, axis: int, cell: Floats) -> list[Float
         good = (np.abs(change) < 1e-3 * cell).all(axis=-1) & (np.abs(moved - line) < cell).all(axis=-1)
     pieces = np.split(moved, np.flatnonzero(good[1:] != good[:-1]) + 1)
     starts = np.r_[True, good[1:] != good[:-1]]
-    return [piece for piece, kept in zip(pieces, good[starts], strict=True) if kept and len(piece) > 1]
+    return [piece for piece, is_good in zip(pieces, good[starts], strict=True) if is_good and len(piece) > 1]

@@ -1,4 +1,4 @@
-"""Ticks and names of axes in space, which matplotlib places by guesses: moved apart by what they measure."""
+"""Ticks and names of axes in space, moved apart by their measured sizes, since matplotlib only estimates places."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 CORNER = 0.08
 #: Letters of ticks that fit beside the upright axis, and what more of them take, in points each.
 LETTERS, WIDTH = 4, 2.2
-#: How far a name is moved at a time, in points, and how often at most; between texts there is so many pixels.
+#: The distance by which a name is moved at a time, in points; the largest number of moves; pixels between texts.
 PAD, MOST_MOVES, GAP = 3.0, 20, 3.5
 _SUPERSCRIPTS = str.maketrans("−-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -39,8 +39,8 @@ def _ticks(low: float, high: float, most: int) -> list[float]:
     from matplotlib.ticker import MaxNLocator
 
     corner = CORNER * (high - low)
-    found = [float(v) for v in MaxNLocator(most).tick_values(low, high)]
-    return [v for v in found if low + corner <= v <= high - corner]
+    ticks = [float(v) for v in MaxNLocator(most).tick_values(low, high)]
+    return [v for v in ticks if low + corner <= v <= high - corner]
 
 
 def move_apart(figure: Figure) -> None:

@@ -1,4 +1,4 @@
-"""How figures look: colours, fonts, and writing them so that their bytes depend on their content alone."""
+"""Style of figures: colours, fonts, and files whose bytes depend on the content alone."""
 
 from __future__ import annotations
 

@@ -21,17 +21,17 @@ from phigen.symbolic.expression import Expression
 if TYPE_CHECKING:
     from matplotlib.figure import FigureBase
 
-#: Up to so many coordinates are drawn panel by panel, more as an image over time.
+#: The largest number of coordinates drawn in panels of their own; more are drawn as an image over time.
 MOST_COORDINATES = 24
 #: Rows are not joined if the typical angle between their chords is more than this, since the line would not be the
 #: orbit; of a long curve even chords that look right one by one cover the panel.
 TURN, FINE_TURN = math.radians(40), math.radians(15)
-#: A curve is long if it could cross its panel so many times.
+#: A curve is long if it could cross its panel this number of times.
 LONG = 60.0
 #: The views of a panel in space, in degrees, the usual one first; and the bands of distance that fade to the back.
 ELEVATION, AZIMUTHS, BANDS = 22.0, (-52.0, -22.0, 8.0, 38.0, -82.0, -112.0), 4
 
-#: How much of a small panel a box in space fills.
+#: The fraction of a small panel that a box in space fills.
 SMALL = 0.76
 
 
@@ -140,8 +140,8 @@ def _draw_faded(
         shown = inside | np.r_[False, inside[:-1]] if joined else inside
         alpha = alphas[0] + (alphas[1] - alphas[0]) * level / (BANDS - 1)
         if inside.any():
-            kept = np.where(shown[:, None], points, np.nan)
-            _draw_curve(axes, kept, colour, alpha, order + 10 * (level >= BANDS / 2), width, joined)
+            visible = np.where(shown[:, None], points, np.nan)
+            _draw_curve(axes, visible, colour, alpha, order + 10 * (level >= BANDS / 2), width, joined)
 
 
 def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: float, width: float, joined: bool) -> None:
@@ -157,7 +157,7 @@ def _draw_curve(axes: Any, points: Floats, colour: str, alpha: float, order: flo
 
 
 def _width(points: Floats) -> float:
-    """Of a line: the longer, the thinner."""
+    """The width of a line: the longer, the thinner."""
     return float(np.clip(1.5 * math.sqrt(LONG / 2 / max(_length(points), 1e-9)), 0.3, 1.5))
 
 

@@ -22,7 +22,7 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
     span = np.ptp(points, axis=0) if len(points) else np.ones(len(names))
     constant = span <= _CONSTANT * max(float(span.max()), float(np.max(np.abs(points), initial=0.0)) * 1e-4)
     varying = [name for name, fixed in zip(names, constant, strict=True) if not fixed]
-    pairs = [found for group in phase_planes(names) if len(found := [n for n in group if n in varying]) >= 2]
+    pairs = [moving for group in phase_planes(names) if len(moving := [n for n in group if n in varying]) >= 2]
     # Of an orbit that closes there is one point; a coordinate that is zero is likely to be that of the section.
     sizes = np.max(np.abs(points), axis=0, initial=0.0)
     rest = sorted((n for n in names if n not in varying), key=lambda n: -sizes[list(names).index(n)])
@@ -33,8 +33,8 @@ def plane_of(names: Sequence[str], points: Floats) -> tuple[int, int]:
 
 def draw_section(axes: Any, sections: Mapping[str, Floats], names: Sequence[str]) -> None:
     """Points (rows, names) of each section, a dot each."""
-    given = [points for points in sections.values() if len(points)]
-    i, j = plane_of(names, np.concatenate(given) if given else np.empty((0, len(names))))
+    point_sets = [points for points in sections.values() if len(points)]
+    i, j = plane_of(names, np.concatenate(point_sets) if point_sets else np.empty((0, len(names))))
     for place, (label, points) in enumerate(sections.items()):
         size = float(np.clip(4.0 - 1.1 * math.log10(max(len(points), 1) / 30), 0.8, 4.0))
         draw_dots(axes, points[:, [i, j]], SERIES[place % len(SERIES)], size, 2.0, label)

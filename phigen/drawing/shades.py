@@ -13,7 +13,7 @@ DIVERGING, SEQUENTIAL = "RdBu_r", "viridis"
 
 
 def bounds_of(values: Floats) -> tuple[float, float]:
-    """What a scale of values begins and ends with: it is symmetric about 0 if some are negative and some positive."""
+    """The ends of a scale of values, which is symmetric about 0 if some are negative and some positive."""
     least, most = float(np.min(values)), float(np.max(values))
     if least < 0 < most:
         return -max(-least, most), max(-least, most)

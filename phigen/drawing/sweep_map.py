@@ -10,11 +10,12 @@ import numpy as np
 
 from phigen.drawing.palette import SERIES, save, styled
 from phigen.errors import FileError
+from phigen.spec.names import KEPT
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Numbers that are kept, the first of them that is there is drawn.
+#: Numbers that are kept beside observables, the first of them that is there is drawn.
 _FIRST = ("lyapunov", "crossings", "energy_error", "casimir_error", "final")
 
 #: Values that differ by more than this factor are drawn by their logarithms.
@@ -30,15 +31,18 @@ def draw(store: Path, path: Path, shown: str | None = None) -> None:
     from phigen.sweeping.store import open_job
 
     with xarray.open_zarr(str(store), decode_cf=False) as data:
-        known = [name for name in _FIRST if name in data]
+        plan = open_job(str(store)).plan
+        observed = [word for word in plan.keep if word not in KEPT]
+        known = [name for name in (*observed, *_FIRST) if name in data]
         if not known:
-            hint = f"keep one of {', '.join(_FIRST)} in the sweep"
+            hint = f"keep one of {', '.join(_FIRST)}, or observables, in the sweep"
             raise FileError(f"{store} has nothing that can be drawn over the members\n  hint: {hint}")
         chosen = shown or known[0]
         if chosen not in known:
             raise FileError(f"{store} has no {chosen!r} to draw; it has {', '.join(known)}")
-        logarithmic = {axis.name for axis in open_job(str(store)).plan.axes if axis.scale == "log"}
-        save(_figure(data, chosen, logarithmic), path)
+        logarithmic = {axis.name for axis in plan.axes if axis.scale == "log"}
+        errors = f"error({chosen.removeprefix('mean(')}"
+        save(_figure(data.drop_vars([w for w in observed if w not in (chosen, errors)]), chosen, logarithmic), path)
 
 
 @styled
@@ -58,7 +62,7 @@ def _figure(data: Any, name: str, logarithmic: Set[str]) -> Figure:
         if panel.dims == ("member",):
             _scatter(figure, axes, data, panel)
         else:
-            _over_grid(figure, axes, panel, logarithmic)
+            _over_grid(figure, axes, panel, logarithmic, _errors(data, name), observed=name not in _FIRST)
         if axes.get_xlabel() in logarithmic:
             axes.set_xscale("log")
         if axes.get_ylabel() in logarithmic:
@@ -68,8 +72,31 @@ def _figure(data: Any, name: str, logarithmic: Set[str]) -> Figure:
     return figure
 
 
-def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str]) -> None:
-    """Over one dimension a curve, over two a map; over further ones, draws first, the median is taken."""
+def _errors(data: Any, name: str) -> Any:
+    """Return the standard errors of the mean of an observable where they are kept too; None of all else."""
+    of, opened, rest = name.partition("(")
+    errors = f"error({rest}"
+    return data[errors] if of == "mean" and opened and errors in data else None
+
+
+def _over_grid(figure: Any, axes: Any, panel: Any, logarithmic: Set[str], errors: Any, *, observed: bool) -> None:
+    """Over one dimension a curve, over two a map; over further ones, draws first, the median is taken.
+
+    Along one dimension, means of observables over draws have error bars, and so have others of which there are
+    ``errors``.
+    """
+    dims = [*panel.dims]
+    if "seed" in dims and len(dims) == 2 and panel.sizes["seed"] > 1 and observed:
+        draws, panel = panel, panel.mean(dim="seed", skipna=True)
+        errors = draws.std(dim="seed", ddof=1, skipna=True) / np.sqrt(draws.notnull().sum(dim="seed"))
+    if len(panel.dims) == 1 and errors is not None:
+        (along,) = panel.dims
+        axes.errorbar(
+            panel[along], panel, errors, color=SERIES[0], linewidth=1.2, capsize=2.5, marker="o", markersize=3
+        )
+        axes.set(xlabel=along)
+        axes.grid(True)
+        return
     dims = [d for d in panel.dims if d != "seed"] or [*panel.dims]
     more = [d for d in panel.dims if d not in dims[:2]]
     panel = panel.median(dim=more, skipna=True) if more else panel
@@ -98,7 +125,8 @@ def _edges(values: Any, *, logarithmic: bool) -> Any:
 
 def _scatter(figure: Any, axes: Any, data: Any, panel: Any) -> None:
     """Members of their own, over the first two numbers that they differ in."""
-    names = [n for n in data.data_vars if data[n].dims == ("member",) and n not in (*_FIRST, "status")][:2]
+    results = (*_FIRST, "status", panel.name)
+    names = [n for n in data.data_vars if data[n].dims == ("member",) and n not in results and "(" not in n][:2]
     if len(names) < 2:
         axes.scatter(data[names[0]] if names else np.arange(panel.size), panel, s=4, color=SERIES[0])
         axes.set(xlabel=names[0] if names else "member")

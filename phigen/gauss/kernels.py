@@ -6,19 +6,34 @@ t − t_start, of a group element G − 1. So no digits are lost where steps are
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen.gauss.realisation import Group, Realisation
-from phigen.gauss.star_algebra import StarAlgebra, combined
+from phigen.gauss.star_algebra import StarAlgebra, Vector, combined
+from phigen.geometry.field import Scalar
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.staging import Coefficients
-from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, number, substitute, symbol, total
-from phigen.symbolic.symbols import Symbol
+from phigen.symbolic.expression import (
+    ONE,
+    ZERO,
+    Expression,
+    fold,
+    gradient,
+    number,
+    raw,
+    substitute,
+    symbol,
+    total,
+)
+from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The kinds of symbols of unknowns, and of the derivatives that are taken into a new frame.
-OFFSET, SLOPE = "z", "k"
+#: The kinds of symbols of unknowns, of the derivatives that are taken into a new frame, of velocities in Lie algebras.
+OFFSET, SLOPE, VELOCITY = "z", "k", "velocity"
+
+#: The symbol of h b_j, the weight of a stage.
+WEIGHT = Symbol("w")
 
 
 @dataclass(frozen=True)
@@ -72,82 +87,171 @@ def _scalar(algebra: StarAlgebra, value: object) -> Expression:
     return algebra.field.expression(value)
 
 
-def _element(algebra: StarAlgebra, factors: Mapping[int, object], values: Sequence[Expression]) -> Expression:
+def _combined(algebra: StarAlgebra, factors: Mapping[int, object], values: Sequence[Expression]) -> Expression:
     """Σ_k factors[k]·values[k]."""
     return total(_scalar(algebra, c) * values[k] for k, c in factors.items() if not values[k].is_zero)
 
 
-def _momentum_change(group: Group, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
-    """x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew.
+@dataclass(frozen=True)
+class _Scaled:
+    """The functional x̃ divided by q, frame elements f by numbers c: so products take few multiplications by numbers.
 
-    Frames are doubled, and x̃ is halved: basis elements are twice those of the Lie algebra, as a rule.
+    ``combination`` gives the E_a by the values of x̃/q at the f/c.
     """
+
+    at_basis: list[Expression]
+    frame: list[Vector]
+    combination: list[Vector]
+
+
+def _scaled(group: Group, x: Sequence[Expression]) -> _Scaled:
     algebra = group.algebra
-    half = algebra.field.one / algebra.field.number(2)
-    at_basis = [_element(algebra, combined([form], {0: half}), x) for form in algebra.functional]
     one = algebra.field.one
-    left = []  # x̃(w b) for the basis b
+
+    def first(coefficients: Iterable[Scalar]) -> Scalar:
+        return next(iter(coefficients), one) if algebra.field.is_rational else one
+
+    q = first(c for form in algebra.functional for c in form.values())
+    starred = [algebra.starred({j: one}) for j in range(algebra.dimension)]
+    scales = [first(c for s in starred for c in algebra.product(f, s).values()) for f in algebra.frame]
+    return _Scaled(
+        [_combined(algebra, combined([form], {0: one / q}), x) for form in algebra.functional],
+        [combined([f], {0: one / c}) for f, c in zip(algebra.frame, scales, strict=True)],
+        [{k: v * q * scales[k] for k, v in parts.items()} for parts in algebra.combination],
+    )
+
+
+def _momentum_change(group: Group, x: Sequence[Expression], w: Sequence[Expression]) -> list[Expression]:
+    """x̃(G E_a G*) − x_a for G = 1 + w: 2x̃(wE_a) + x̃(wE_a w*), as E_a is skew."""
+    algebra, scaled = group.algebra, _scaled(group, x)
+    left = _functional_times(algebra, scaled, w)
+    moved = [number(2) * _combined(algebra, f, left) + _with_star(algebra, f, left, w) for f in scaled.frame]
+    return [_combined(algebra, parts, moved) for parts in scaled.combination]
+
+
+def _momentum(group: Group, x: Sequence[Expression], g: Sequence[Expression]) -> list[Expression]:
+    """x̃(G E_a G*) for a group element G."""
+    algebra, scaled = group.algebra, _scaled(group, x)
+    left = _functional_times(algebra, scaled, g)
+    moved = [_with_star(algebra, f, left, g) for f in scaled.frame]
+    return [_combined(algebra, parts, moved) for parts in scaled.combination]
+
+
+def _functional_times(algebra: StarAlgebra, scaled: _Scaled, w: Sequence[Expression]) -> list[Expression]:
+    """x̃(wb)/q for the elements b of the basis."""
+    left = []
     for k in range(algebra.dimension):
-        terms = []
-        for i in range(algebra.dimension):
-            value = _element(algebra, algebra.table.get((i, k), {}), at_basis)
-            if not value.is_zero:
-                terms.append(w[i] * value)
-        left.append(total(terms))
-    moved = []
-    for f in (combined([f], {0: algebra.field.number(2)}) for f in algebra.frame):
-        twice = number(2) * _element(algebra, f, left)
-        quadratic = []
-        for j in range(algebra.dimension):
-            value = _element(algebra, algebra.product(f, algebra.starred({j: one})), left)
-            if not value.is_zero:
-                quadratic.append(w[j] * value)
-        moved.append(twice + total(quadratic))
-    return [_element(algebra, parts, moved) for parts in algebra.combination]
+        values = [_combined(algebra, algebra.table.get((i, k), {}), scaled.at_basis) for i in range(algebra.dimension)]
+        left.append(total(w[i] * value for i, value in enumerate(values) if not value.is_zero))
+    return left
+
+
+def _with_star(
+    algebra: StarAlgebra, f: Mapping[int, Scalar], left: Sequence[Expression], w: Sequence[Expression]
+) -> Expression:
+    """x̃(wfw*)/q, where ``left`` are the values x̃(wb)/q."""
+    one = algebra.field.one
+    terms = []
+    for j in range(algebra.dimension):
+        value = _combined(algebra, algebra.product(f, algebra.starred({j: one})), left)
+        if not value.is_zero:
+            terms.append(w[j] * value)
+    return total(terms)
 
 
 def field_kernel(points: StageMap, coefficients: Coefficients) -> Kernel:
-    """The vector field of the unknowns at a stage, before it is multiplied by h b_j."""
-    values = coefficients.hoist(vector_field(points, at_unknowns(points)))
+    """The vector field of the unknowns at a stage, multiplied by the weight h b_j of the stage."""
+    velocities: list[Expression] = []
+
+    def hold(value: Expression) -> Expression:
+        if not value.args:
+            return value
+        velocities.append(value)
+        return symbol(Symbol(VELOCITY, len(velocities) - 1))
+
+    slopes = vector_field(points, at_unknowns(points), symbol(WEIGHT), hold)
+    values = _inserted(coefficients.hoist(slopes), coefficients.hoist(velocities))
     return Kernel(
         "stage_field",
-        "the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
-        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns},
-        (Output("slope", tuple(values)),),
+        "w times the derivatives of the unknowns of a stage, which are offsets from x, the start of the step",
+        {"coef": coefficients.slots, "x": points.start, "z": points.unknowns, "w": (WEIGHT,)},
+        (Output("move", tuple(values)),),
     )
+
+
+def _inserted(roots: Sequence[Expression], velocities: Sequence[Expression]) -> list[Expression]:
+    """The roots with velocities in place of their symbols, whose numerical factors are not moved into the products."""
+
+    def visit(e: Expression, args: list[Expression]) -> Expression:
+        if e.op == "symbol" and kind_of(e.value) == VELOCITY:
+            number_of_velocity: int = e.value.key[0]
+            return velocities[number_of_velocity]
+        return raw(e.op, tuple(args), e.value) if e.args else e
+
+    return fold(roots, visit)
 
 
 def at_unknowns(points: StageMap) -> dict[str, Expression]:
     """The coordinates and the time at a stage, by the unknowns."""
     system = points.system
     at = {c: symbol(c) + d for c, d in zip(system.coordinates, points.change, strict=True)}
+    for group, first in zip(points.realisation.groups, points.starts, strict=True):
+        momenta = _momentum(group, _values(system, group), _group_element(points, group, first))
+        for i, value, shift in zip(group.indices, momenta, group.shift, strict=False):
+            at[system.coordinates[i]] = value - shift
     return at | {t: symbol(t) + symbol(points.unknowns[len(points.moved)]) for t in system.times}
 
 
-def vector_field(points: StageMap, at: Mapping[str, Expression]) -> list[Expression]:
-    """The derivatives of the unknowns at a stage, where the coordinates have these values."""
+def _element(
+    algebra: StarAlgebra, elements: Sequence[Mapping[int, object]], factors: Sequence[Expression]
+) -> list[Expression]:
+    """The components of Σ_a factors[a]·elements[a]."""
+    return [
+        total(_scalar(algebra, e[k]) * r for e, r in zip(elements, factors, strict=False) if k in e)
+        for k in range(algebra.dimension)
+    ]
+
+
+def _group_element(points: StageMap, group: Group, first: int) -> list[Expression]:
+    """G = 1 + w, by the unknowns w from the first on."""
+    algebra = group.algebra
+    return [
+        symbol(points.unknowns[first + k]) + (_scalar(algebra, algebra.unit[k]) if k in algebra.unit else ZERO)
+        for k in range(algebra.dimension)
+    ]
+
+
+def vector_field(
+    points: StageMap,
+    at: Mapping[str, Expression],
+    weight: Expression = ONE,
+    hold: Callable[[Expression], Expression] | None = None,
+) -> list[Expression]:
+    """The derivatives of the unknowns at a stage, where the coordinates have these values, times a weight.
+
+    ``hold`` receives each component of the velocities in Lie algebras, and returns what stands for it.
+    """
     system, realisation = points.system, points.realisation
     if not realisation.exact:
         field_ = system.vector_field()
-        return [*substitute([field_[i] for i in points.moved], at), *(ONE for _ in system.times)]
+        moved = substitute([field_[i] for i in points.moved], at)
+        return [*(weight * value for value in moved), *(weight for _ in system.times)]
     slopes = gradient(system.hamiltonian, system.coordinates)
     if system.forces:
         slopes = [s + z for s, z in zip(slopes, system.forces.covector, strict=True)]
     constant = hamiltonian_vector_field(system.poisson, slopes)
     if system.forces:
         constant = tuple(a + b for a, b in zip(constant, system.forces.vector, strict=True))
-    found = [*substitute([constant[i] for i in points.moved], at), *(ONE for _ in system.times)]
-    there = substitute(slopes, at)
+    plain = substitute([constant[i] for i in points.moved], at)
+    derivatives = [*(weight * value for value in plain), *(weight for _ in system.times)]
+    rates = [-weight * value for value in substitute(slopes, at)]
     for group, first in zip(realisation.groups, points.starts, strict=True):
-        algebra = group.algebra
-        w = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
-        rates = [-there[i] for i in group.indices]  # the constant, if there is one, acts as 0: it is central
-        velocity = [
-            total(_scalar(algebra, e[k]) * r for e, r in zip(algebra.basis, rates, strict=False) if k in e)
-            for k in range(algebra.dimension)
-        ]
-        found += [v + m for v, m in zip(velocity, _multiplied(algebra, w, velocity), strict=True)]
-    return found
+        # A constant among the basis elements, if there is one, acts as 0: it is central.
+        velocity = _element(group.algebra, group.algebra.basis, [rates[i] for i in group.indices])
+        if hold is not None:
+            velocity = [hold(value) for value in velocity]
+        derivatives += _multiplied(group.algebra, _group_element(points, group, first), velocity)
+    return derivatives
 
 
 def _multiplied(algebra: StarAlgebra, a: Sequence[Expression], b: Sequence[Expression]) -> list[Expression]:
@@ -181,11 +285,7 @@ def frame_kernel(points: StageMap, coefficients: Coefficients) -> Kernel | None:
         algebra = group.algebra
         w = [symbol(s) for s in points.unknowns[first : first + algebra.dimension]]
         k = slopes[first : first + algebra.dimension]
-        star: list[Expression] = [
-            total(_scalar(algebra, image[i]) * v for image, v in zip(algebra.star, w, strict=True) if i in image)
-            for i in range(algebra.dimension)
-        ]
-        found += [a + b for a, b in zip(k, _multiplied(algebra, star, k), strict=True)]
+        found += [a + b for a, b in zip(k, _multiplied(algebra, _element(algebra, algebra.star, w), k), strict=True)]
     return Kernel(
         "next_frame",
         "derivatives k of the unknowns as seen from the end z of a step, where the next one starts",

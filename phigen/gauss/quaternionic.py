@@ -104,12 +104,18 @@ def _generated(form: Mapping[tuple[int, int], Map], m: int, field: Field) -> lis
     found: list[Map] = [{(i, i): field.one for i in range(m)}]
     pending = [value for value in form.values() if value]
     while pending:
-        value = pending.pop()
+        value = _normalised(pending.pop())
         if Span(field, [*found, value]).dimension == len(found):
             continue
         found.append(value)
-        pending += [_composed(a, b) for a in found for b in found]
+        pending += [product for a in found for b in found if (product := _composed(a, b))]
     return found
+
+
+def _normalised(a: Map) -> Map:
+    """A multiple whose first entry is 1: products with it take fewer multiplications."""
+    first = a[min(a)]
+    return {at: v / first for at, v in a.items()}
 
 
 def _composed(a: Mapping[tuple[int, int], Scalar], b: Mapping[tuple[int, int], Scalar]) -> Map:

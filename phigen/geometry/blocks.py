@@ -21,4 +21,4 @@ def blocks(coordinates: Sequence[str], poisson: Matrix) -> list[list[int]]:
                 continue
             together = {part[m] for m in (i, j, *(index[s] for s in symbols_of(entry) if s in index))}
             part = [min(together) if label in together else label for label in part]
-    return [[i for i, label in enumerate(part) if label == wanted] for wanted in sorted(set(part))]
+    return [[i for i, label in enumerate(part) if label == root] for root in sorted(set(part))]

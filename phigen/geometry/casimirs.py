@@ -33,7 +33,7 @@ def found_casimirs(
     shape: Shape,
     form: PoissonForm,
     declared: Mapping[str, Expression],
-    taken: Collection[str],
+    used_names: Collection[str],
 ) -> tuple[dict[str, Expression], tuple[str, ...]]:
     """Casimirs independent of the declared ones, under names C1, C2, … that are not taken; and notes.
 
@@ -45,7 +45,7 @@ def found_casimirs(
         return {}, ("no Casimirs were searched for: no point of the domain of π was found",)
     rank, known = ranks
     missing = len(coordinates) - rank - known
-    found: list[Expression] = []
+    casimirs: list[Expression] = []
     notes: list[str] = []
     if missing > 0:
         with progress.stage("Casimirs", missing) as running:
@@ -55,13 +55,13 @@ def found_casimirs(
                 if ranks is None or ranks[0] <= known:
                     continue
                 slopes, known = [*slopes, slope], ranks[0]
-                found.append(candidate)
-                running.done = len(found)
-                if len(found) == missing:
+                casimirs.append(candidate)
+                running.done = len(casimirs)
+                if len(casimirs) == missing:
                     notes = []
                     break
-    names = (f"C{i}" for i in range(1, len(found) + len(taken) + 1) if f"C{i}" not in taken)
-    return dict(zip(names, found, strict=False)), tuple(notes)
+    names = (f"C{i}" for i in range(1, len(casimirs) + len(used_names) + 1) if f"C{i}" not in used_names)
+    return dict(zip(names, casimirs, strict=False)), tuple(notes)
 
 
 def _candidates(

@@ -12,7 +12,7 @@ from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Tower
 from phigen.symbolic.verdict import CHECKED, PROVED, REFUTED, UNDECIDED, Statement, decide_zero, sample_point
 
-#: What makes the strong order 1.
+#: The name of the statement that makes the strong order 1.
 COMMUTING = "the sources of noise commute, hence strong order 1"
 
 
@@ -57,13 +57,15 @@ def invariant_statements(system: System) -> Iterator[Statement]:
 
 
 def force_statements(system: System) -> Iterator[Statement]:
-    """How forces change Casimirs, and that the damping takes energy as it should."""
+    """Statements on forces: the rates of change of Casimirs, and the sign of the damping."""
     if system.forces is None:
         return
     for name, casimir in system.casimirs.items():
         rate = system.forced_rate_of_casimir(casimir)
-        kept = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], system.positive)
-        yield kept if kept.holds else Statement(f"d{name}/dt = {shortened(rate)}, by the vector force", PROVED)
+        conserved = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], system.positive)
+        yield (
+            conserved if conserved.holds else Statement(f"d{name}/dt = {shortened(rate)}, by the vector force", PROVED)
+        )
     damping = system.forces.damping
     if not damping.is_zero:
         slope = gradient(system.hamiltonian, system.coordinates)
@@ -74,7 +76,7 @@ def force_statements(system: System) -> Iterator[Statement]:
 
 
 def noise_statements(system: System) -> Iterator[Statement]:
-    """Whether the sources of noise commute, which decides the strong order; what density is stationary."""
+    """Statements on noise: whether its sources commute, which decides the strong order, and a stationary density."""
     if not system.noise:
         return
     commute = _commutation(system)
@@ -110,7 +112,7 @@ def _commutation(system: System) -> Statement:
 
 
 def _noise_bracket(system: System, i: int, j: int) -> tuple[str, Expression]:
-    """Where the flows of two sources do not commute: π∇{g_i, g_j}, as the sum of the squares of its components."""
+    """Obstruction to commuting flows of two sources: π∇{g_i, g_j}, as the sum of the squares of its components."""
     first, second = system.noise[i], system.noise[j]
     field = hamiltonian_vector_field(system.poisson, second.impulse(system.coordinates))
     bracket = total(a * b for a, b in zip(first.impulse(system.coordinates), field, strict=True))

@@ -1,4 +1,4 @@
-"""Whether the formulas of a system have values: nothing is divided by zero, and some point is in their domain."""
+"""Tests that the formulas of a system are defined: no division by zero, and some point in their domain."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phigen.symbolic.verdict import REFUTED, UNDECIDED, Statement, decide_zero, 
 #: Points that are tried, and the factors by which they are tried: near 0, around 1 and far off.
 POINTS = 64
 SCALES = (Fraction(1), Fraction(1, 32), Fraction(30))
-#: Values that are not this small are not those of a disguised zero.
+#: A larger magnitude excludes that a value is 0: rounding of a zero in disguise stays far below.
 _CLEARLY = 1e-6
 
 Point = Mapping[str, float]
@@ -28,13 +28,13 @@ def undefined_parts(system: System, starts: Sequence[Point]) -> Iterator[Stateme
     starts, the latter is undecided.
     """
     for name, roots in _parts(system).items():
-        found = _divided_by_zero(roots, system.positive)
-        if found:
-            yield Statement(f"{name} is defined", REFUTED, found)
+        divisor = _divided_by_zero(roots, system.positive)
+        if divisor:
+            yield Statement(f"{name} is defined", REFUTED, divisor)
         elif not _has_value(roots, system.positive, starts):
             tried = f"no value at any of {len(SCALES) * POINTS} points"
-            told = f"{tried}, nor where a run starts" if starts else tried
-            yield Statement(f"{name} is defined", REFUTED if starts else UNDECIDED, told)
+            reason = f"{tried}, nor where a run starts" if starts else tried
+            yield Statement(f"{name} is defined", REFUTED if starts else UNDECIDED, reason)
 
 
 def undefined_starts(system: System, starts: Mapping[str, Point]) -> Iterator[Statement]:
@@ -52,7 +52,7 @@ def start_is_defined(run: str) -> str:
 
 
 def _parts(system: System) -> dict[str, Sequence[Expression]]:
-    """The expressions of a system by what they are."""
+    """The expressions of a system, each with its description."""
     parts: dict[str, Sequence[Expression]] = {"H": [system.hamiltonian]}
     if system.forces:
         parts["the force"] = [*system.forces.covector, *system.forces.vector]
@@ -62,7 +62,7 @@ def _parts(system: System) -> dict[str, Sequence[Expression]]:
 
 
 def _divided_by_zero(roots: Sequence[Expression], positive: Collection[str]) -> str:
-    """What is divided by, or has its logarithm taken, and is zero; empty if there is nothing of that kind."""
+    """Description of a divisor, or of the argument of a logarithm, that is zero; empty if there is none."""
     for e in topological(list(roots)):
         if e.op == "log" or (e.op == "pow" and e.value < 0):
             (argument,) = e.args

@@ -147,14 +147,14 @@ def named(family: str, size: int) -> LieAlgebra:
     return algebra_of_sparse_matrices(f"{family}({size})", matrix_size, matrices)
 
 
-def families_of_dimension(wanted: int) -> list[tuple[str, int]]:
+def families_of_dimension(dimension: int) -> list[tuple[str, int]]:
     """All (family, size) of that dimension, the dimensions growing with the size in each family."""
-    found = []
+    families = []
     for name, (smallest, dimension_of, _) in FAMILIES.items():
         step = 2 if name == "sp" else 1
         size = smallest
-        while dimension_of(size) < wanted:
+        while dimension_of(size) < dimension:
             size += step
-        if dimension_of(size) == wanted:
-            found.append((name, size))
-    return found
+        if dimension_of(size) == dimension:
+            families.append((name, size))
+    return families

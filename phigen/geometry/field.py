@@ -89,8 +89,8 @@ class Field(Arithmetic[Scalar]):
     def number(self, value: int | Fraction) -> Scalar:
         """The rational number as an element."""
         value = Fraction(value)
-        found = fmpq(value.numerator, value.denominator)
-        return found if self.is_rational else Ratio(self._context.constant(found), self._context.constant(1))
+        rational = fmpq(value.numerator, value.denominator)
+        return rational if self.is_rational else Ratio(self._context.constant(rational), self._context.constant(1))
 
     def convert(self, e: Expression) -> Scalar:
         """The expression as an element; KeyError if it needs a symbol that the field does not have."""

@@ -26,11 +26,11 @@ class Forces:
     undamped: tuple[Expression, ...] = ()
 
 
-def forces_of(given: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
+def forces_of(spec_forces: SpecForces, coordinates: Sequence[str], field: Sequence[Expression]) -> Forces | None:
     """The forces of a spec, None where it has none; ``field`` is π∇H."""
-    if not given:
+    if not spec_forces:
         return None
-    damping = given.damping or ZERO
-    undamped = tuple(given.covector.get(c, ZERO) for c in coordinates)
+    damping = spec_forces.damping or ZERO
+    undamped = tuple(spec_forces.covector.get(c, ZERO) for c in coordinates)
     covector = tuple(z + damping * f for z, f in zip(undamped, field, strict=True))
-    return Forces(covector, tuple(given.vector.get(c, ZERO) for c in coordinates), damping, undamped)
+    return Forces(covector, tuple(spec_forces.vector.get(c, ZERO) for c in coordinates), damping, undamped)

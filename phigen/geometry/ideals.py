@@ -70,13 +70,13 @@ def _idempotents(element: Any) -> list[Any]:
     _, factors = minimal.factor()
     if len(factors) < 2:
         return []
-    found = []
+    idempotents = []
     for factor, multiplicity in factors:
-        own = factor**multiplicity
-        rest = fmpq_poly(minimal / own)
-        _, _, cofactor = own.xgcd(rest)
-        found.append(_value(cofactor * rest, element))
-    return found
+        primary = factor**multiplicity
+        rest = fmpq_poly(minimal / primary)
+        _, _, cofactor = primary.xgcd(rest)
+        idempotents.append(_value(cofactor * rest, element))
+    return idempotents
 
 
 def _value(polynomial: Any, matrix: Any) -> Any:

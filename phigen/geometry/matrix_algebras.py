@@ -74,20 +74,22 @@ def product(a: SparseMatrix, b: SparseMatrix) -> SparseMatrix:
     return out
 
 
-def from_structure_constants(dimension: int, given: Mapping[int, Mapping[int, Mapping[int, Expression]]]) -> LieAlgebra:
-    """The algebra with [E_i, E_j] = Σ_k given[i][j][k] E_k (from 0); pairs may be given in one order or both.
+def from_structure_constants(
+    dimension: int, structure: Mapping[int, Mapping[int, Mapping[int, Expression]]]
+) -> LieAlgebra:
+    """The algebra with [E_i, E_j] = Σ_k structure[i][j][k] E_k (from 0); pairs may be given in one order or both.
 
     Raises `SpecError` for indices out of range, pairs that contradict antisymmetry, and a failing Jacobi
     identity (naming the triple).
     """
-    used = [i for i, row in given.items() for j, ks in row.items() for i in (i, j, *ks)]
+    used = [i for i, row in structure.items() for j, ks in row.items() for i in (i, j, *ks)]
     if used and max(used) >= dimension:
         message = f"structure constants use E{max(used) + 1}, but there are {dimension} coordinates"
         raise SpecError([Diagnostic(message)])
     constants: dict[tuple[int, int], dict[int, Expression]] = {}
     for i in range(dimension):
         for j in range(i, dimension):
-            row = _bracket_of_pair(i, j, given)
+            row = _bracket_of_pair(i, j, structure)
             if row:
                 constants[i, j] = row
     algebra = LieAlgebra(f"a Lie algebra of dimension {dimension}", dimension, constants)
@@ -96,9 +98,9 @@ def from_structure_constants(dimension: int, given: Mapping[int, Mapping[int, Ma
 
 
 def _bracket_of_pair(
-    i: int, j: int, given: Mapping[int, Mapping[int, Mapping[int, Expression]]]
+    i: int, j: int, constants: Mapping[int, Mapping[int, Mapping[int, Expression]]]
 ) -> dict[int, Expression]:
-    forward, backward = given.get(i, {}).get(j), given.get(j, {}).get(i)
+    forward, backward = constants.get(i, {}).get(j), constants.get(j, {}).get(i)
     if i == j:
         backward = None if forward is None else dict.fromkeys(forward, ZERO)
     if forward is not None and backward is not None:

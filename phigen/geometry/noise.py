@@ -29,6 +29,6 @@ class Source:
         return tuple(self.amplitude * g for g in gradient(self.hamiltonian, coordinates))
 
 
-def sources_of(given: Mapping[str, SpecNoise]) -> tuple[Source, ...]:
+def sources_of(spec_sources: Mapping[str, SpecNoise]) -> tuple[Source, ...]:
     """The sources of a spec, in its order."""
-    return tuple(Source(name, s.hamiltonian, s.amplitude) for name, s in given.items())
+    return tuple(Source(name, s.hamiltonian, s.amplitude) for name, s in spec_sources.items())

@@ -68,13 +68,13 @@ def _converted(field: Field, terms: Terms) -> dict[Exponents, Scalar]:
 
 
 def _monomials(n: int, degree: int) -> list[Exponents]:
-    found = []
+    monomials = []
     for chosen in combinations_with_replacement(range(n), degree):
         exponents = [0] * n
         for i in chosen:
             exponents[i] += 1
-        found.append(tuple(exponents))
-    return found
+        monomials.append(tuple(exponents))
+    return monomials
 
 
 def _equations(entries: list[list[dict[Exponents, Scalar]]], monomials: list[Exponents]) -> list[dict[int, Scalar]]:

@@ -90,5 +90,5 @@ def sign_of(e: Expression, positive: Collection[str]) -> str | None:
             return POSITIVE if sign and exponent < 0 else sign  # 1/0 is no value
         return _ALWAYS.get(e.op)
 
-    (found,) = fold([e], visit)
-    return found
+    (result,) = fold([e], visit)
+    return result

@@ -83,8 +83,8 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
     left = dict(zip(form.coordinates, form.map, strict=True))
     known: dict[str, Expression] = {}
     while left:
-        found = _next_solved(left, known, coordinates)
-        if found is None:
+        solution = _next_solved(left, known, coordinates)
+        if solution is None:
             unknown = [c for c in coordinates if c not in known]
             raise SpecError(
                 [
@@ -94,7 +94,7 @@ def _inverse(form: PullbackForm, coordinates: Sequence[str]) -> tuple[Expression
                     )
                 ]
             )
-        y, x, value = found
+        y, x, value = solution
         known[x] = _simplified(value)
         del left[y]
     return tuple(known[c] for c in coordinates)

@@ -31,19 +31,19 @@ def generic_ranks(matrices: Sequence[Rows], positive: Collection[str] = ()) -> l
     roots = [e for m in matrices for row in m for e in row]
     names, exact = symbols_of(*roots), is_rational(*roots)
     rank: Callable[[Any], int] = _exact_rank if exact else _numerical_rank
-    found: list[list[int]] = []
+    ranks_at_points: list[list[int]] = []
     for k in range(ATTEMPTS):
         point = sample_point(names, positive, k)
         values: list[Any]
         try:
             values = evaluate_exactly(roots, point) if exact else evaluate_with_scale(roots, point, DIGITS)
             in_turn = iter(values)
-            found.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
+            ranks_at_points.append([rank([[next(in_turn) for _ in row] for row in m]) for m in matrices])
         except DomainError:
             continue
-        if len(found) == POINTS or not names:  # numbers are the same at all points
+        if len(ranks_at_points) == POINTS or not names:  # numbers are the same at all points
             break
-    return [max(ranks) for ranks in zip(*found, strict=True)] if found else None
+    return [max(ranks) for ranks in zip(*ranks_at_points, strict=True)] if ranks_at_points else None
 
 
 def _exact_rank(rows: Sequence[Sequence[Fraction]]) -> int:

@@ -27,7 +27,7 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
     others = [s for s in symbols_of(*upper.values()) if s not in coordinates]
     tower = Tower([*coordinates, *others], upper.values())
     entries = {ij: tower.simplified(e) for ij, e in zip(upper, tower.convert_all(list(upper.values())), strict=True)}
-    found: dict[int, list[tuple[Poly, int]]] = {}
+    factor_parts: dict[int, list[tuple[Poly, int]]] = {}
     constants = {}
     for (i, j), element in entries.items():
         if tower.is_zero(element):
@@ -36,10 +36,10 @@ def separated(coordinates: Sequence[str], poisson: Matrix) -> Separated | None:
         if parts is None or set(parts) - {i, j, -1}:
             return None
         for k in (i, j):
-            if found.setdefault(k, parts.get(k, [])) != parts.get(k, []):
+            if factor_parts.setdefault(k, parts.get(k, [])) != parts.get(k, []):
                 return None
         constants[i, j] = _product(tower, parts[-1])
-    factors = tuple(_product(tower, found.get(i, [])) for i in range(len(coordinates)))
+    factors = tuple(_product(tower, factor_parts.get(i, [])) for i in range(len(coordinates)))
     return Separated(factors, skew(constants, len(coordinates)))
 
 

@@ -107,7 +107,7 @@ def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expressio
     """The expressions as polynomials in the coordinates, be it by an identity; None if one of them is not."""
     names = list(coordinates) + [s for s in symbols_of(*expressions) if s not in coordinates]
     tower = Tower(names, expressions)
-    found = []
+    terms_of_coordinates = []
     for e, element in zip(expressions, tower.convert_all(expressions), strict=True):
         terms = _split(tower, element, coordinates)
         if terms is None:
@@ -115,8 +115,8 @@ def coordinate_terms(coordinates: Sequence[str], expressions: Sequence[Expressio
             if same is None:
                 return None
             (terms,) = coordinate_terms(coordinates, [same]) or [{}]
-        found.append(terms)
-    return found
+        terms_of_coordinates.append(terms)
+    return terms_of_coordinates
 
 
 def _split(tower: Tower, element: Poly, coordinates: Sequence[str]) -> Terms | None:
@@ -154,11 +154,11 @@ def _constant(coordinates: Sequence[str], entries: dict[tuple[int, int], Terms],
 def _log_canonical(n: int, entries: dict[tuple[int, int], Terms]) -> Shape | None:
     a: dict[tuple[int, int], Expression] = {}
     for (i, j), terms in entries.items():
-        wanted = tuple(1 if k in (i, j) else 0 for k in range(n))
-        if set(terms) - {wanted}:
+        monomial = tuple(1 if k in (i, j) else 0 for k in range(n))
+        if set(terms) - {monomial}:
             return None
         if terms:
-            a[i, j] = terms[wanted]
+            a[i, j] = terms[monomial]
     return LogCanonical(skew(a, n))
 
 

@@ -50,10 +50,10 @@ def expression(value: Any) -> Expression:
 
 
 def _convert(e: Any, known: dict[Any, Expression]) -> Expression:
-    found = known.get(e)
-    if found is None:
-        found = known[e] = _node(e, [_convert(a, known) for a in e.args])
-    return found
+    converted = known.get(e)
+    if converted is None:
+        converted = known[e] = _node(e, [_convert(a, known) for a in e.args])
+    return converted
 
 
 def _node(e: Any, args: list[Expression]) -> Expression:
@@ -121,8 +121,8 @@ class _Sympy(Arithmetic[Any]):
         return sympy.Rational(value.numerator, value.denominator)
 
     def variable(self, name: str) -> Any:
-        own = plain(name).replace("λ_", "lambda_")
-        return self._symbols.get(name) or sympy.Symbol(own, real=True)
+        letters = plain(name).replace("λ_", "lambda_")
+        return self._symbols.get(name) or sympy.Symbol(letters, real=True)
 
     def power(self, base: Any, exponent: Fraction) -> Any:
         return base ** self.constant(exponent)
@@ -168,7 +168,7 @@ class SympySystem:
 
 
 class Described(Protocol):
-    """What a `System` says of itself, as far as it has a counterpart in sympy."""
+    """Attributes of a `System` that have a counterpart in sympy."""
 
     @property
     def name(self) -> str: ...
@@ -193,17 +193,17 @@ class Described(Protocol):
 def symbols_in_sympy(system: Described) -> dict[str, Any]:
     """The symbols of the coordinates, the parameters and the time, by name."""
     real = {c: sympy.Symbol(c, real=True) for c in (*system.coordinates, *system.times)}
-    given = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
-    return real | given
+    parameters = {p.name: sympy.Symbol(p.name, **_assumed(p)) for p in system.parameters}
+    return real | parameters
 
 
 def _assumed(parameter: Parameter) -> dict[str, bool]:
     return {"positive": True} if parameter.positive else {"real": True}
 
 
-def free_symbols(names: Iterable[str], taken: Iterable[str]) -> list[Any]:
-    """Real symbols of these names, with _ after those that are taken."""
-    used = {str(name) for name in taken}
+def free_symbols(names: Iterable[str], used_names: Iterable[str]) -> list[Any]:
+    """Real symbols of these names, with _ after names in use."""
+    used = {str(name) for name in used_names}
     result = []
     for name in names:
         while name in used:
@@ -241,20 +241,20 @@ def parts(
     invariants: Mapping[str, Any] | None,
     time: Any = None,
 ) -> dict[str, Any]:
-    """What a system from sympy is built of, by the names of `build_system`; see `System.from_sympy`."""
+    """Arguments of `build_system` for a system from sympy; see `System.from_sympy`."""
     when = "" if time is None else _name(time)
     names = tuple(_name(c) for c in coordinates)
     matrix = sympy.Matrix(poisson)
     rows = tuple(tuple(expression(matrix[i, j]) for j in range(matrix.cols)) for i in range(matrix.rows))
-    given = tuple(_parameter(p, value) for p, value in (parameters or {}).items())
+    declared = tuple(_parameter(p, value) for p, value in (parameters or {}).items())
     formulas = {key: expression(e) for key, e in {**(casimirs or {}), **(invariants or {})}.items()}
     energy = expression(hamiltonian)
-    kept = [formulas[key] for key in casimirs or {}]
-    _expect_known(names, given, [*(e for row in rows for e in row), *kept])
-    _expect_known((*names, *filter(None, [when])), given, [energy, *formulas.values()])
+    casimir_formulas = [formulas[key] for key in casimirs or {}]
+    _expect_known(names, declared, [*(e for row in rows for e in row), *casimir_formulas])
+    _expect_known((*names, *filter(None, [when])), declared, [energy, *formulas.values()])
     return {
         "coordinates": names,
-        "parameters": given,
+        "parameters": declared,
         "form": MatrixForm(rows),
         "hamiltonian": energy,
         "casimirs": {key: formulas[key] for key in casimirs or {}},
@@ -263,16 +263,18 @@ def parts(
     }
 
 
-def _name(given: Any) -> str:
-    return given if isinstance(given, str) else str(given.name)
+def _name(name_or_symbol: Any) -> str:
+    return name_or_symbol if isinstance(name_or_symbol, str) else str(name_or_symbol.name)
 
 
-def _parameter(given: Any, value: Any) -> Parameter:
+def _parameter(name_or_symbol: Any, value: Any) -> Parameter:
     default = expression(value)
     if not default.is_number:
-        raise SpecError([Diagnostic(f"parameter {_name(given)}: its default {value} is not a rational number")])
-    positive = not isinstance(given, str) and given.is_positive is True
-    return Parameter(_name(given), default.value, positive)
+        raise SpecError(
+            [Diagnostic(f"parameter {_name(name_or_symbol)}: its default {value} is not a rational number")]
+        )
+    positive = not isinstance(name_or_symbol, str) and name_or_symbol.is_positive is True
+    return Parameter(_name(name_or_symbol), default.value, positive)
 
 
 def _expect_known(names: Sequence[str], parameters: Sequence[Parameter], roots: Sequence[Expression]) -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
+from phigen.display import display
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.geometry.casimirs import found_casimirs
 from phigen.geometry.forces import Forces, forces_of
@@ -83,12 +84,12 @@ class System:
 
     @property
     def driven(self) -> bool:
-        """Whether H is no invariant: it depends on the time, or forces or noise do work."""
+        """Whether H is not an invariant: it depends on the time, or forces or noise do work."""
         return bool(self.time) or self.forces is not None or bool(self.noise)
 
     @property
     def frozen(self) -> System:
-        """The system whose time stands still: one more parameter."""
+        """The system with its time as one more parameter."""
         standing = tuple(Parameter(t, Fraction(0)) for t in self.times)
         return replace(self, parameters=(*self.parameters, *standing), time="")
 
@@ -103,7 +104,7 @@ class System:
         return self.shape.algebra if isinstance(self.shape, LiePoisson) else None
 
     def vector_field(self) -> tuple[Expression, ...]:
-        """π∇H, and what the forces add, one expression for each coordinate."""
+        """π∇H plus the forces, one expression for each coordinate."""
         slope = gradient(self.hamiltonian, self.coordinates)
         if self.forces is None:
             return hamiltonian_vector_field(self.poisson, slope)
@@ -112,7 +113,7 @@ class System:
         return tuple(a + b for a, b in zip(tangent, self.forces.vector, strict=True))
 
     def forced_rate(self, function: Expression) -> Expression:
-        """What the forces add to the rate of change of a function F: ∇F·(πζ + f). For H it is their work."""
+        """Contribution of the forces to the rate of change of a function F: ∇F·(πζ + f). For H it is their power."""
         if self.forces is None:
             return ZERO
         moved = hamiltonian_vector_field(self.poisson, self.forces.covector)
@@ -120,7 +121,7 @@ class System:
         return total(s * (a + b) for s, a, b in zip(slopes, moved, self.forces.vector, strict=True) if not s.is_zero)
 
     def forced_rate_of_casimir(self, casimir: Expression) -> Expression:
-        """The same of a Casimir, which πζ does not change: ∇C·f."""
+        """Contribution of the forces to the rate of change of a Casimir: ∇C·f, since πζ conserves it."""
         if self.forces is None:
             return ZERO
         slopes = gradient(casimir, self.coordinates)
@@ -163,15 +164,11 @@ class System:
 
     def _repr_latex_(self) -> str:
         """π, H, Casimirs and invariants, for notebooks."""
-        from phigen.notation.notebook import system_latex
-
-        return system_latex(self)
+        return cast(str, display("formulas of a system")(self))
 
     def _repr_html_(self) -> str:
         """The same with the parameters, for notebooks."""
-        from phigen.notation.notebook import system_html
-
-        return system_html(self)
+        return cast(str, display("page of a system")(self))
 
 
 def system_from_spec(spec: Spec) -> System:
@@ -200,7 +197,7 @@ def system_from_spec(spec: Spec) -> System:
 
 
 def system_of_lattice(spec: Spec) -> SpecError:
-    """The error for a lattice where one system of a few coordinates is wanted."""
+    """Refuse a lattice where one system of a few coordinates is required."""
     message = f"{spec.name} is a lattice, and this is for one system of a few coordinates"
     hint = "phigen.compile takes it as it is; phigen show --expand SIZES prints a small one as an ordinary spec"
     return SpecError([spec.diagnostic(("lattice",), message, hint)])
@@ -227,8 +224,8 @@ def build_system(
         matrix, shape = structure(form, coordinates)
     except SpecError as error:
         raise _located(error, locations) from None
-    taken = {*coordinates, time, *(p.name for p in parameters), *declared, *(invariants or {})}
-    found, notes = found_casimirs(coordinates, matrix, shape, form, declared, taken)
+    used_names = {*coordinates, time, *(p.name for p in parameters), *declared, *(invariants or {})}
+    further_casimirs, notes = found_casimirs(coordinates, matrix, shape, form, declared, used_names)
     acting = None
     if forces:
         acting = forces_of(forces, coordinates, hamiltonian_vector_field(matrix, gradient(hamiltonian, coordinates)))
@@ -238,7 +235,7 @@ def build_system(
         tuple(parameters),
         matrix,
         hamiltonian,
-        declared | found,
+        declared | further_casimirs,
         dict(invariants or {}),
         shape,
         form,

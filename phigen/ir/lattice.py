@@ -36,7 +36,7 @@ class LatticeLoops:
         storage = ir.Storage.VARIATION if sweep.is_tangent else ir.Storage.STATE
         arrays = (ir.Array(storage, k, self.program.coordinates[k]) for k in sweep.moved)
         stores = [ir.Store(array, e) for array, e in zip(arrays, sweep.kernel.roots, strict=True)]
-        role = ir.Role.TANGENT_SWEEP if sweep.is_tangent else ir.Role.SWEEP
+        role = ir.LoopRole.TANGENT_SWEEP if sweep.is_tangent else ir.LoopRole.SWEEP
         parameters = ("coef", "state", *["varied"] * sweep.is_tangent, "sites", *["colour"] * bool(self.step.by_colour))
         return self._over_sites(sweep.kernel, role, parameters, stores, sweep.gather, self._selection(sweep))
 
@@ -50,19 +50,22 @@ class LatticeLoops:
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
         parameters = ("coef", *starts, "state", *varied, "sites", "out")
-        return self._over_sites(kernel, ir.Role.STAGE, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read)
+        return self._over_sites(
+            kernel, ir.LoopRole.STAGE, parameters, self._outputs(ir.Storage.OUTPUT, kernel.roots), read
+        )
 
     def observable(self, kernel: Kernel) -> ir.Function:
         """Return the function of a density, an energy or the vector field; sites share the energy of bonds."""
         others = self.step.others
-        gather = {"energy": others.energy, "vector_field": others.field}.get(kernel.name)
+        gathers = {"energy": others.energy, "vector_field": others.field, "observables": others.observed}
+        gather = gathers.get(kernel.name)
         body: list[ir.Statement] = [*self._outputs(ir.Storage.OBSERVABLE, kernel.roots)]
         if kernel.name == "energy" and others.energy.names:
             shared, out = Symbol(symbols.GATHERED, "energy"), ir.Array(ir.Storage.OBSERVABLE, 0)
             body.insert(0, ir.real(shared, ir.Load(ir.Array(ir.Storage.SUM, 0))))
             body.append(ir.Store(out, _HALF * symbol(shared)))
         gather = gather if gather and gather.names else None
-        return self._over_sites(kernel, ir.Role.OBSERVABLE, ("params", "state", "sites", "out"), body, gather)
+        return self._over_sites(kernel, ir.LoopRole.OBSERVABLE, ("params", "state", "sites", "out"), body, gather)
 
     def sums(self, ends: Ends) -> ir.Function:
         """Return the function that sums over the bonds of one kind, or over the pairs, of each site."""
@@ -75,24 +78,24 @@ class LatticeLoops:
         varied = "varied" in kernel.inputs or ends in self.step.others.varied.ends
         colour = source == "coef" and bool(self.step.by_colour)
         parameters = (source, "state", *["varied"] * varied, "sites", *["colour"] * colour)
-        return ir.Function(kernel.name, kernel.purpose, ir.Role.GATHER, parameters, (*once, loop))
+        return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.GATHER, parameters, (*once, loop))
 
     def transposed_sweep(self, sweep: Sweep, kernel: Kernel) -> ir.Function:
         """Return the transpose of a sweep, whose kernel is ``kernel``."""
         stores = self._cotangents(kernel, sweep.gather.names if sweep.gather else ())
-        role = ir.Role.TRANSPOSED_SWEEP
+        role = ir.LoopRole.TRANSPOSED_SWEEP
         return self._over_sites(kernel, role, ("coef",), stores, sweep.gather, self._selection(sweep))
 
     def transposed_stage(self, kernel: Kernel, gather: Gather | None) -> ir.Function:
         """Return the transpose of a kernel of the equation of a stage, which reads sums over bonds or pairs or not."""
         stores = self._cotangents(kernel, gather.names if gather else ())
-        return self._over_sites(kernel, ir.Role.TRANSPOSED_STAGE, ("coef",), stores, gather)
+        return self._over_sites(kernel, ir.LoopRole.TRANSPOSED_STAGE, ("coef",), stores, gather)
 
     def recomputing(self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str]) -> ir.Function:
         """Return either, which reads ``sums`` that are there already and recomputes ``fields`` before a sweep."""
         once, reads = self._reads(kernel, sums)
         loop = ir.Loop("sites", (*reads, *self._cotangents(kernel, sums, fields)))
-        return ir.Function(kernel.name, kernel.purpose, ir.Role.TRANSPOSED_SWEEP, ("coef",), (*once, loop))
+        return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.TRANSPOSED_SWEEP, ("coef",), (*once, loop))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
         """Return the transpose of the function that sums over bonds or pairs, by their transposed kernel."""
@@ -100,7 +103,7 @@ class LatticeLoops:
         source = "params" if "params" in kernel.inputs else "coef"
         body = (*reads, *self._cotangents(kernel))
         loop = ir.Loop("bonds" if self.step.others.graph else "pairs", body, end=ends.end, chosen=ends.chosen)
-        return ir.Function(kernel.name, kernel.purpose, ir.Role.TRANSPOSED_GATHER, (source,), (*once, loop))
+        return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.TRANSPOSED_GATHER, (source,), (*once, loop))
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
         """Yield what a transposed kernel stores, zeros left out; ``fields`` are those that it recomputes."""
@@ -134,7 +137,7 @@ class LatticeLoops:
     def _over_sites(
         self,
         kernel: Kernel,
-        role: ir.Role,
+        role: ir.LoopRole,
         parameters: tuple[str, ...],
         updates: Iterable[ir.Statement],
         gather: Gather | None,

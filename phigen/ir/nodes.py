@@ -413,8 +413,8 @@ Block = tuple[Statement, ...]
 PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "out")
 
 
-class Role(Enum):
-    """Purpose of a function."""
+class LoopRole(Enum):
+    """Purpose of a function of loops; `phigen.scheme.kernel.Role` is that of a kernel."""
 
     SWEEP = auto()
     TANGENT_SWEEP = auto()
@@ -432,7 +432,7 @@ class Function:
 
     name: str
     doc: str
-    role: Role
+    role: LoopRole
     parameters: tuple[str, ...]
     body: Block
 

@@ -183,7 +183,7 @@ def _rows(program: Program, step: Sweeps) -> Rows:
     """
     swept = [sweep.kernel for part in step.parts for sweep in part]
     swept += step.equation.kernels if step.equation else ()
-    gathers = (step.partners.energy, step.partners.field) if step.partners else ()
+    gathers = (step.partners.energy, step.partners.field, step.partners.observed) if step.partners else ()
     seen = {kernel.name for gather in gathers for kernel in gather.kernels}
     back = (step.adjoint.prepare, step.adjoint.refresh) if step.adjoint else ()
     apart = {id(kernel) for kernel in (step.prepare, step.refresh, *back)}  # of coefficients, not of sites

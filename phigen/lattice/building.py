@@ -58,6 +58,8 @@ def cell_from_spec(spec: Spec) -> Cell:
         spec.time,
         spec.forces,
         spec.noise,
+        spec.observables,
+        lattice.reductions,
     )
     problems = [
         *_not_along_bonds(spec, cell),
@@ -70,8 +72,12 @@ def cell_from_spec(spec: Spec) -> Cell:
 
 
 def least_sizes(cell: Cell) -> tuple[int, ...]:
-    """The sizes that a grid has at least: no site is its own neighbour, and an open one has room for all of H and π."""
-    return tuple(1 + max(h, p) for h, p in zip(cell.hamiltonian_reach, cell.poisson_reach, strict=True))
+    """The sizes that a grid has at least: no site is its own neighbour, and an open one has room for all of H and π.
+
+    There is room for what is observed, too.
+    """
+    reaches = zip(cell.hamiltonian_reach, cell.poisson_reach, cell.observed_reach, strict=True)
+    return tuple(1 + max(reach) for reach in reaches)
 
 
 def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:

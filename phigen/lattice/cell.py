@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from phigen.spec.model import NO_FORCES, Parameter, SpecForces, SpecNoise
+from phigen.spec.model import NO_FORCES, Parameter, Reduction, SpecForces, SpecNoise
 from phigen.symbolic.expression import ZERO, Expression, gradient, mul, neg, symbol, total
 from phigen.symbolic.neighbours import ENDS, Neighbours, Offset, Place, minus, plus, steps
 from phigen.symbolic.symbols import increment
@@ -32,7 +32,8 @@ class Cell:
     a bond. H is the sum of the densities; at open ends without those of their `terms` that reach beyond.
     ``casimirs`` maps names to a density and ``sites`` (one for each site), ``sum`` or ``product``; ``invariants`` are
     sums over sites. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is none.
-    ``forces`` and the sources of ``noise`` are those at a site; each site has noise of its own.
+    ``forces`` and the sources of ``noise`` are those at a site; each site has noise of its own. ``observables`` are
+    densities, of which ``reductions`` make numbers, and fields.
     """
 
     name: str
@@ -51,6 +52,8 @@ class Cell:
     time: str = ""
     forces: SpecForces = NO_FORCES
     noise: Mapping[str, SpecNoise] = field(default_factory=dict)
+    observables: Mapping[str, Expression] = field(default_factory=dict)
+    reductions: Mapping[str, Reduction] = field(default_factory=dict)
 
     @property
     def driven(self) -> bool:
@@ -141,7 +144,17 @@ class Cell:
     @cached_property
     def hamiltonian_reach(self) -> tuple[int, ...]:
         """How far apart two sites of one term of H are at most, along each axis."""
-        widths = [[h - low for low, h in zip(*self.extent(t), strict=True)] for t in self.terms]
+        return self._widest(self.terms)
+
+    @cached_property
+    def observed_reach(self) -> tuple[int, ...]:
+        """How far apart two sites of one observable are at most, along each axis."""
+        return self._widest(self.observables.values())
+
+    def _widest(self, expressions: Iterable[Expression]) -> tuple[int, ...]:
+        """Return how far apart two sites of one of the expressions are at most, along each axis."""
+        grid = expressions if self.axes else ()
+        widths = [[h - low for low, h in zip(*self.extent(e), strict=True)] for e in grid]
         return tuple(max((w[k] for w in widths), default=0) for k in range(len(self.axes)))
 
     def _reach(self, expressions: Iterable[Expression]) -> tuple[int, ...]:

@@ -251,7 +251,7 @@ def _decimal(value: float) -> Fraction:
 
 
 def _free(name: str, site: Site, taken: set[str]) -> str:
-    """``x_1_2``; with underscores added where that name has a meaning already."""
+    """``x_1_2``; with underscores added where that name is in use already."""
     found = "_".join([name, *map(str, site)])
     while found in taken:
         found += "_"

@@ -66,7 +66,7 @@ def _residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
     required = substitute([motion.rates.get(f, ZERO) for f in names], point)
     yield from zip((f"{f} at t = 0" for f in names), start, strict=True)
     for f, a, b in zip(names, speeds, required, strict=True):
-        yield f"rate of {f}", a - angles_added(b)
+        yield f"rate of {f}", angles_added(a) - angles_added(b)
     for f, rate in motion.rates.items():
         if f not in motion.solution:
             yield f"rate of {f}", rate

@@ -462,7 +462,7 @@ class PartSearch:
             flows = (
                 [joint]
                 if isinstance(joint, Flow)
-                else [flow_of(ring, group) for group in Conflicts(ring).grouped(listed)]
+                else [flow_of(ring, group, numeric=False) for group in Conflicts(ring).grouped(listed)]
             )
         except NoFlowError as error:
             raise NoPartError(error.term.expression, error.reason) from None

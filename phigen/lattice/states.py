@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,12 +50,25 @@ def start_of(spec: Spec, run: Run) -> Start:
     return _Reader(spec, run).start()
 
 
+def defaults_at(spec: Spec, names: Collection[str], sizes: tuple[int, ...], bonds: int) -> dict[str, Floats]:
+    """Return the defaults of parameters that are formulas, lists, files or random, at the given sizes.
+
+    ``bonds`` is the number of bonds of a graph. Raises `SpecError` for those that do not fit, with their place.
+    """
+    arrays = {}
+    for p in spec.parameters:
+        if p.name in names and p.values is not None:
+            shape = sizes if p.at == "sites" else (bonds,)
+            hint = f"give {p.name}=, an array of shape {shape}, or one number"
+            arrays[p.name] = _Arrays(spec, sizes, hint=hint).read(p.values, shape, p.name)
+    return arrays
+
+
 class _Reader:
     def __init__(self, spec: Spec, run: Run) -> None:
         if spec.lattice is None or run.lattice is None:
             raise ValueError(f"{spec.name} is no lattice")
         self.spec, self.run, self.lattice, self.given = spec, run, spec.lattice, run.lattice
-        self.folder = Path(spec.file).parent
 
     def start(self) -> Start:
         bonds, columns = self._bonds(self.given)
@@ -63,7 +76,7 @@ class _Reader:
         if len(bonds) and bonds.max() >= sizes[0]:
             raise self._error("bonds", f"a bond ends at site {bonds.max()}, but there are {sizes[0]} sites")
         self._expect_room(sizes)
-        self.indices = self._counters(sizes)
+        self.arrays = _Arrays(self.spec, sizes, self.run.name)
         parameters: dict[str, float | Floats] = dict(self.spec.parameters_of(self.run))
         for p in self.spec.parameters:
             if p.at != "all":
@@ -74,7 +87,7 @@ class _Reader:
                 else:
                     found = found or p.values
                     whole = np.full(shape, float(p.value))
-                    parameters[p.name] = whole if found is None else self._array(found, shape, p.name)
+                    parameters[p.name] = whole if found is None else self.arrays.read(found, shape, p.name)
                 if p.positive and np.any(np.asarray(parameters[p.name]) <= 0):
                     message = f"the parameter {p.name!r} is positive by declaration, but not all its values are"
                     raise self._error("parameters", message)
@@ -97,23 +110,45 @@ class _Reader:
             raise self._error("initial", "the number of sites is not known", "sizes: [N]")
         return max([*lengths, int(bonds.max()) + 1 if len(bonds) else 0])
 
-    def _counters(self, sizes: Sequence[int]) -> dict[str, Any]:
-        grids = np.meshgrid(*(np.arange(n, dtype=np.float64) for n in sizes), indexing="ij")
-        found: dict[str, Any] = dict(zip(self.lattice.indices, grids, strict=True))
-        return found | {f"N_{i}": float(n) for i, n in zip(self.lattice.indices, sizes, strict=True)}
-
     def _state(self, sizes: tuple[int, ...]) -> Floats:
         fields, given = self.spec.coordinates, self.given.state
         shape = (len(fields), *sizes)
         if "" not in given:
-            return np.stack([self._array(given[f], sizes, f) for f in fields])
+            return np.stack([self.arrays.read(given[f], sizes, f) for f in fields])
         values = given[""]
         if values.random != "sphere":
-            return self._array(values, shape, "initial")
+            return self.arrays.read(values, shape, "initial")
         drawn = np.random.default_rng(values.seed).normal(size=shape)
         return np.asarray(float(values.scale) * drawn / np.sqrt((drawn**2).sum(axis=0)))
 
-    def _array(self, values: Values, shape: tuple[int, ...], name: str) -> Floats:
+    def _bonds(self, given: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
+        if not isinstance(given.bonds, str):
+            return np.array(given.bonds, dtype=np.int64).reshape(-1, 2), {}
+        if not given.bonds:
+            return np.zeros((0, 2), dtype=np.int64), {}
+        at_bonds = [p.name for p in self.spec.parameters if p.at == "bonds"]
+        try:
+            return bonds_in(Path(self.spec.file).parent / given.bonds, at_bonds)
+        except (OSError, ValueError) as error:
+            raise self._error("bonds", f"bonds: cannot read {given.bonds!r}: {_reason(error)}") from None
+
+
+class _Arrays:
+    """Values of a spec as arrays over the sites or bonds of a lattice of given sizes.
+
+    ``run`` is the name of the run whose values they may be, and ``hint`` that of errors.
+    """
+
+    def __init__(self, spec: Spec, sizes: Sequence[int], run: str = "", hint: str = "") -> None:
+        assert spec.lattice is not None
+        grids = np.meshgrid(*(np.arange(n, dtype=np.float64) for n in sizes), indexing="ij")
+        indices: dict[str, Any] = dict(zip(spec.lattice.indices, grids, strict=True))
+        self.indices = indices | {f"N_{i}": float(n) for i, n in zip(spec.lattice.indices, sizes, strict=True)}
+        self.spec, self.run, self.hint = spec, run, hint
+        self.folder = Path(spec.file).parent
+
+    def read(self, values: Values, shape: tuple[int, ...], name: str) -> Floats:
+        """Return values as an array of that shape. Raises `SpecError` if they do not fit."""
         if values.file:
             try:
                 return values_in(self.folder / values.file, name, shape)
@@ -140,21 +175,10 @@ class _Reader:
 
     def _refused(self, name: str, message: str) -> SpecError:
         """The error of the values of a field, of a parameter, or of the whole state, at the place of these."""
-        here = ("runs", self.run.name)
+        here = ("runs", self.run)
         paths = [(*here, "parameters", name), ("parameters", name, "value"), (*here, "initial", name)]
         path = next((p for p in paths if p in self.spec.locations), (*here, "initial"))
-        return SpecError([self.spec.diagnostic(path, f"{name}: {message}")])
-
-    def _bonds(self, given: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
-        if not isinstance(given.bonds, str):
-            return np.array(given.bonds, dtype=np.int64).reshape(-1, 2), {}
-        if not given.bonds:
-            return np.zeros((0, 2), dtype=np.int64), {}
-        at_bonds = [p.name for p in self.spec.parameters if p.at == "bonds"]
-        try:
-            return bonds_in(self.folder / given.bonds, at_bonds)
-        except (OSError, ValueError) as error:
-            raise self._error("bonds", f"bonds: cannot read {given.bonds!r}: {_reason(error)}") from None
+        return SpecError([self.spec.diagnostic(path, f"{name}: {message}", self.hint)])
 
 
 def _reason(error: Exception) -> str:

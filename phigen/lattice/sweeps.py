@@ -12,9 +12,10 @@ from phigen.lattice.adjoint import transposed
 from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfits, since_of, since_seam, told_at
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.damping import TogetherError
-from phigen.lattice.graphs import GraphSearch, energies, field_with_sums, site_sums
+from phigen.lattice.graphs import GraphSearch, energies, site_sums
 from phigen.lattice.kernels import site_kernel
 from phigen.lattice.kicks import cell_kicks
+from phigen.lattice.observables import observables, observed_sums
 from phigen.lattice.parts import (
     BondSum,
     CellFlow,
@@ -23,9 +24,7 @@ from phigen.lattice.parts import (
     NoPartError,
     PartSearch,
     SiteMotion,
-    present,
     splittings,
-    summands_of,
 )
 from phigen.lattice.series import SeriesPlan, equation, plan_series
 from phigen.lattice.variations import along, with_variations
@@ -39,7 +38,7 @@ from phigen.scheme.lowering import operation_counts
 from phigen.scheme.noise import noise_said, with_noise
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
-from phigen.scheme.program import About, Noise, Observables, Program
+from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Ends, Gather, Partners, Seam, Sites, Sweep, Sweeps
 from phigen.spec.model import Spec
@@ -47,7 +46,6 @@ from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
-from phigen.symbolic.expression import total
 from phigen.symbolic.neighbours import steps
 
 
@@ -230,13 +228,13 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         {"params": plain_names, "h": (TIME,), **({"kick": (KICK,)} if schedule.multiples else {})},
         (Output("coef", tuple(coefficients.values)),),
     )
-    observed = _observables(cell)
+    observed = observables(cell, single=extras.real == "float")
     kernels = [*(sweep.kernel for part in swept for sweep in part), *((solved.relax, solved.advance) if solved else ())]
     drawn = Noise(tuple(cell.noise), 1 if solved else 2) if cell.noise else None
-    sites = _sites(cell, plan.colouring, [*kernels, observed.energy, observed.casimirs, observed.vector_field])
+    sites = _sites(cell, plan.colouring, [*kernels, *observed.kernels])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
     if partners:
-        own = (partners.energy, partners.field, partners.varied)
+        own = partners.gathers
         every = [s for part in swept for sweep in part for s in (sweep, sweep.tangent) if s]
         gathers = [*(sweep.gather for sweep in every if sweep.gather), *own]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
@@ -264,6 +262,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         time=cell.time,
         parameters=cell.parameters,
         casimirs=tuple(cell.casimirs),
+        observed=tuple(cell.reductions),
         order=plan.order.order,
         step=step,
         observables=observed,
@@ -374,18 +373,7 @@ def _partners(cell: Cell, *, varied: bool) -> Partners | None:
         _gather(cell, sums, f"{what}_forces", purpose) or empty,
         cell.relation == GRAPH,
         _gather(cell, follow, f"{what}_slopes", f"{purpose}, and to their variations") or empty,
-    )
-
-
-def _observables(cell: Cell) -> Observables:
-    """The densities of the Hamiltonian and of the Casimirs, and the vector field at a site."""
-    origin = [0] * len(cell.axes)
-    density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell) if not s.bond)
-    casimirs = [density for density, _ in cell.casimirs.values()]
-    return Observables(
-        site_kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
-        site_kernel(cell, "casimirs", "the densities of the Casimirs", casimirs, "out"),
-        site_kernel(cell, "vector_field", "pi grad H", field_with_sums(cell), "out"),
+        _gather(cell, observed_sums(cell), f"{what}_quantities", f"the densities of observables of a {what}") or empty,
     )
 
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import cast
 
+from phigen.display import display
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import Cell
 from phigen.spec.model import Spec
@@ -40,9 +42,7 @@ class LatticeSystem:
 
     def _repr_latex_(self) -> str:
         """Return brackets, H, Casimirs and invariants as formulas, for notebooks."""
-        from phigen.notation import lattices
-
-        return lattices.document(self.cell)
+        return cast(str, display("formulas of a cell")(self.cell))
 
 
 def lattice_from_spec(spec: Spec) -> LatticeSystem:

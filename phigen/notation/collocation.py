@@ -1,4 +1,4 @@
-"""Gauss collocation, for reading: the order, the equations of a step, and what its unknowns are."""
+"""Gauss collocation, for reading: the order, the equations of a step, and its unknowns."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ def equations() -> list[tuple[str, str]]:
 
 def lines(compilation: Compilation) -> list[str]:
     """Describe the unknowns, one line for each part, and the step."""
-    found, names = [], compilation.system.coordinates
+    listed_lines, names = [], compilation.system.coordinates
     for part in realisation_of(compilation).parts:
         listed = ", ".join(names[i] for i in part.indices)
         if isinstance(part, Plain):
-            found.append(f"{listed}: themselves")
+            listed_lines.append(f"{listed}: themselves")
             continue
         shifts = [f"{names[i]} + {readable([s], None)[0]}" for i, s in zip(part.indices, part.shift, strict=True)]
         shown = listed if all(s.is_zero for s in part.shift) else ", ".join(shifts)
-        found.append(
+        listed_lines.append(
             f"{shown}: x̃(G E_a G*) with G in an algebra of dimension {part.algebra.dimension}, G = 1 at the start"
         )
     exact = realisation_of(compilation).exact
-    found.append(
+    listed_lines.append(
         "the step is a Poisson map" if exact else "the step is a Poisson map to truncation only, that is: none"
     )
-    return found
+    return listed_lines
 
 
 def described(compilation: Compilation) -> dict[str, object]:

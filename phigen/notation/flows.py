@@ -25,28 +25,28 @@ def flows_of(compilation: Compilation) -> tuple[Flow, ...]:
 
 
 def images(flow: Flow, coordinates: Sequence[str]) -> dict[str, Expression]:
-    """Where a flow takes the coordinates that move, in the time ``h:``."""
+    """Images of the coordinates that a flow changes, after the time ``h:``."""
     return {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
-    """What it is the flow of: the Hamiltonian, or the components of a force that are not 0, by coordinates."""
+    """The generator of a flow: its Hamiltonian, or the non-zero components of a force, by coordinates."""
     if not flow.force:
         return [("", flow.hamiltonian)]
     return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]
 
 
 def formulas(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
-    """The parts of H, and where the flow of each takes the coordinates, as pairs of a name and a text.
+    """The parts of H and the images of the coordinates under the flow of each, as pairs of a name and a text.
 
-    Where that is long, what occurs in it more than once has a name, σ with a number, and comes after it.
+    Parts that occur more than once in long formulas have names, σ with a number, and come last.
     """
     listed: list[tuple[str, str]] = []
     for k, flow in enumerate(flows_of(compilation), 1):
         moved = images(flow, compilation.system.coordinates)
         named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
-        own = [e for _, e in definitions(flow, compilation.system.coordinates)]
-        listed += zip(named, readable(own, most), strict=True)
+        local = [e for _, e in definitions(flow, compilation.system.coordinates)]
+        listed += zip(named, readable(local, most), strict=True)
         listed += [(f"Φ_{k}: {name}", text) for name, text in parts.texts(moved, most)]
     return listed
 
@@ -63,10 +63,10 @@ def described(compilation: Compilation) -> dict[str, object]:
     parts = []
     for flow in flows_of(compilation):
         moved = images(flow, compilation.system.coordinates)
-        own = definitions(flow, compilation.system.coordinates)
-        texts = readable([*(e for _, e in own), *moved.values()], None)
-        force = {c: t for (c, _), t in zip(own, texts, strict=False)}
+        local = definitions(flow, compilation.system.coordinates)
+        texts = readable([*(e for _, e in local), *moved.values()], None)
+        force = {c: t for (c, _), t in zip(local, texts, strict=False)}
         part: dict[str, object] = {"force": force} if flow.force else {"hamiltonian": texts[0]}
-        parts.append(part | {"flow": dict(zip(moved, texts[len(own) :], strict=True)), "manner": flow.manner})
+        parts.append(part | {"flow": dict(zip(moved, texts[len(local) :], strict=True)), "manner": flow.manner})
     steps = [[part + 1, time] for part, time in schedule(compilation.program.step)]
     return {"scheme": "splitting", "parts": parts, "flows": steps}

@@ -1,4 +1,4 @@
-"""The generating function of a compilation: what the order rests on, and S_1 … S_k as formulas."""
+"""The generating function of a compilation: the reason for its order, and S_1 … S_k as formulas."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Generating:
 
     @property
     def missing(self) -> str:
-        """What is said of those that are not listed."""
+        """The remark on the terms that are not listed."""
         return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
 
 
@@ -73,6 +73,6 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
         raise SpecError([Diagnostic(message, hint="scheme: series has it")])
     system, chart = compilation.system, compilation.chart
     expect_modified(system, chart, len(compilation.program.fractions))
-    found = corrections(system, chart, compilation.order, count, compilation.gauge)
+    series = corrections(system, chart, compilation.order, count, compilation.gauge)
     listed = powers(compilation.order, count, symmetric=chart.symmetric)
-    return [(j, of_polynomial(found.tower, found.terms[j], most)) for j in listed]
+    return [(j, of_polynomial(series.tower, series.terms[j], most)) for j in listed]

@@ -78,13 +78,13 @@ def _tensor(system: System) -> str:
 
 
 def _flow(compilation: Compilation, k: int) -> str:
-    """A part of H, and where its flow for the time h takes the coordinates that move."""
+    """A part of H, and the images of the coordinates that its flow changes, after the time h."""
     flow = flows.flows_of(compilation)[k - 1]
     moved = flows.images(flow, compilation.system.coordinates)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
-    own = flows.definitions(flow, compilation.system.coordinates)
-    left = [*(mathml.component(flow.letter, k, c) for c, _ in own), *(pulled + mathml.name(c) for c in moved)]
-    return aligned(_equations(left, [*(e for _, e in own), *moved.values()]))
+    local = flows.definitions(flow, compilation.system.coordinates)
+    left = [*(mathml.component(flow.letter, k, c) for c, _ in local), *(pulled + mathml.name(c) for c in moved)]
+    return aligned(_equations(left, [*(e for _, e in local), *moved.values()]))
 
 
 def _maps(compilation: Compilation) -> Iterator[str]:
@@ -102,19 +102,19 @@ def _maps(compilation: Compilation) -> Iterator[str]:
 
 
 def _gauged(compilation: Compilation) -> str:
-    """The Hamiltonian that the series is of, if Casimirs are subtracted, to stand before what S_1 is."""
+    """The Hamiltonian of the series, if Casimirs are subtracted; precedes the formula of S_1."""
     gauge = compilation.gauge
     factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
     parts = zip(factors, (*gauge.free, *gauge.fixed), strict=True)
-    taken = "".join(f"<mo>−</mo>{factor}{_TIMES}{mathml.name(casimir)}" for factor, casimir in parts)
-    return f"<mi>H</mi>{taken}{_EQUALS}" if taken else ""
+    subtracted = "".join(f"<mo>−</mo>{factor}{_TIMES}{mathml.name(casimir)}" for factor, casimir in parts)
+    return f"<mi>H</mi>{subtracted}{_EQUALS}" if subtracted else ""
 
 
 def _series(compilation: Compilation, most: int | None) -> Iterator[Equation]:
-    found = series_formulas(compilation, most)
-    listed = [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(found.listed)]
-    yield _indexed("S", "h"), [*listed, *([f"{_PLUS}<mo>…</mo>"] if found.beyond else [])]
-    for i, formula in found.listed:
+    series = series_formulas(compilation, most)
+    listed = [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(series.listed)]
+    yield _indexed("S", "h"), [*listed, *([f"{_PLUS}<mo>…</mo>"] if series.beyond else [])]
+    for i, formula in series.listed:
         first, *others = _pieces(formula)
         yield _indexed("S", i), [_gauged(compilation) * (i == 1) + first, *others]
 
@@ -124,21 +124,21 @@ def _assigned(names: Sequence[str], expressions: Sequence[Expression]) -> list[E
 
 
 def _equations(left: Sequence[str], expressions: Sequence[Expression], more: Sequence[str] = ()) -> list[Equation]:
-    """Equations for expressions that share parts, which get names and equations of their own, after these."""
-    found = parts.readable(expressions)
-    listed = [(name, [*mathml.pieces(form), *more]) for name, form in zip(left, found.forms, strict=True)]
-    return [*listed, *((mathml.name(name), mathml.pieces(e)) for name, e in found.parts)]
+    """Equations for expressions; shared parts get names and equations of their own at the end."""
+    formulas = parts.readable(expressions)
+    listed = [(name, [*mathml.pieces(form), *more]) for name, form in zip(left, formulas.forms, strict=True)]
+    return [*listed, *((mathml.name(name), mathml.pieces(e)) for name, e in formulas.parts)]
 
 
 def _pieces(formula: Formula) -> list[str]:
-    """A polynomial; the divisor before it, and after it how many terms it has if not all are shown."""
+    """A polynomial with its divisor before it; if terms are left out, their total number follows."""
     first, *others = mathml.pieces(replace(formula, divisor=1))
-    found = [first, *others]
+    pieces = [first, *others]
     if formula.divisor != 1:
         scale = f"<mfrac><mn>1</mn><mn>{formula.divisor}</mn></mfrac>{_TIMES}"
-        found = [f"{scale}<mo>(</mo>{first}", *others]
-        found[-1] += "<mo>)</mo>"
-    return [*found, f"<mtext>({formula.size} terms)</mtext>"] if formula.hidden else found
+        pieces = [f"{scale}<mo>(</mo>{first}", *others]
+        pieces[-1] += "<mo>)</mo>"
+    return [*pieces, f"<mtext>({formula.size} terms)</mtext>"] if formula.hidden else pieces
 
 
 def aligned(equations: Sequence[Equation] | Iterator[Equation]) -> str:

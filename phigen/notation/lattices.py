@@ -12,14 +12,14 @@ from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.neighbours import Offset, steps
 from phigen.symbolic.readable import SHOWN, readable
 
-#: A formula: what is on the left, as text and as markup, and the right side.
+#: A formula: its left side as text and as markup, and its right side.
 Named = tuple[str, str, Expression]
 
 KINDS = {"sites": "", "sum": "Σ ", "product": "Π "}
 
 
 def described(cell: Cell) -> str:
-    """How the sites are related, in words."""
+    """The relation between sites, in words."""
     if cell.relation == GRID:
         axes = ", ".join(f"{a} ({b})" for a, b in zip(cell.axes, cell.boundary, strict=True))
         return f"grid with the axes {axes}" if len(cell.axes) > 1 else f"chain along {axes}"
@@ -28,13 +28,13 @@ def described(cell: Cell) -> str:
 
 def brackets(cell: Cell) -> list[tuple[str, Expression]]:
     """The brackets that are not 0, in one order: of fields of a site first, then with neighbours."""
-    found: list[tuple[str, Expression]] = []
+    entries: list[tuple[str, Expression]] = []
     seen: set[tuple[str, str]] = set()
     for (f, other), value in (*cell.bracket.items(), *cell.bond_bracket.items()):
         if (f, other) not in seen:
-            found.append((f"{{{f}, {other}}}", value))
+            entries.append((f"{{{f}, {other}}}", value))
             seen |= {(f, other), _mirrored(cell, f, other)}
-    return found
+    return entries
 
 
 def _mirrored(cell: Cell, f: str, other: str) -> tuple[str, str]:
@@ -46,7 +46,7 @@ def _mirrored(cell: Cell, f: str, other: str) -> tuple[str, str]:
 
 def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple[str, str]]]]:
     """Titles with lines (left, right) of text."""
-    found = [
+    contents = [
         ("Poisson tensor of a site" if cell.is_local else "Poisson tensor", brackets(cell)),
         ("Hamiltonian, the sum of", _densities(cell)),
         ("Forces at a site: ẋ = π(∇H + ζ) + f, and with damping λ: ζ + λ π∇H for ζ", _forces(cell)),
@@ -57,7 +57,7 @@ def sections(cell: Cell, most: int | None = SHOWN) -> list[tuple[str, list[tuple
     ]
     return [
         (title, list(zip((n for n, _ in listed), readable([e for _, e in listed], most), strict=True)))
-        for title, listed in found
+        for title, listed in contents
         if listed
     ]
 
@@ -69,8 +69,8 @@ def _forces(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def _noise(cell: Cell) -> list[tuple[str, Expression]]:
-    found = [((f"σ_{name}", s.amplitude), (f"g_{name}", s.hamiltonian)) for name, s in cell.noise.items()]
-    return [line for pair in found for line in pair]
+    pairs = [((f"σ_{name}", s.amplitude), (f"g_{name}", s.hamiltonian)) for name, s in cell.noise.items()]
+    return [line for pair in pairs for line in pair]
 
 
 def _densities(cell: Cell) -> list[tuple[str, Expression]]:
@@ -79,11 +79,11 @@ def _densities(cell: Cell) -> list[tuple[str, Expression]]:
 
 
 def rates(cell: Cell) -> list[tuple[str, Expression]]:
-    """The field at a site of a grid; where sites have bonds, what each adds to the gradient of H."""
+    """The vector field at a site of a grid; for bonds, the contribution of each to the gradient of H."""
     if cell.relation == GRID:
         return [(f"d{f}/dt", e) for f, e in vector_field(cell).items()]
-    own = [(f"∂h/∂{f}", e) for f, e in forces(cell).items() if not e.is_zero]
-    return own + [(f"∂h/∂{f}", e) for f, e in bond_forces(cell).items()]
+    site_rates = [(f"∂h/∂{f}", e) for f, e in forces(cell).items() if not e.is_zero]
+    return site_rates + [(f"∂h/∂{f}", e) for f, e in bond_forces(cell).items()]
 
 
 def document(cell: Cell) -> str:

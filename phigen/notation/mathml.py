@@ -21,7 +21,7 @@ from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.readable import Formula
 from phigen.symbolic.symbols import GAUGE, PART, Symbol
 
-#: Characters of markup beyond which a part of a formula is left out; what is shared should have a name by then.
+#: Characters of markup beyond which a part of a formula is left out; shared parts of such length have names.
 LONGEST = 60_000
 
 #: Polynomials of more terms keep their order, even if it begins with a minus.
@@ -107,10 +107,10 @@ def terms_of(e: Expression) -> Sum:
 
 def terms_of_formula(formula: Formula) -> Sum:
     """The terms of a formula, its divisor left out."""
-    found: list[Term] = []
+    terms: list[Term] = []
     for c, monomial in formula.terms:
-        found += _times((Term(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
-    shown = _positive_first(found) if len(found) <= FEW else tuple(found)
+        terms += _times((Term(c),), *(_power(terms_of(base), exponent) for base, exponent in monomial))
+    shown = _positive_first(terms) if len(terms) <= FEW else tuple(terms)
     return (*shown, *_one(Factor(_DOTS))) if formula.hidden else shown
 
 
@@ -188,7 +188,7 @@ def indexed(letter: str, index: str) -> str:
 
 
 def component(letter: str, k: int, c: str) -> str:
-    """The k-th of several, and of a vector field its component along a coordinate: H_2, F_3^{x}."""
+    """A letter with an index, for a vector field also with a coordinate: H_2, F_3^{x}."""
     if not c:
         return f"<msub><mi>{escape(letter)}</mi><mn>{k}</mn></msub>"
     return f"<msubsup><mi>{escape(letter)}</mi><mn>{k}</mn>{name(c)}</msubsup>"
@@ -272,7 +272,7 @@ def _single(terms: Sum) -> Term:
 
 
 def _base(terms: Sum) -> Factor:
-    """What can carry an exponent."""
+    """The base of a power, in parentheses if necessary."""
     if len(terms) == 1 and not terms[0].below:
         c, above = terms[0].coefficient, terms[0].above
         if len(above) == 1 and c == 1:
@@ -292,8 +292,8 @@ def _sorted(terms: Sum) -> Sum:
     for t in terms:
         sums[t.above, t.below] = sums.get((t.above, t.below), Fraction(0)) + t.coefficient
     constant = sums.pop(((), ()), Fraction(0))
-    kept = [Term(c, above, below) for (above, below), c in sums.items() if c]
-    rest = sorted(kept, key=lambda t: _key((*t.above, *t.below)))
+    nonzero = [Term(c, above, below) for (above, below), c in sums.items() if c]
+    rest = sorted(nonzero, key=lambda t: _key((*t.above, *t.below)))
     if constant > 0:
         return _bounded((Term(constant), *rest))
     return _bounded(_positive_first([*rest, Term(constant)] if constant else rest))
@@ -333,8 +333,8 @@ def _name(identifier: str) -> Factor:
         return Factor(f"<mn>{identifier}</mn>")
     if identifier.endswith("]"):
         return _at_neighbour(identifier, key)
-    found = re.fullmatch(r"([^\W\d_]+)_?([0-9]+)|([^\W_]+)_(\w+)", identifier)
-    stem, index = (found[1] or found[3], found[2] or found[4]) if found else (identifier, "")
+    match = re.fullmatch(r"([^\W\d_]+)_?([0-9]+)|([^\W_]+)_(\w+)", identifier)
+    stem, index = (match[1] or match[3], match[2] or match[4]) if match else (identifier, "")
     letter = _GREEK.get(stem, stem)
     return Factor(f"<mi>{escape(letter)}</mi>", index=name(index) if index else "", word=len(letter) > 1, key=key)
 

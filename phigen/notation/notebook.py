@@ -1,4 +1,4 @@
-"""How systems, compilations and trajectories show themselves in notebooks: LaTeX and HTML with MathML.
+"""Representations of systems, compilations and trajectories in notebooks: LaTeX and HTML with MathML.
 
 The HTML has no style sheet and no script, so that it looks like the notebook it stands in.
 """
@@ -42,7 +42,7 @@ def system_html(system: System) -> str:
 
 
 def compilation_html(compilation: Compilation) -> str:
-    """The system, and what it was compiled to."""
+    """The system and its method."""
     program = compilation.program
     said = f"compiled to order {program.order}: {compilation.label}, {program.step.manner}"
     about = _cell_html(compilation.cell) if compilation.cell else system_html(compilation.system)
@@ -56,7 +56,7 @@ def _cell_html(cell: Cell) -> str:
 
 
 def trajectory_html(trajectory: Trajectory) -> str:
-    """First and last state, and how far energy and Casimirs went from their values at the start."""
+    """First and last state, and the largest errors of energy and Casimirs."""
     head = ["", "t", *trajectory.coordinates, "energy", *trajectory.casimirs]
     table = trajectory.rows()
     body = [["start", *map(_number, table[0])], ["end", *map(_number, table[-1])]]
@@ -68,7 +68,7 @@ def trajectory_html(trajectory: Trajectory) -> str:
 
 
 def lattice_trajectory_html(trajectory: LatticeTrajectory) -> str:
-    """Means of the fields and the energy in the first and last frame, and how far energy and Casimirs went."""
+    """Means of the fields and the energy in the first and last frame, and the largest errors of energy and Casimirs."""
     changes = trajectory.changes()
     head = ["", "t", *(f"mean {c}" for c in trajectory.coordinates), "energy", *[*changes][1:]]
     body = []

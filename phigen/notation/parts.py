@@ -1,4 +1,4 @@
-"""Formulas with names for what occurs in them more than once: what makes large expressions readable."""
+"""Formulas with names for parts that occur more than once, so that large expressions are readable."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from phigen.symbolic.readable import LONGEST, Formula, expanded
 from phigen.symbolic.readable import readable as as_text
 from phigen.symbolic.symbols import MOMENTUM, PART, Symbol, kind_of, plain
 
-#: What has fewer leaves than this gets no name of its own, nor what saves fewer leaves.
+#: A part with fewer leaves than this gets no name, nor one whose name saves fewer leaves.
 SMALL, WORTH = 3, 4
 
-#: Names for shared parts of all expressions must make the whole so much shorter.
+#: Names are used if they shorten the whole to this fraction.
 WORTH_NAMES = 0.75
 
 #: Expressions with fewer leaves are written as they stand, or expanded where that is shorter.
@@ -35,7 +35,7 @@ class Readable:
 
 
 def readable(expressions: Sequence[Expression]) -> Readable:
-    """The expressions expanded, as they stand, or with names for shared parts: whatever is short."""
+    """The expressions expanded, as they stand, or with names for shared parts: the shortest form."""
     plain, named = _partly_named(expressions), _all_named(expressions)
     return named if plain.size > SHORT and named.size < WORTH_NAMES * plain.size else plain
 
@@ -46,7 +46,7 @@ def _all_named(expressions: Sequence[Expression]) -> Readable:
 
 
 def _partly_named(expressions: Sequence[Expression]) -> Readable:
-    """Short expressions expanded or as they stand, with names for what the others share."""
+    """Short expressions expanded or as they stand; names for the shared parts of long ones."""
     trees = fold(expressions, lambda e, sizes: sum(sizes) or 1)
     forms: dict[int, Formula | Expression] = {}
     for i, (e, form) in enumerate(zip(expressions, expanded(expressions, None), strict=True)):
@@ -64,7 +64,7 @@ def _partly_named(expressions: Sequence[Expression]) -> Readable:
 def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, str]]:
     """Expressions as pairs of a name and a text of ``most`` terms, as they stand or expanded.
 
-    Where one is long, and names for shared parts make the whole shorter, those are used: σ_1, σ_2, …, which follow.
+    If names for shared parts shorten the whole, they are used: σ_1, σ_2, …, with their texts at the end.
     """
     expressions = [*named.values()]
     plainly = as_text(expressions, most)
@@ -72,9 +72,9 @@ def texts(named: Mapping[str, Expression], most: int | None) -> list[tuple[str, 
         shared, roots = with_names(expressions)
         names = [*named, *(plain(name) for name, _ in shared)]
         shown = as_text([*roots, *(e for _, e in shared)], most, vanishing(shared))
-        found = _met([*zip(names, shown, strict=True)], len(named))
-        if sum(len(text) for _, text in found) < WORTH_NAMES * sum(map(len, plainly)):
-            return found
+        named_texts = _met([*zip(names, shown, strict=True)], len(named))
+        if sum(len(text) for _, text in named_texts) < WORTH_NAMES * sum(map(len, plainly)):
+            return named_texts
     return list(zip(named, plainly, strict=True))
 
 
@@ -88,16 +88,16 @@ def vanishing(shared: Sequence[tuple[str, Expression]]) -> list[str]:
     return [name for name, _ in shared if name in zeros]
 
 
-def _met(listed: Sequence[tuple[str, str]], own: int) -> list[tuple[str, str]]:
-    """The first ``own`` texts, and after them the parts that they and each other mention, numbered anew."""
-    met = {name for _, text in listed[:own] for name in _SHARED.findall(text)}
-    for name, text in reversed(listed[own:]):
+def _met(listed: Sequence[tuple[str, str]], count: int) -> list[tuple[str, str]]:
+    """The first ``count`` texts, followed by the parts that occur in them, directly or not, renumbered."""
+    met = {name for _, text in listed[:count] for name in _SHARED.findall(text)}
+    for name, text in reversed(listed[count:]):
         if name in met:
             met |= {*_SHARED.findall(text)}
-    kept = [name for name, _ in listed[own:] if name in met]
-    numbers = {name: plain(Symbol(PART, k)) for k, name in enumerate(kept, 1)}
-    shown = [*listed[:own], *((name, text) for name, text in listed[own:] if name in met)]
-    return [(numbers.get(name, name), _SHARED.sub(lambda found: numbers[found[0]], text)) for name, text in shown]
+    used_names = [name for name, _ in listed[count:] if name in met]
+    numbers = {name: plain(Symbol(PART, k)) for k, name in enumerate(used_names, 1)}
+    shown = [*listed[:count], *((name, text) for name, text in listed[count:] if name in met)]
+    return [(numbers.get(name, name), _SHARED.sub(lambda match: numbers[match[0]], text)) for name, text in shown]
 
 
 def short(expressions: Sequence[Expression]) -> list[Formula | Expression]:
@@ -116,7 +116,7 @@ def leaves(form: Formula | Expression) -> int:
 
 
 def with_names(roots: Sequence[Expression]) -> tuple[tuple[tuple[str, Expression], ...], list[Expression]]:
-    """Names for what occurs more than once and is worth one, and the roots in terms of these."""
+    """Names for long parts that occur more than once, and the roots in terms of these."""
     uses: dict[int, int] = {}
     order = topological(roots)
     for e in order:

@@ -1,4 +1,4 @@
-"""Casimirs of log-canonical structures as logarithms of products of powers, which is how they are known."""
+"""Casimirs of log-canonical structures as logarithms of products of powers, their usual form."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def _exponents(node: Expression, args: list[_Sum]) -> _Sum:
     match node.op:
         case "add" | "sub":
             sign = 1 if node.op == "add" else -1
-            found = dict(parts[0])
+            exponents = dict(parts[0])
             for name, u in parts[1].items():
-                found[name] = found[name] + u * sign if name in found else u * sign
-            return found
+                exponents[name] = exponents[name] + u * sign if name in exponents else u * sign
+            return exponents
         case "neg":
             return {name: -u for name, u in parts[0].items()}
         case "mul" if set(parts[0]) == {None} or set(parts[1]) == {None}:

@@ -1,4 +1,4 @@
-"""What was compiled, in sympy: the Hamiltonian that is discretised, α, β and S_1 … S_k."""
+"""The formulas of a compilation in sympy: the Hamiltonian that is discretised, α, β and S_1 … S_k."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from phigen.symbolic.symbols import STEP, momentum
 class SympyFormulas:
     """The formulas of a method in sympy.
 
-    ``hamiltonian`` is what is discretised: H less λ C for each Casimir C of the gauge, whose λ is in ``gauge``. α and β
-    are n expressions in the coordinates of ``system`` and in ``covector``; where they are series in it, ``degree`` says
-    up to which degree they are given, else it is None. ``series`` has S_1 … S_k with S_h = Σ h^i S_i.
+    ``hamiltonian`` is the function that is discretised: H less λ C for each Casimir C of the gauge, whose λ is in
+    ``gauge``. α and β are n expressions in the coordinates of ``system`` and in ``covector``; where they are series in
+    it, ``degree`` is their degree, else None. ``series`` has S_1 … S_k with S_h = Σ h^i S_i.
     """
 
     system: SympySystem
@@ -37,7 +37,7 @@ class SympyFormulas:
 
 
 class Dictionary:
-    """The symbols of a compilation in sympy, and how its expressions are said in them."""
+    """The symbols of a compilation in sympy, and the translation of its expressions."""
 
     def __init__(self, compilation: Compilation) -> None:
         system, gauge = compilation.system, compilation.gauge
@@ -46,8 +46,8 @@ class Dictionary:
         self.times = tuple(known[t] for t in system.times)
         self.covector = tuple(free_symbols([f"p_{c}" for c in system.coordinates], known))
         level = ["e"] * (gauge.monitor is not None)
-        wanted = ["h", *(f"lambda_{c}" for c in gauge.free), *level]
-        self.step, *free = free_symbols(wanted, [*known, *self.covector])
+        names = ["h", *(f"lambda_{c}" for c in gauge.free), *level]
+        self.step, *free = free_symbols(names, [*known, *self.covector])
         self.gauge = dict(zip((*gauge.free, *level), free, strict=True))
         momenta = dict(zip(map(momentum, system.coordinates), self.covector, strict=True))
         self._symbols = {**known, **momenta, **dict(zip(gauge.symbols, free, strict=True)), STEP: self.step}
@@ -92,7 +92,7 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 def _ends_of_paths(
     compilation: Compilation, dictionary: Dictionary, degree: int
 ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """α and β = α(x, −p) up to a degree in p; what the compiler has beyond it is not of the series."""
+    """α and β = α(x, −p) up to a degree in p; the compiler's terms of higher degree do not belong to the series."""
     formal = formal_alpha(compilation.discretised, compilation.chart, degree + 1)
     parts = closed_form([dictionary.expression(e) for e in formal], dictionary.covector)(degree)
 

@@ -13,13 +13,13 @@ from xml.etree.ElementTree import Element
 
 #: The width of a line: a little less than that of the text of an article at 10, 11 and 12 points.
 LINE = 31.0
-#: What continued lines begin with, and its width.
+#: The indentation of continued lines, and its width.
 INDENT, INDENTED = "\\quad ", 1.0
-#: A line is left shorter by this part of it rather than broken one level of parentheses deeper.
+#: A line may be shorter by this fraction, to avoid a break one level of parentheses deeper.
 _SHORTER = 0.35
-#: Between factors a line breaks as if they were so many levels deeper.
+#: A break between factors counts as this number of levels deeper.
 _FACTORS = 4
-#: What is wider than this part of a line is opened where that can be done: a fraction, a root, an exponent.
+#: A fraction, root or exponent wider than this fraction of a line is written inline, so that it can be broken.
 _WIDE = 0.6
 
 _GREEK = {
@@ -61,22 +61,22 @@ def width(*markup: str) -> float:
 
 
 def lines(markup: Sequence[str], room: float) -> list[str]:
-    """Elements side by side as lines of LaTeX: the first has so much room, the others `INDENTED` less."""
+    """Elements side by side as lines of LaTeX of the given width; all but the first are indented by `INDENTED`."""
     elements = _elements(markup)
     whole = _atoms(elements, whole=True)
     if _width(whole) <= room:
         return [_joined(whole)]
-    atoms, found, begin = _atoms(elements, whole=False), [], 0
+    atoms, broken_lines, begin = _atoms(elements, whole=False), [], 0
     while begin < len(atoms):
         end = _end(atoms, begin, room - (INDENTED if begin else 0.0))
         times = "\\cdot " if begin and (atoms[begin].level or 0) >= _FACTORS else ""
-        found.append(times + _joined(atoms[begin:end]))
+        broken_lines.append(times + _joined(atoms[begin:end]))
         begin = end
-    return found
+    return broken_lines
 
 
 def _end(atoms: Sequence[Atom], begin: int, room: float) -> int:
-    """Where the line ends that begins there: at the best place within its room, else at the first beyond."""
+    """End of the line that begins at an atom: the best break within the width, else the first break beyond."""
     used, best, least = 0.0, len(atoms), float("inf")
     for place in range(begin, len(atoms)):
         level = atoms[place].level
@@ -113,27 +113,27 @@ def _flattened(elements: Sequence[Element]) -> Iterator[Element]:
 
 
 def _atoms(elements: Sequence[Element], depth: int = 0, *, whole: bool) -> list[Atom]:
-    """Elements side by side; ``whole`` for what stays on one line."""
-    flat, found, bars = list(_flattened(elements)), list[Atom](), 0
+    """Elements side by side as atoms; ``whole`` forbids breaks."""
+    flat, listed_atoms, bars = list(_flattened(elements)), list[Atom](), 0
     tall = _tall_parentheses(flat)
     for place, element in enumerate(flat):
         text, before = element.text or "", flat[place - 1].text if place else "("
         if element.tag != "mo":
             called = place + 1 < len(flat) and flat[place + 1].text == _APPLY
-            found += _of_element(element, depth, called=called, whole=whole)
+            listed_atoms += _of_element(element, depth, called=called, whole=whole)
         elif text in ("(", ")"):
             depth += 1 if text == "(" else -1
-            found.append(_parenthesis(text, tall=place in tall, whole=whole))
+            listed_atoms.append(_parenthesis(text, tall=place in tall, whole=whole))
         elif text == "−" and (before in ("(", ",", "=") or (before == "|" and bars % 2)):
-            found.append(Atom("-", 0.8))
+            listed_atoms.append(Atom("-", 0.8))
         elif text in ("+", "−", "="):
-            found.append(Atom(*_SIGNS[text], level=None if before == "(" else depth))
+            listed_atoms.append(Atom(*_SIGNS[text], level=None if before == "(" else depth))
         elif text == _TIMES:
-            found.append(Atom(" ", 0.0, depth + _FACTORS))
+            listed_atoms.append(Atom(" ", 0.0, depth + _FACTORS))
         else:
             bars += text == "|"
-            found.append(Atom(*_SIGNS[text]))
-    return found
+            listed_atoms.append(Atom(*_SIGNS[text]))
+    return listed_atoms
 
 
 def _parenthesis(text: str, *, tall: bool, whole: bool) -> Atom:
@@ -145,15 +145,15 @@ def _parenthesis(text: str, *, tall: bool, whole: bool) -> Atom:
 
 def _tall_parentheses(flat: Sequence[Element]) -> set[int]:
     """The places of the parentheses with something tall between."""
-    found, opened = set(), list[int]()
+    tall, opened = set(), list[int]()
     for place, element in enumerate(flat):
         if element.tag == "mo" and element.text == "(":
             opened.append(place)
         elif element.tag == "mo" and element.text == ")":
             begin = opened.pop()
             if any(part.tag in _TALL for e in flat[begin:place] for part in e.iter()):
-                found |= {begin, place}
-    return found
+                tall |= {begin, place}
+    return tall
 
 
 def _of_element(element: Element, depth: int, *, called: bool, whole: bool) -> list[Atom]:
@@ -205,7 +205,7 @@ def _identifier(name: str, *, called: bool) -> Atom:
 
 
 def _scripts(kind: str, parts: Sequence[Element], depth: int, *, called: bool, whole: bool) -> list[Atom]:
-    """What carries an index or an exponent; a sum in parentheses may be broken, and so may exp of a long sum."""
+    """A base with an index or an exponent; a sum in parentheses may be broken, and so may exp of a long sum."""
     base, *scripts = parts
     written = [_one([s]) for s in scripts]
     if not whole and kind == "msup" and base.text == "e" and written[0].width > 0.75 * _WIDE * LINE:

@@ -1,1 +1,1 @@
-"""The figures of the paper made again, each with what can be measured in it: one module per example of the paper."""
+"""The figures of the paper, redrawn and with measured numbers: one module per example of the paper."""

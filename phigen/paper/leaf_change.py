@@ -57,23 +57,25 @@ def leaf_change_plate() -> Plate:
     """The two maps in space, and the function that labels the leaves along them."""
     compilation, solver = compiled(SPEC, 4)
     steps = round(TURNS * PERIOD / STEP)
-    own = solver.integrate(START, STEP, steps)
+    trajectory = solver.integrate(START, STEP, steps)
     start = np.array(START)
     printed = _rows(start, STEP, steps, 1)
-    findings = _findings(compilation, own, start)
+    findings = _findings(compilation, trajectory, start)
     section = solver.section(START, 1e-3, 13000, lambda x: 1 - x[:, 0])
     period = Finding("period of the orbit through (1, 1, 2)", "4π", float(np.diff(section.t)[0]))
-    figure = _draw(compilation, own, printed)
+    figure = _draw(compilation, trajectory, printed)
     return Plate("A Poisson map that is not Hamiltonian", figure, (period, *findings))
 
 
-def _findings(compilation: Compilation, own: Trajectory, start: Floats) -> tuple[Finding, ...]:
+def _findings(compilation: Compilation, trajectory: Trajectory, start: Floats) -> tuple[Finding, ...]:
     method = Method("printed", printed_map, _rows)
     turn = _rows(start, PAPER_STEP, round(PERIOD / PAPER_STEP), 10)
-    label, (x, y, z) = turn @ (-1, 1, 1), own.x.T
+    label, (x, y, z) = turn @ (-1, 1, 1), trajectory.x.T
     off = [float(np.max(np.abs(_rows(start, 1 / n, n, n)[-1] - _flow(start, 1.0)))) for n in (1000, 2000)]
     point = np.array(ELSEWHERE)
-    slopes = evaluate(gradient(compilation.system.hamiltonian, own.coordinates), dict(zip("xyz", point, strict=True)))
+    slopes = evaluate(
+        gradient(compilation.system.hamiltonian, trajectory.coordinates), dict(zip("xyz", point, strict=True))
+    )
     return (
         Finding("printed equations: dH/dt at (1, 2, 4)", "0, Hamiltonian", float(printed_field(point) @ slopes)),
         Finding("printed map: defect of DΦ π DΦᵀ = π∘Φ, step 0.05", "it is Poisson",
@@ -82,7 +84,7 @@ def _findings(compilation: Compilation, own: Trajectory, start: Floats) -> tuple
         Finding("printed map: −x + y + z after one turn, relative change, step 0.0001", "leaves the leaf",
                 float(label[-1] / label[0] - 1)),
         Finding("phigen: −x + y + z, largest relative change", "constant",
-                float(np.max(relative(own.casimirs["C"])))),
+                float(np.max(relative(trajectory.casimirs["C"])))),
         Finding("exact flow: x − y + z, largest change", "constant on leaves", float(np.ptp(x - y + z))),
     )  # fmt: skip
 
@@ -96,20 +98,24 @@ def _flow(state: Floats, t: float) -> Floats:
 
 
 @styled
-def _draw(compilation: Compilation, own: Trajectory, printed: Floats) -> Figure:
+def _draw(compilation: Compilation, trajectory: Trajectory, printed: Floats) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 3.3), layout="constrained")
-    names = own.coordinates
+    names = trajectory.coordinates
     leaf = leaf_of(compilation.system.casimirs, names, dict(zip(names, START, strict=True)), {})
-    for index, (points, title) in enumerate(((own.x, "phigen, order 4"), (printed, "the printed map, k = 2")), start=1):
+    for index, (points, title) in enumerate(
+        ((trajectory.x, "phigen, order 4"), (printed, "the printed map, k = 2")), start=1
+    ):
         axes = figure.add_subplot(1, 3, index, projection="3d")
         draw_in_space(axes, names, points, leaf, 0.85)
         axes.locator_params(nbins=3)
         axes.set_title(title)
     axes = figure.add_subplot(1, 3, 3)
-    axes.plot(own.t, printed @ (-1, 1, 1), color=SERIES[1], linewidth=1.4, label="the printed map")
-    axes.plot(own.t, own.casimirs["C"], color=SERIES[0], linewidth=1.4, label="phigen, and the exact flow")
+    axes.plot(trajectory.t, printed @ (-1, 1, 1), color=SERIES[1], linewidth=1.4, label="the printed map")
+    axes.plot(
+        trajectory.t, trajectory.casimirs["C"], color=SERIES[0], linewidth=1.4, label="phigen, and the exact flow"
+    )
     axes.set(xlabel="t", title="which leaf: −x + y + z", ylim=(0, None))
     axes.grid(True)
     axes.legend(loc="upper left")

@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 SPEC, RUN = "lotka_volterra", "blow_up"
-#: The method of the paper by its label here, what one option makes of it, and classical methods.
+#: Labels: the method of the paper, its variant with one option, and classical methods.
 OWN = {"phigen, order 2": 2, "phigen, order 8": 8}
 CLASSICAL = {"RK2": "rk2", "RK4": "rk4"}
 PHI, RK2, RK4 = "phigen, order 2", "RK2", "RK4"
 COLOURS = dict(zip([*OWN, *CLASSICAL], (SERIES[0], PALETTE["ink"], SERIES[1], SERIES[3]), strict=True))
-#: Where errors are read off, and the coarse step and the end of the figure of the singularity.
+#: The time at which errors are read, and the coarse step and the end of the figure of the singularity.
 TIME, COARSE, END = 0.254, 1e-3, 0.262
 
 
@@ -73,45 +73,45 @@ def approach() -> Approach:
 
 def errors_plate() -> Plate:
     """Errors of the solution, the Casimir and the energy."""
-    found = approach()
-    row = int(np.searchsorted(found.trajectories[PHI].t, TIME - 1e-9))
-    off = {label: float(found.errors(label)[row]) for label in COLOURS}
-    casimir = {label: float(np.max(relative(t.casimirs["C"]))) for label, t in found.trajectories.items()}
-    energy = {label: float(np.max(relative(t.energy))) for label, t in found.trajectories.items()}
+    course = approach()
+    row = int(np.searchsorted(course.trajectories[PHI].t, TIME - 1e-9))
+    off = {label: float(course.errors(label)[row]) for label in COLOURS}
+    casimir = {label: float(np.max(relative(t.casimirs["C"]))) for label, t in course.trajectories.items()}
+    energy = {label: float(np.max(relative(t.energy))) for label, t in course.trajectories.items()}
     findings = (
         Finding("error of PHI-1 at t = 0.254", "much smaller than of RK-2", off[PHI]),
         Finding("error of RK2 at t = 0.254", "goes off the solution early", off[RK2]),
         Finding("error of RK4 at t = 0.254", "larger than of PHI-1, for larger t", off[RK4]),
         Finding("error of phigen at order 8 at t = 0.254", "–", off["phigen, order 8"]),
-        Finding("order of PHI-1, from steps of 0.001 and 0.0005", "1", _order(found)),
+        Finding("order of PHI-1, from steps of 0.001 and 0.0005", "1", _order(course)),
         Finding("Casimir, PHI-1: largest error", "machine precision", casimir[PHI]),
         Finding("Casimir, RK2: largest error", "not preserved", casimir[RK2]),
         Finding("energy, PHI-1: largest error", "up to the order in the step", energy[PHI]),
         Finding("energy, RK2: largest error", "(not mentioned)", energy[RK2]),
     )
-    return Plate("Lotka–Volterra: errors up to the singularity", _draw_errors(found), findings)
+    return Plate("Lotka–Volterra: errors up to the singularity", _draw_errors(course), findings)
 
 
-def _order(found: Approach) -> float:
+def _order(course: Approach) -> float:
     """The observed order of the method of the paper, at t = 0.2."""
-    x0, errors = [float(v) for v in found.run.initial], []
+    x0, errors = [float(v) for v in course.run.initial], []
     for steps in (200, 400):
-        trajectory = found.solver.integrate(x0, 0.2 / steps, steps, steps)
-        exact = exact_solution(found.compilation.system, found.run, {}, np.array(x0), trajectory.t[-1:])
-        errors.append(max(abs(trajectory.column(c)[-1] - exact[c][0]) for c in found.solver.coordinates))
+        trajectory = course.solver.integrate(x0, 0.2 / steps, steps, steps)
+        exact = exact_solution(course.compilation.system, course.run, {}, np.array(x0), trajectory.t[-1:])
+        errors.append(max(abs(trajectory.column(c)[-1] - exact[c][0]) for c in course.solver.coordinates))
     return math.log2(errors[0] / errors[1])
 
 
 @styled
-def _draw_errors(found: Approach) -> Figure:
+def _draw_errors(course: Approach) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 3.2), layout="constrained")
     panels: list[Any] = list(figure.subplots(1, 3, sharey=True))
-    for label, trajectory in found.trajectories.items():
-        curves = found.errors(label), relative(trajectory.casimirs["C"]), relative(trajectory.energy)
+    for label, trajectory in course.trajectories.items():
+        curves = course.errors(label), relative(trajectory.casimirs["C"]), relative(trajectory.energy)
         for axes, errors in zip(panels, curves, strict=True):
-            left = found.end - trajectory.t[1:]
+            left = course.end - trajectory.t[1:]
             axes.loglog(left, np.maximum(errors[1:], ROUNDING / 4), color=COLOURS[label], linewidth=1.2, label=label,
                         zorder=4 if label == PHI else 3)  # fmt: skip
     for axes, what in zip(panels, ("solution", "Casimir", "energy"), strict=True):
@@ -126,27 +126,27 @@ def _draw_errors(found: Approach) -> Figure:
 
 
 def singularity_plate() -> Plate:
-    """What the methods do at the singularity itself, with a step large enough to be seen."""
-    found = approach()
-    x0, steps = [float(v) for v in found.run.initial], round(END / COARSE)
-    own, stopped = _until_it_fails(found.solver, x0, COARSE, steps)
-    _, fine = _until_it_fails(found.solver, x0, COARSE / 10, 10 * steps)
-    other = classical.integrate("rk2", field_of(found.solver, {}), np.array(x0), COARSE, steps)
-    passed = int(found.end / COARSE) + 1
+    """The methods at the singularity itself, with a step large enough to be seen."""
+    course = approach()
+    x0, steps = [float(v) for v in course.run.initial], round(END / COARSE)
+    orbit, stopped = _until_it_fails(course.solver, x0, COARSE, steps)
+    _, fine = _until_it_fails(course.solver, x0, COARSE / 10, 10 * steps)
+    other = classical.integrate("rk2", field_of(course.solver, {}), np.array(x0), COARSE, steps)
+    passed = int(course.end / COARSE) + 1
     finite = np.flatnonzero(np.isfinite(other).all(axis=1))[-1]
     findings = (
-        Finding("T_sing", "≃ 0.23", found.end),
-        Finding("PHI-1, step 0.001: last step, in steps before T_sing", "the last step before", _left(found, stopped)),
+        Finding("T_sing", "≃ 0.23", course.end),
+        Finding("PHI-1, step 0.001: last step, in steps before T_sing", "the last step before", _left(course, stopped)),
         Finding("PHI-1, step 0.0001: last step, in steps before T_sing", "the last step before",
-                (found.end - fine) / (COARSE / 10)),
+                (course.end - fine) / (COARSE / 10)),
         Finding("RK2, step 0.001: x1 after T_sing is passed", "misses the singularity", float(other[passed, 0])),
-        Finding("RK2, step 0.001: overflow, in steps after T_sing", "–", -_left(found, finite * COARSE) + 1),
+        Finding("RK2, step 0.001: overflow, in steps after T_sing", "–", -_left(course, finite * COARSE) + 1),
     )  # fmt: skip
-    return Plate("Lotka–Volterra: at the singularity", _draw_singularity(found, own, other), findings)
+    return Plate("Lotka–Volterra: at the singularity", _draw_singularity(course, orbit, other), findings)
 
 
-def _left(found: Approach, t: float) -> float:
-    return (found.end - t) / COARSE
+def _left(course: Approach, t: float) -> float:
+    return (course.end - t) / COARSE
 
 
 def _until_it_fails(solver: Solver, x0: list[float], h: float, steps: int) -> tuple[Trajectory, float]:
@@ -159,18 +159,18 @@ def _until_it_fails(solver: Solver, x0: list[float], h: float, steps: int) -> tu
 
 
 @styled
-def _draw_singularity(found: Approach, own: Trajectory, other: Floats) -> Figure:
+def _draw_singularity(course: Approach, orbit: Trajectory, other: Floats) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(5.6, 3.4), layout="constrained")
     axes = figure.add_subplot()
-    times = found.end - np.geomspace(0.02, 1e-6, 300)
-    start = np.array([float(v) for v in found.run.initial])
-    exact = exact_solution(found.compilation.system, found.run, {}, start, times)["x1"]
+    times = course.end - np.geomspace(0.02, 1e-6, 300)
+    start = np.array([float(v) for v in course.run.initial])
+    exact = exact_solution(course.compilation.system, course.run, {}, start, times)["x1"]
     axes.semilogy(times, -exact, color=PALETTE["muted"], linewidth=1.0, label="exact")
-    axes.axvline(found.end, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (4, 3)))
-    axes.annotate("singularity", (found.end, 1e5), (5, 0), textcoords="offset points", color=PALETTE["muted"])
-    axes.semilogy(own.t, -own.x[:, 0], "o", color=COLOURS[PHI], markersize=3.5, label=f"{PHI}, until it stops")
+    axes.axvline(course.end, color=PALETTE["muted"], linewidth=0.8, linestyle=(0, (4, 3)))
+    axes.annotate("singularity", (course.end, 1e5), (5, 0), textcoords="offset points", color=PALETTE["muted"])
+    axes.semilogy(orbit.t, -orbit.x[:, 0], "o", color=COLOURS[PHI], markersize=3.5, label=f"{PHI}, until it stops")
     shown = np.where(np.abs(other[:, 0]) < 1e8, -other[:, 0], np.nan)
     axes.semilogy(COARSE * np.arange(len(other)), shown, "s", color=COLOURS[RK2], markersize=3, label=RK2)
     axes.set(xlim=(0.242, END), ylim=(40, 1e6), xlabel="t", ylabel="−x1", title="steps of 0.001")

@@ -1,4 +1,4 @@
-"""A figure of the paper made again, and the numbers that stand beside what the paper says."""
+"""A redrawn figure of the paper, and measured numbers to compare with those of the paper."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Finding:
-    """One measured number, and what the paper says about it, in our words."""
+    """One measured number, and the paper's statement about it, paraphrased."""
 
     quantity: str
     paper: str

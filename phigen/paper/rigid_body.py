@@ -62,7 +62,7 @@ def _runge_kutta(body: Bodies, h: float, steps: int, stride: int) -> Trajectory:
 
 
 def errors_plate(steps: int = LONG) -> Plate:
-    """The errors of energy and Casimir over so many steps of the paper's size."""
+    """The errors of energy and Casimir over a number of steps of the paper's size."""
     body = bodies()
     stride = max(1, steps // ROWS)
     methods = {
@@ -76,14 +76,14 @@ def errors_plate(steps: int = LONG) -> Plate:
 
 
 def _early_findings(body: Bodies) -> tuple[Finding, ...]:
-    """What a million steps show."""
+    """Findings from the first million steps."""
     stride = EARLY // ROWS
-    own, double, better = (
+    poisson, double, better = (
         solver.integrate(body.x0, factor * body.h, EARLY // factor, stride)
         for solver, factor in ((body.solver, 1), (body.solver, 2), (body.better, 1))
     )
     other = _runge_kutta(body, body.h, EARLY, stride)
-    amplitude = float(np.max(relative(own.energy)))
+    amplitude = float(np.max(relative(poisson.energy)))
     drift = float(relative(other.energy)[-1])
     return (
         Finding("energy, PHI-2: largest error up to t = 100", "small oscillation", amplitude),
@@ -92,7 +92,7 @@ def _early_findings(body: Bodies) -> tuple[Finding, ...]:
         Finding("energy, RK4: error at t = 100", "larger than of PHI-2", drift),
         Finding("time after which RK4 has the larger energy error", "–", 100 * amplitude / drift),
         Finding("energy, phigen at order 4: largest error up to t = 100", "–", float(np.max(relative(better.energy)))),
-        Finding("Casimir, PHI-2: largest error up to t = 100", "machine precision", _casimir_error(own)),
+        Finding("Casimir, PHI-2: largest error up to t = 100", "machine precision", _casimir_error(poisson)),
         Finding("Casimir, RK4: error at t = 100", "grows linearly", _casimir_error(other)),
     )  # fmt: skip
 
@@ -132,7 +132,7 @@ def section_plate() -> Plate:
     def height(states: Floats) -> Floats:
         return states[:, 1]
 
-    own = body.solver.section(body.x0, COARSE, SECTION_STEPS, height).x
+    poisson_crossings = body.solver.section(body.x0, COARSE, SECTION_STEPS, height).x
     course = started("rk4", body.compilation, body.x0, body.parameters)
     finder = CrossingFinder[ClassicalCourse](height, COARSE)
     blocks = finder.follow(course, SECTION_STEPS, lambda: course.advance(COARSE, 1))
@@ -140,13 +140,17 @@ def section_plate() -> Plate:
     course.advance(COARSE, _REST)
     rest, orbit = course.state(), body.solver.integrate(body.x0, body.h, 700)
     findings = (
-        Finding("PHI-2, step 0.004: diameter of its crossings", "one point", _diameter(own)),
+        Finding("PHI-2, step 0.004: diameter of its crossings", "one point", _diameter(poisson_crossings)),
         Finding("RK4, step 0.004: distance of its last crossing from the first", "moves away",
                 float(np.linalg.norm(other[-1] - other[0]))),
         Finding("RK4, step 0.004: |x| in the end", "0", float(np.linalg.norm(rest))),
         Finding("RK4, step 0.004: |π∇H| in the end", "0", float(np.linalg.norm(body.solver.vector_field(rest)))),
     )  # fmt: skip
-    return Plate("Rigid body: trajectory and Poincaré section", _draw_section(body, orbit, own, other, rest), findings)
+    return Plate(
+        "Rigid body: trajectory and Poincaré section",
+        _draw_section(body, orbit, poisson_crossings, other, rest),
+        findings,
+    )
 
 
 def _diameter(points: Floats) -> float:
@@ -154,7 +158,7 @@ def _diameter(points: Floats) -> float:
 
 
 @styled
-def _draw_section(body: Bodies, orbit: Trajectory, own: Floats, other: Floats, rest: Floats) -> Figure:
+def _draw_section(body: Bodies, orbit: Trajectory, crossings: Floats, other: Floats, rest: Floats) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(8.6, 3.8), layout="constrained")
@@ -168,7 +172,7 @@ def _draw_section(body: Bodies, orbit: Trajectory, own: Floats, other: Floats, r
     space.set_title("trajectory on its leaf, and the plane x2 = 0")
     axes = right.add_subplot()
     draw_dots(axes, other[:: len(other) // _DOTS, [0, 2]], SERIES[1], 2.0, 2.0, "RK4")
-    draw_dots(axes, own[:1, [0, 2]], SERIES[0], 7.0, 3.0, f"{PHI}: all {len(own)} crossings")
+    draw_dots(axes, crossings[:1, [0, 2]], SERIES[0], 7.0, 3.0, f"{PHI}: all {len(crossings)} crossings")
     exact = body.better.section(body.x0, body.h, 700, lambda x: x[:, 1]).x[0]
     axes.plot(exact[0], exact[2], "o", color=PALETTE["ink"], markersize=7, fillstyle="none", label="exact", zorder=4)
     axes.plot(rest[0], rest[2], "+", color=PALETTE["ink"], markersize=10, zorder=4)

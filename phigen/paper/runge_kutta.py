@@ -1,4 +1,4 @@
-"""Classical methods in compiled C, which go on step by step: long runs, and sections of them."""
+"""Classical methods in compiled C, called step by step: long runs and sections of them."""
 
 from __future__ import annotations
 
@@ -29,10 +29,10 @@ class ClassicalCourse:
     def advance(self, h: float, steps: int) -> None:
         """See `Course`."""
         self.place[:] = self.x
-        found = self.runner(h, steps, 1)
-        if found is None:
+        end = self.runner(h, steps, 1)
+        if end is None:
             raise BackendError("NOT_FINITE", self.steps, self.x[None])
-        self.x = found
+        self.x = end
         self.steps += steps
 
     def branch(self) -> ClassicalCourse:

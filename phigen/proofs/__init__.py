@@ -1,1 +1,1 @@
-"""What is proved about one spec, and compiling with those proofs as a condition."""
+"""Proofs about one spec, and compilation on condition of these proofs."""

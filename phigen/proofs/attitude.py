@@ -1,4 +1,4 @@
-"""What is stated of attitudes: a step leaves the momentum in the other frame as it is, and turns as H says.
+"""Statements on attitudes: a step conserves the momentum in the other frame, and rotates with the velocity ∇H.
 
 With x the momenta in the body, g₁ = g₀ τ and x₁ = Ad*_τ x₀, so that the momentum in space is constant; with x those
 in space g₁ = τ g₀, and that in the body is. Any element with this property would do as well with one more that fixes x,
@@ -64,9 +64,11 @@ def check(compilation: Compilation) -> Iterator[Statement]:
             yield path_statement(system, group)
     else:
         chart, p = compilation.chart, covector_symbols(system.coordinates)
-        made = element([p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=attitude.cayley)
+        group_element = element(
+            [p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=attitude.cayley
+        )
         stated = element_statements(
-            group, made, p, chart.alpha, chart.beta, cayley=attitude.cayley, positive=system.positive
+            group, group_element, p, chart.alpha, chart.beta, cayley=attitude.cayley, positive=system.positive
         )
         yield from islice(stated, 1 if pushed else None)
     if not compilation.splitting:
@@ -84,15 +86,15 @@ def _first_term(compilation: Compilation) -> Expression:
 
 
 def rate_statement(system: System, attitude: Attitude, slope: Vector, monitor: Expression | None = None) -> Statement:
-    """∇S_1, ``slope``, and what is put back for Casimirs, are ∇H together: in the components that turn.
+    """∇S_1, ``slope``, plus the terms restored for Casimirs equals ∇H, in the components of the rotation.
 
     With a ``monitor`` g they are g∇H where K = 0.
     """
-    group, wanted = attitude.group, list(gradient(system.hamiltonian, system.coordinates))
+    group, velocity = attitude.group, list(gradient(system.hamiltonian, system.coordinates))
     if monitor:
-        wanted = [monitor * w for w in wanted]
+        velocity = [monitor * w for w in velocity]
         slope = substitute(list(slope), {LEVEL: -system.hamiltonian})
-    whole = [w - s for w, s in zip(wanted, slope, strict=True)]
+    whole = [w - s for w, s in zip(velocity, slope, strict=True)]
     shown = whole if group.matrices else [whole[i] for i in (*group.rotation, *group.translation)]
     put_back = attitude.rate.roots[: len(shown)] if attitude.rate else [ZERO] * len(shown)
     where = "∇S_1" + " + ∇(λC)" * bool(attitude.rate)
@@ -119,7 +121,7 @@ def path_statement(system: System, group: Group) -> Statement:
 
 
 def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[Statement]:
-    """Of each part, that its gradient is constant along its flow; that all of them together with Casimirs are H."""
+    """Statements on the parts: the gradient of each is constant along its flow; their sum with Casimirs is H."""
     system, splitting = compilation.system, compilation.splitting
     assert splitting is not None
     turned = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
@@ -138,11 +140,11 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
         if group.matrices and turning.factors:
             yield exponential_statement(system, group, turning, f"the matrix of the flow of H_{k} is exp(t∇H_{k})")
         elif turning.left.is_zero and len(turning.factors) == 1:
-            made = joined(group, factor_elements(system, group, turning))
+            step_element = joined(group, factor_elements(system, group, turning))
             start = [symbol(c) for c in system.coordinates]
             end = [a + b for a, b in zip(start, flow.increment, strict=True)]
             name = f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for the flow of H_{k}"
-            listed = _residuals(group, [ONE + made[0], *made[1:4]], made[4:], start, end)
+            listed = _residuals(group, [ONE + step_element[0], *step_element[1:4]], step_element[4:], start, end)
             yield decide_zero(name, listed, system.positive, "any g₀")
     put_back = [turning.left for turning in turned if not turning.left.is_zero]
     attitude = compilation.program.attitude
@@ -155,11 +157,11 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
 def exponential_statement(system: System, group: Group, turning: Turning, name: str) -> Statement:
     """dE/dt = (1 + E)P for each factor, with P the matrix of its gradient, and E = 0 at t = 0."""
     residuals = []
-    for factor, made in zip(turning.factors, factor_elements(system, group, turning), strict=True):
+    for factor, factor_element in zip(turning.factors, factor_elements(system, group, turning), strict=True):
         rate = group.generator(gradient(factor, system.coordinates))
-        wanted = [a + b for a, b in zip(rate, multiplied(made, rate), strict=True)]
-        residuals += [("", derivative(e, TIME) - w) for e, w in zip(made, wanted, strict=True)]
-        residuals += [("at t = 0", e) for e in substitute(made, {TIME: ZERO})]
+        derivatives = [a + b for a, b in zip(rate, multiplied(factor_element, rate), strict=True)]
+        residuals += [("", derivative(e, TIME) - w) for e, w in zip(factor_element, derivatives, strict=True)]
+        residuals += [("at t = 0", e) for e in substitute(factor_element, {TIME: ZERO})]
     return decide_zero(name, residuals, system.positive)
 
 
@@ -183,8 +185,8 @@ def representation_statement(system: System, algebra: LieAlgebra, group: Group) 
         for r in size:
             for s in size:
                 commutator = total(a[r][k] * b[k][s] - b[r][k] * a[k][s] for k in size)
-                wanted = total(c * group.matrices[k][r][s] for k, c in row.items())
-                residuals.append((f"({i + 1}, {j + 1})", commutator + (-wanted if group.spatial else wanted)))
+                expected = total(c * group.matrices[k][r][s] for k, c in row.items())
+                residuals.append((f"({i + 1}, {j + 1})", commutator + (-expected if group.spatial else expected)))
     sign = "" if group.spatial else "−"
     name = f"[E_i, E_j] = {sign}Σ c_ij^k E_k, so that Ad*_g m is constant for ṁ = π(m)p, ġ = "
     return decide_zero(name + ("P g" if group.spatial else "g P"), residuals, system.positive)
@@ -211,8 +213,8 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
     matrices = tuple(
         {(r, s): e for r, row in enumerate(m) for s, e in enumerate(row) if not e.is_zero} for m in group.matrices
     )
-    found = trilinear(algebra, Representation("", group.rows, matrices))
-    terms = found or {}
+    form = trilinear(algebra, Representation("", group.rows, matrices))
+    terms = form or {}
     residuals = []
     for i in n:
         half = [total(sign * c * p[a] / 2 for a in n for m, c in algebra.bracket(a, i).items() if m == k) for k in n]
@@ -227,32 +229,37 @@ def cayley_statement(system: System, algebra: LieAlgebra, group: Group, alpha: V
 
 
 def element_statements(
-    group: Group, made: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
+    group: Group, group_element: Vector, p: Vector, start: Vector, end: Vector, *, cayley: bool, positive: Sequence[str]
 ) -> Iterator[Statement]:
-    """``made`` is the element of p, written by φ(s/4) or not, and leaves the momentum in the other frame as it is.
+    """``group_element`` is that of p, written by φ(s/4) or not, and conserves the momentum in the other frame.
 
     ``start`` and ``end`` are those of a step, for all components; the attitude before it is any quaternion.
     """
-    given = [p[i] for i in group.rotation], [p[i] for i in group.translation]
-    found = direction(*given, cayley=cayley)
-    phi = ZERO if cayley else _doubled(dot(given[0], given[0]))
-    plain, factor = with_phi(*given, phi), found.factor
-    listed = [("length", dot(found.turn, found.turn) - found.length**2)]
+    covectors = [p[i] for i in group.rotation], [p[i] for i in group.translation]
+    increment = direction(*covectors, cayley=cayley)
+    phi = ZERO if cayley else _doubled(dot(covectors[0], covectors[0]))
+    plain, factor = with_phi(*covectors, phi), increment.factor
+    listed = [("length", dot(increment.turn, increment.turn) - increment.length**2)]
     listed += [
-        ("quaternion", found.length * a - b) for a, b in zip([ONE + made[0], *made[1:4]], found.turn, strict=True)
+        ("quaternion", increment.length * a - b)
+        for a, b in zip([ONE + group_element[0], *group_element[1:4]], increment.turn, strict=True)
     ]
-    listed += [("position", found.length**2 * a - b) for a, b in zip(made[4:], found.shift, strict=True)]
-    listed += [("φ(s)", a - factor * b) for a, b in zip(found.turn, plain.turn, strict=True)]
-    listed += [("φ(s)", a - factor**2 * b) for a, b in zip(found.shift, plain.shift, strict=True)]
+    listed += [
+        ("position", increment.length**2 * a - b) for a, b in zip(group_element[4:], increment.shift, strict=True)
+    ]
+    listed += [("φ(s)", a - factor * b) for a, b in zip(increment.turn, plain.turn, strict=True)]
+    listed += [("φ(s)", a - factor**2 * b) for a, b in zip(increment.shift, plain.shift, strict=True)]
     name = "τ = (1 + P/2)/(1 − P/2)" if cayley else "τ = exp(p)"
     residuals = zip([label for label, _ in listed], _with_phi([e for _, e in listed], _quarter), strict=True)
     yield decide_zero(f"the quaternion of {name} has length 1", residuals, positive)
-    simple = with_phi(*given, ZERO if cayley else _any(ZERO))
+    simple = with_phi(*covectors, ZERO if cayley else _any(ZERO))
     first, last = (_with_phi(part, _any) for part in (start, end))
     order = "τ g₀" if group.spatial else "g₀ τ"
     where = "body" if group.spatial else "space"
-    kept = _residuals(group, simple.turn, simple.shift, first, last)
-    yield decide_zero(f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}", kept, positive, f"the momentum in {where}, any g₀")
+    conserved = _residuals(group, simple.turn, simple.shift, first, last)
+    yield decide_zero(
+        f"Ad*_g₁ x₁ = Ad*_g₀ x₀ for g₁ = {order}", conserved, positive, f"the momentum in {where}, any g₀"
+    )
 
 
 def _residuals(
@@ -283,7 +290,7 @@ def _screwed(group: Group, turn: Vector, shift: Vector, start: Vector, end: Vect
 
 
 def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], Expression]) -> list[Expression]:
-    """The expressions with another value of φ, and φ′ by the differential equation: of φ no more is used."""
+    """The expressions with another value of φ, and φ′ by the differential equation: no other property of φ is used."""
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
         if e.op not in SPECIAL:
@@ -295,12 +302,12 @@ def _with_phi(expressions: Sequence[Expression], value: Callable[[Expression], E
 
 
 def _any(s: Expression) -> Expression:
-    """φ, of which nothing is used."""
+    """φ as a free symbol, without any of its properties."""
     return symbol(Symbol("phi"))
 
 
 def _quarter(s: Expression) -> Expression:
-    """φ(s/4) by c = 1 − φ(s/4)s/4, of which nothing is used."""
+    """φ(s/4) by c = 1 − φ(s/4)s/4, with φ(s/4) a free symbol."""
     return (ONE - symbol(Symbol("cosine"))) / s
 
 

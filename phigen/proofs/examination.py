@@ -1,4 +1,4 @@
-"""Everything phigen proves about one spec, in groups; what is refuted, and where the spec says it."""
+"""All proofs about one spec, in groups; the refuted statements with their places in the spec."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ from phigen.proofs.statements import (
 from phigen.spec.model import LieAlgebraForm, Spec
 from phigen.symbolic.verdict import REFUTED, Statement
 
-#: What rests on π: if that is no Poisson tensor, all of it may fail, and says nothing more.
+#: Groups of statements that depend on π: if π is not a Poisson tensor, they are not examined.
 UNEXAMINED = "Casimirs, invariants, the method"
 
-#: Where a spec says what a group of statements is about.
+#: The keys of a spec to which a group of statements refers.
 _PLACES = {METHOD: ("birealisation",), MONITOR: ("monitor",), SPLITTING: ("scheme",), ATTITUDE: ("reconstruct",)}
 _PLACES |= {DAMPING: ("damping",), GAUSS: ("scheme",)}
 
 
 @dataclass(frozen=True)
 class Examination:
-    """What was proved about a spec.
+    """The statements proved or refuted about a spec.
 
-    ``compilation`` is None if there is none: ``obstacle`` then says why. An obstacle is no refutation: no
+    ``compilation`` is None if there is none; ``obstacle`` then has the reason. An obstacle is not a refutation: no
     bi-realisation of the catalogue may apply to a perfectly good Poisson tensor. ``unexamined`` names what rests on
     something refuted, and would only repeat that; it is empty if everything was examined.
     """
@@ -62,11 +62,11 @@ class Examination:
         Casimirs and invariants stand for themselves. The axioms of a bi-realisation, and the flows of a splitting, are
         about the same few formulas: the first that fails says what is wrong.
         """
-        found = []
+        mistakes = []
         for group, listed in self.groups.items():
             refuted = [(group, s) for s in listed if s.verdict == REFUTED]
-            found += refuted if group in (DEFINEDNESS, CASIMIRS, INVARIANTS) else refuted[:1]
-        return found
+            mistakes += refuted if group in (DEFINEDNESS, CASIMIRS, INVARIANTS) else refuted[:1]
+        return mistakes
 
 
 def refuted(groups: Groups) -> list[Statement]:
@@ -74,19 +74,23 @@ def refuted(groups: Groups) -> list[Statement]:
     return [s for group in groups.values() for s in group if s.verdict == REFUTED]
 
 
-def refutation(found: Examination) -> str:
-    """What is refuted, for a message, each with its place in the spec."""
-    rest = f"not examined, since they rest on it: {found.unexamined}" if found.unexamined else ""
+def refutation(examination: Examination) -> str:
+    """The refuted statements for a message, each with its place in the spec."""
+    rest = f"not examined, because they depend on it: {examination.unexamined}" if examination.unexamined else ""
     return "\n".join(
-        str(found.spec.diagnostic(_place(found.spec, group, s), str(s), hint_of(found.spec, group) or rest))
-        for group, s in found.mistakes
+        str(
+            examination.spec.diagnostic(
+                _place(examination.spec, group, s), str(s), hint_of(examination.spec, group) or rest
+            )
+        )
+        for group, s in examination.mistakes
     )
 
 
 def hint_of(spec: Spec, group: str) -> str:
-    """What is often the cause where a statement of a group is false, or nothing.
+    """The usual cause of a false statement of a group, or nothing.
 
-    Of Casimirs it is that coordinates are in another order than the basis of the algebra that is named.
+    For Casimirs: the order of the coordinates differs from that of the basis of the named algebra.
     """
     form = spec.poisson
     if group == DAMPING:
@@ -98,16 +102,17 @@ def hint_of(spec: Spec, group: str) -> str:
     )
 
 
-def doubts(found: Examination) -> list[Diagnostic]:
-    """Warnings of what seems to have no value anywhere, or where a run starts, each with its place in the spec."""
+def doubts(examination: Examination) -> list[Diagnostic]:
+    """Warnings of expressions that seem to be undefined everywhere, or at the start of a run, with their places."""
     listed = [
-        found.spec.diagnostic(_place(found.spec, DEFINEDNESS, s), str(s)) for s in found.groups.get(DEFINEDNESS, ())
+        examination.spec.diagnostic(_place(examination.spec, DEFINEDNESS, s), str(s))
+        for s in examination.groups.get(DEFINEDNESS, ())
     ]
     return [replace(d, severity="warning") for d in listed]
 
 
 def _place(spec: Spec, group: str, statement: Statement) -> tuple[str, ...]:
-    """The path of keys to what a statement is about."""
+    """The path of keys to the subject of a statement."""
     places: dict[str, tuple[str, ...]] = {f"{name} is a Casimir": ("casimirs", name) for name in spec.casimirs}
     places |= {f"{name} is invariant": ("invariants", name) for name in spec.invariants}
     places |= {"H is defined": ("hamiltonian",), "the density of a pair is symmetric": ("hamiltonian", "pairs")}

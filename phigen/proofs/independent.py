@@ -1,4 +1,4 @@
-"""The second derivation (`phigen.series.reference`) beside what the compiler uses, term by term."""
+"""The second derivation (`phigen.series.reference`) compared with the compiler's, term by term."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from phigen.series.reference_paths import source_of_paths
 from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.verdict import CHECKED, POINTS, PROVED, REFUTED, UNDECIDED, Statement, sample_point
 
-#: The time that the second derivation of one spec may take, unless the user says otherwise.
+#: Seconds allowed for the second derivation of one spec by default.
 SECONDS = 60.0
 
 #: Digits of values at points, and how many of them must agree.
@@ -37,10 +37,10 @@ DIGITS, AGREEING = 120, 60
 _ATTEMPTS = 64
 _LONGEST = 160
 
-#: What is compared after the S_i.
+#: The comparisons after the S_i.
 GRADIENT, MAPS = "∇S_h", "α and β"
 
-#: A pair that should be equal, with what it is.
+#: A pair that should be equal, with its name.
 Pair = tuple[str, Any, Any]
 
 
@@ -60,15 +60,15 @@ class Comparison:
     @property
     def timed(self) -> Statement:
         """The statement with the seconds."""
-        taken = f"in {self.sympy:.2f} s"
+        seconds = f"in {self.sympy:.2f} s"
         if self.compiler is not None:
             what = "" if self.term == 1 else f"S_1 … S_{self.term} "
-            taken = f"{what}in {self.sympy:.2f} s, by phigen in {self.compiler:.3f} s"
-        return replace(self.statement, detail="; ".join(filter(None, [self.statement.detail, taken])))
+            seconds = f"{what}in {self.sympy:.2f} s, by phigen in {self.compiler:.3f} s"
+        return replace(self.statement, detail="; ".join(filter(None, [self.statement.detail, seconds])))
 
 
 class OutOfTimeError(BaseException):
-    """The time is up. No `Exception`, so that nothing on the way takes it for a failure of its own."""
+    """The time limit is reached. Not an `Exception`, so that no handler in between catches it."""
 
 
 def compare(compilation: Compilation, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
@@ -84,15 +84,15 @@ def compare(compilation: Compilation, terms: int | None = None, seconds: float =
         try:
             with progress.stage(f"{step} by sympy") as stage, time_limit(seconds):
                 derivation = derivation or _Derivation(compilation, terms)
-                found = derivation.compared(step)
+                comparison = derivation.compared(step)
         except (OutOfTimeError, OverflowError) as error:
             raise _limit(compilation, step, derivation.reached if derivation else 0, str(error)) from None
         seconds -= stage.seconds
-        yield found
+        yield comparison
 
 
 def _steps(compilation: Compilation, terms: int) -> list[str]:
-    """What is compared, by name."""
+    """The steps of the comparison, by name."""
     steps = [f"S_{i}" for i in range(1, terms + 1)]
     if compilation.scheme and compilation.scheme.terms <= terms:
         steps.append(GRADIENT)
@@ -165,17 +165,17 @@ class _Derivation:
 
     @property
     def _degree(self) -> int:
-        """Up to which degree in p the maps are compared: as S_1 … S_terms need them, and at least up to 2."""
-        wanted, chart = max(self._terms - 1, 2), self._compilation.chart
-        return wanted if chart.exact or chart.degree is None else min(wanted, chart.degree)
+        """The degree in p up to which the maps are compared: that needed for S_1 … S_terms, at least 2."""
+        degree, chart = max(self._terms - 1, 2), self._compilation.chart
+        return degree if chart.exact or chart.degree is None else min(degree, chart.degree)
 
     @property
     def reached(self) -> int:
-        """How many S_i were derived."""
+        """The number of S_i derived so far."""
         return len(self._found)
 
     def compared(self, step: str) -> Comparison:
-        """The next S_i, or what rests on them."""
+        """The comparison of the next S_i, or of the gradient or the maps."""
         if step == GRADIENT:
             return self._gradient()
         if step == MAPS:
@@ -214,13 +214,13 @@ class _Derivation:
         return Comparison(statement, None, time.perf_counter() - start)
 
     def _pushes(self) -> dict[Any, Any]:
-        """What p is beside ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
-        system, own = self._compilation.system, self._dictionary
-        pushes = dict.fromkeys(own.coordinates, sympy.Integer(0))
-        for c, zeta in zip(own.coordinates, system.forces.covector if system.forces else (), strict=False):
-            pushes[c] += own.step * own.expression(zeta)
+        """Terms of p besides ∇S_h, by coordinate: hζ of forces, ΔW σ∇g of noise."""
+        system, dictionary = self._compilation.system, self._dictionary
+        pushes = dict.fromkeys(dictionary.coordinates, sympy.Integer(0))
+        for c, zeta in zip(dictionary.coordinates, system.forces.covector if system.forces else (), strict=False):
+            pushes[c] += dictionary.step * dictionary.expression(zeta)
         for source, name in zip(system.noise, system.increments, strict=True):
-            g, dw = own.expression(source.hamiltonian), own.expression(symbol(name) * source.amplitude)
+            g, dw = dictionary.expression(source.hamiltonian), dictionary.expression(symbol(name) * source.amplitude)
             pushes = {c: push + dw * derivative(g, c) for c, push in pushes.items()}
         return pushes
 
@@ -243,8 +243,8 @@ class _Derivation:
         coordinates, d = self._compilation.system.coordinates, self._degree
         start = time.perf_counter()
         pairs = self._at_origin()
-        for name, given, end in (("α", self._alpha, 0), ("β", self._beta, 1)):
-            for c, theirs, mine in zip(coordinates, given(d), self._path(end)(d), strict=True):
+        for name, compiled_map, end in (("α", self._alpha, 0), ("β", self._beta, 1)):
+            for c, theirs, mine in zip(coordinates, compiled_map(d), self._path(end)(d), strict=True):
                 every = dict.fromkeys([*theirs, *mine])
                 pairs += [(f"{name}_{c}", theirs.get(mu, sympy.S.Zero), mine.get(mu, sympy.S.Zero)) for mu in every]
         name = f"α and β up to degree {d} in p"
@@ -254,8 +254,8 @@ class _Derivation:
     def _axioms(self) -> Comparison:
         d, x, p = self._degree, self._dictionary.coordinates, self._dictionary.covector
         start = time.perf_counter()
-        found = defects(self._poisson, self._alpha(d), self._beta(d), x, p, d)
-        rest = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in found)]
+        residuals = defects(self._poisson, self._alpha(d), self._beta(d), x, p, d)
+        rest = [*self._at_origin(), *((label, r, sympy.S.Zero) for label, r in residuals)]
         statement = decide(f"axioms of α and β up to degree {d - 1} in p", rest, self._positive, "")
         return Comparison(statement, None, time.perf_counter() - start)
 
@@ -273,11 +273,11 @@ def decide(name: str, pairs: Iterable[Pair], positive: Collection[str], detail: 
         if rest == 0 or functions.vanishes(rest):
             continue
         open_pairs += 1
-        found = _tried([theirs, mine], positive)
-        if isinstance(found, str):
+        point_or_count = _tried([theirs, mine], positive)
+        if isinstance(point_or_count, str):
             where = f"{label}, " if label else ""
-            return Statement(name, REFUTED, f"{where}at {found}", _cut(sympy.sstr(functions.expression(rest))))
-        fewest = min(fewest, found)
+            return Statement(name, REFUTED, f"{where}at {point_or_count}", _cut(sympy.sstr(functions.expression(rest))))
+        fewest = min(fewest, point_or_count)
     if not open_pairs:
         return Statement(name, PROVED, detail)
     if not fewest:

@@ -1,4 +1,4 @@
-"""What is stated of a lattice of any size, and of the method that was compiled for it."""
+"""Statements on a lattice of any size and on its method."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from phigen.symbolic.verdict import REFUTED, Statement
 
 
 def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
-    """What `tensor` and `integrals` say, of a lattice of any size."""
+    """The statements of `tensor` and `integrals` for a lattice of any size."""
     groups = {"Poisson tensor": proofs.tensor(cell)}
     if any(s.verdict == REFUTED for s in groups["Poisson tensor"]):
         return groups
-    found = {
+    statements = {
         CASIMIRS: tuple(proofs.casimirs(cell)),
         FORCES: tuple(acting.force_statements(cell)),
         NOISE: tuple(acting.noise_statements(cell)),
         INVARIANTS: tuple(proofs.invariants(cell)),
         "Hamiltonian": tuple(proofs.pair_symmetry(cell)),
     }
-    return groups | {group: listed for group, listed in found.items() if listed}
+    return groups | {group: listed for group, listed in statements.items() if listed}
 
 
 def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:

@@ -1,4 +1,4 @@
-"""What is stated of a system and of the method that was compiled for it, in groups: proved, refuted, or checked."""
+"""Statements on a system and on its method, in groups: proved, refuted, or checked."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ GAUSS = "Gauss collocation"
 
 
 def definedness(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """What has no value anywhere, or where a run starts; nothing is said of what has."""
+    """Statements on expressions that are undefined everywhere, or where a run starts; none if all are defined."""
     starts = _starts(system, spec)
-    found = tuple(undefined_parts(system, starts)) or tuple(
+    undefined = tuple(undefined_parts(system, starts)) or tuple(
         undefined_starts(system, dict(zip(spec.runs, starts, strict=True)))
     )
-    return {DEFINEDNESS: found} if found else {}
+    return {DEFINEDNESS: undefined} if undefined else {}
 
 
 def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
@@ -52,14 +52,14 @@ def _starts(system: System, spec: Spec) -> list[dict[str, float]]:
 
 
 def monitor(system: System, spec: Spec) -> dict[str, tuple[Statement, ...]]:
-    """g of dt = g dτ is positive; nothing where there is none."""
+    """g of dt = g dτ is positive; no statement without a monitor."""
     if spec.monitor is None or isinstance(spec.monitor, str):
         return {}
     return {MONITOR: (positivity("g > 0", spec.monitor, system.positive, _starts(system, spec)),)}
 
 
 def damping(spec: Spec, starts: Sequence[Mapping[str, float]]) -> dict[str, tuple[Statement, ...]]:
-    """λ of the damping is not negative; nothing where there is none, or where nothing tells."""
+    """λ of the damping is not negative; no statement without damping, or if its sign is unknown."""
     rate = spec.forces.damping
     if rate is None:
         return {}
@@ -89,19 +89,19 @@ def _defaults(spec: Spec, *runs: Run) -> list[dict[str, float]]:
 
 
 def tensor(system: System) -> dict[str, tuple[Statement, ...]]:
-    """π is skew, and satisfies the Jacobi identity, which nothing is said of if it is not skew."""
+    """π is skew and satisfies the Jacobi identity; the latter is examined for a skew π only."""
     skew = checks.skew_symmetry(system)
     return {"Poisson tensor": (skew,) if skew.verdict == REFUTED else (skew, jacobi_identity(system))}
 
 
 def integrals(system: System) -> dict[str, tuple[Statement, ...]]:
-    """The Casimirs, the rank of π, what the forces do to them, and the invariants that the spec claims."""
+    """Statements on the Casimirs, the rank of π, changes by forces, and the declared invariants."""
     casimirs = (*checks.casimir_statements(system), checks.rank_statement(system))
     invariants = tuple(checks.invariant_statements(system))
     forces = tuple(checks.force_statements(system))
     noise = tuple(checks.noise_statements(system))
-    found = {CASIMIRS: casimirs} | ({FORCES: forces} if forces else {}) | ({NOISE: noise} if noise else {})
-    return found | ({INVARIANTS: invariants} if invariants else {})
+    groups = {CASIMIRS: casimirs} | ({FORCES: forces} if forces else {}) | ({NOISE: noise} if noise else {})
+    return groups | ({INVARIANTS: invariants} if invariants else {})
 
 
 def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
@@ -122,8 +122,8 @@ def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
         tableau = compilation.program.step.tableau
         proved = check_gauss(compilation.system, compilation.discretised, compilation.gauss, tableau)
         return {compilation.label: tuple(proved)} | last
-    found = axioms.check(compilation.system, compilation.chart)
-    stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in found]
+    axiom_statements = axioms.check(compilation.system, compilation.chart)
+    stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in axiom_statements]
     label = f"{METHOD} ({compilation.chart.kind})"
     return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))} | last
 
@@ -144,10 +144,10 @@ def series_statements(compilation: Compilation) -> Iterator[Statement]:
     yield decide_elements(name, series.tower, listed[: plan.terms], system.positive, f"up to t^{plan.terms - 1}")
     if realisation.symmetric:
         even = ", ".join(f"S_{i}" for i in range(2, terms + 1, 2))
-        found = [entry for i, entry in enumerate(listed) if i % 2]
+        even_terms = [entry for i, entry in enumerate(listed) if i % 2]
         whose = "" if plan is compilation.order else " of each stage"
         yield decide_elements(
-            f"{even} = 0", series.tower, found, system.positive, f"hence the order {plan.order}{whose}"
+            f"{even} = 0", series.tower, even_terms, system.positive, f"hence the order {plan.order}{whose}"
         )
 
 

@@ -21,45 +21,45 @@ _BETTER = "preferred to the Cayley transform, whose error constants are 8 to 26 
 
 
 def build(system: System, choice: BirealisationChoice) -> BiRealisation:
-    """The bi-realisation that fits the shape of π; its ``explanation`` says what was picked and why."""
+    """The bi-realisation that fits the shape of π; its ``explanation`` names the kind and the reason."""
     match system.shape:
         case Constant() | Canonical():
-            found = constant.build(system, choice)
+            chosen = constant.build(system, choice)
         case LogCanonical():
-            found = log_canonical.build(system, choice)
+            chosen = log_canonical.build(system, choice)
         case LiePoisson() | Affine():
-            found = _of_algebra(system, choice)
+            chosen = _of_algebra(system, choice)
         case _:
-            found = _general(system, choice)
-    return replace(found, explanation=f"auto picked {found.kind}, since {found.explanation}")
+            chosen = _general(system, choice)
+    return replace(chosen, explanation=f"auto picked {chosen.kind}, since {chosen.explanation}")
 
 
 def _of_algebra(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Exponential in closed form, else block by block, else Cayley, else the exponential by following paths."""
-    found = exponential.closed_form(system)
-    if found is not None:
-        return replace(found, explanation=f"{found.explanation}; {_BETTER}")
-    found = _applicable(_by_blocks, system, choice)
-    if found is not None:
-        return found
+    candidate = exponential.closed_form(system)
+    if candidate is not None:
+        return replace(candidate, explanation=f"{candidate.explanation}; {_BETTER}")
+    candidate = _applicable(_by_blocks, system, choice)
+    if candidate is not None:
+        return candidate
     try:
-        found = cayley.build(system, choice)
+        candidate = cayley.build(system, choice)
     except SpecError as error:
         followed = exponential.followed(system, choice)
         why = error.diagnostics[0].message
         return replace(followed, explanation=f"{followed.explanation}; no Cayley transform either: {why}")
     why = "the exponential has no closed form that phigen finds, and would have to follow paths numerically"
-    return replace(found, explanation=f"{found.explanation}; {why}")
+    return replace(candidate, explanation=f"{candidate.explanation}; {why}")
 
 
 def _general(system: System, choice: BirealisationChoice) -> BiRealisation:
     """Constant in other coordinates, or a closed form in those of the spec or for each block; else Karasev."""
     for kind in (_gauged, _pulled_back, _by_blocks):
-        found = _applicable(kind, system, choice)
-        if found is not None:
-            return found
-    found = karasev.build(system, choice)
-    return replace(found, explanation=f"no closed form is known for this π: {found.explanation}")
+        candidate = _applicable(kind, system, choice)
+        if candidate is not None:
+            return candidate
+    candidate = karasev.build(system, choice)
+    return replace(candidate, explanation=f"no closed form is known for this π: {candidate.explanation}")
 
 
 def _gauged(system: System, choice: BirealisationChoice) -> BiRealisation:

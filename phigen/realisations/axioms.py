@@ -23,10 +23,10 @@ from phigen.symbolic.expression import ZERO, Expression, call, fold, number, reb
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import Statement, decide_elements, decide_zero
 
-#: What is stated, and proved or refuted.
+#: The names of the statements.
 ALPHA, BETA, MIXED = "{α_i, α_j} = π_ij∘α", "{β_i, β_j} = −π_ij∘β", "{α_i, β_j} = 0"
 
-#: Two indices, and what should be 0.
+#: Two indices, and the expression that should be 0.
 Residual = tuple[int, int, Poly]
 
 
@@ -47,7 +47,7 @@ def check(system: System, realisation: BiRealisation) -> list[Statement]:
 
 
 def _inner(inner: tuple[System, BiRealisation]) -> list[Statement]:
-    """The brackets of what is pulled back, said to be in its coordinates."""
+    """The brackets of the inner structure of a pull-back, with its coordinates in the statement."""
     where = f"in the coordinates {', '.join(inner[0].coordinates)}"
     return [replace(s, detail=f"{s.detail}, {where}" if s.detail else where) for s in check(*inner)[1:4]]
 

@@ -27,7 +27,7 @@ from phigen.spec.model import BirealisationChoice
 
 
 def _of_parts(build: Callable[[System, BirealisationChoice, Builder], BiRealisation]) -> Builder:
-    """The builder of a kind that is made of others: of the kind ``choice.of``, which is auto unless it is given."""
+    """The builder of the inner kind of a composed kind: ``choice.of``, by default auto."""
 
     def built(system: System, choice: BirealisationChoice) -> BiRealisation:
         return build(system, replace(choice, kind=choice.of, of="auto"), builder(choice.of))
@@ -70,9 +70,9 @@ def realise(system: System, choice: BirealisationChoice | None = None) -> BiReal
 
 def builder(kind: str) -> Builder:
     """The builder of a kind; raises `SpecError` for those that do not exist."""
-    found = BUILDERS.get(kind)
-    if found is not None:
-        return found
+    build = BUILDERS.get(kind)
+    if build is not None:
+        return build
     raise SpecError([Diagnostic(f"unknown birealisation {kind!r}", hint=_choices())])
 
 

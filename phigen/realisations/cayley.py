@@ -84,16 +84,16 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 def closed_representation(algebra: LieAlgebra) -> Representation | None:
     """The representation of the whole algebra that `closed_product` uses; None if it is none, or one for each part."""
-    given = [algebra.representation] if algebra.representation else []
-    if not given and len(indecomposable_parts(algebra)) > 1:
+    declared = [algebra.representation] if algebra.representation else []
+    if not declared and len(indecomposable_parts(algebra)) > 1:
         return None
-    return next((r for r in chain(given, candidates(algebra)) if trilinear(algebra, r) is not None), None)
+    return next((r for r in chain(declared, candidates(algebra)) if trilinear(algebra, r) is not None), None)
 
 
 def trilinear(algebra: LieAlgebra, representation: Representation) -> Trilinear | None:
     """The trilinear form of P E_i P in a representation; None if it leaves the algebra."""
-    found = _product(algebra, representation)
-    return None if isinstance(found, _Escape) else found
+    form = _product(algebra, representation)
+    return None if isinstance(form, _Escape) else form
 
 
 def _factored(terms: dict[Powers, Expression], variables: Sequence[Expression]) -> Expression:
@@ -114,21 +114,21 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
     """
     tried: dict[str, str] = {}
     if algebra.representation is not None:
-        found = _product(algebra, algebra.representation)
-        if not isinstance(found, _Escape):
-            return found, f"with {algebra.representation.name}"
-        tried[algebra.representation.name] = _refusal(algebra, algebra.representation, found)
+        form = _product(algebra, algebra.representation)
+        if not isinstance(form, _Escape):
+            return form, f"with {algebra.representation.name}"
+        tried[algebra.representation.name] = _refusal(algebra, algebra.representation, form)
     terms: Trilinear = {}
     used: dict[str, list[str]] = {}
     for part in indecomposable_parts(algebra):
         ideal = restricted(algebra, part)
         for representation in candidates(ideal):
-            found = _product(ideal, representation)
-            if not isinstance(found, _Escape):
-                terms |= {(part[i], part[a], part[b], part[k]): c for (i, a, b, k), c in found.items()}
+            form = _product(ideal, representation)
+            if not isinstance(form, _Escape):
+                terms |= {(part[i], part[a], part[b], part[k]): c for (i, a, b, k), c in form.items()}
                 used.setdefault(representation.name, []).append(f"({', '.join(ideal.labels)})")
                 break
-            tried[representation.name] = _refusal(ideal, representation, found)
+            tried[representation.name] = _refusal(ideal, representation, form)
         else:
             _expect_poisson(algebra)
             tried = tried or {"": f"no faithful representation of {ideal.name} was found"}
@@ -143,7 +143,7 @@ def closed_product(algebra: LieAlgebra) -> tuple[Trilinear, str]:
 
 
 def _expect_poisson(algebra: LieAlgebra) -> None:
-    """A better error where π is linear but no Poisson tensor, so that no representation can exist."""
+    """Refuse a linear π that violates the Jacobi identity, for which no representation can exist."""
     failing = failing_jacobi(algebra)
     if failing is not None:
         triple, component, residual = failing

@@ -1,4 +1,4 @@
-"""Exterior calculus on T*U in the polynomial ring: what a Poisson spray and Moser's trick are computed with.
+"""Exterior calculus on T*U in the polynomial ring: the calculus of Poisson sprays and Moser's trick.
 
 Variables are z = (x_1, …, x_n, p_1, …, p_n). The canonical form is ω = Σ dx_i ∧ dp_i, so that {x_i, p_j} = δ_ij.
 The *weight* of a form counts its factors p and dp: it is the eigenvalue under the Euler field E = Σ p_i ∂_{p_i}.

@@ -19,7 +19,8 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
             raise refuse(f"birealisation {name} has {len(maps)} components for {system.dimension} coordinates")
         unknown = [s for s in symbols_of(*maps) if s not in allowed]
         if unknown:
-            raise refuse(f"birealisation {name} uses {plain(unknown[0])}, which is no coordinate, parameter or p_NAME")
+            wrong = plain(unknown[0])
+            raise refuse(f"birealisation {name} uses {wrong}, which is not a coordinate, a parameter or p_NAME")
     x = [symbol(c) for c in system.coordinates]
     return BiRealisation(
         KIND,

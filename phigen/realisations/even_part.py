@@ -31,7 +31,7 @@ from phigen.symbolic.symbols import plain
 from phigen.symbolic.tower import Poly, Tower
 from phigen.symbolic.verdict import sample_point
 
-#: Most terms of one component of M^k x in p and x that are worth looking at.
+#: Most terms of one component of M^k x in p and x for which a closed form is tried.
 MOST_TERMS = 20_000
 
 Vector = list[Expression]
@@ -55,12 +55,12 @@ def even_part(algebra: LieAlgebra, x: Sequence[Expression], p: Sequence[Expressi
     forms: list[str] = []
     for part in _parts(algebra):
         ideal = restricted(algebra, part)
-        found = _of_ideal(ideal, [x[i] for i in part], [p[i] for i in part])
-        if found is None:
+        closed = _of_ideal(ideal, [x[i] for i in part], [p[i] for i in part])
+        if closed is None:
             return None
-        for i, value in zip(part, found.values, strict=True):
+        for i, value in zip(part, closed.values, strict=True):
             values[i] = value
-        forms += found.forms
+        forms += closed.forms
     return EvenPart(tuple(values), tuple(forms))
 
 
@@ -78,9 +78,9 @@ def _parts(algebra: LieAlgebra) -> list[list[int]]:
 
 def _of_ideal(ideal: LieAlgebra, x: Vector, p: Vector) -> EvenPart | None:
     """An ideal spanned by basis elements: as a whole, or by summands that the basis hides."""
-    found = _closed(ideal, x, p)
-    if found is not None:
-        return found
+    whole = _closed(ideal, x, p)
+    if whole is not None:
+        return whole
     projections = ideal_projections(ideal)
     if len(projections) < 2:
         return None

@@ -33,9 +33,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
     Raises `SpecError` for other π.
     """
-    found = closed_form(system)
-    if found is not None:
-        return found
+    closed = closed_form(system)
+    if closed is not None:
+        return closed
     if dual_of(system) is None:
         raise refuse(f"birealisation {KIND} needs a linear or affine π; this π is {system.shape}", "try auto")
     return followed(system, choice)
@@ -77,9 +77,9 @@ def followed(system: System, choice: BirealisationChoice) -> BiRealisation:
     """The exponential without a closed form: the path ṁ = π(m)p, a linear differential equation, is followed."""
     from phigen.realisations import karasev
 
-    found = karasev.build(system, choice)
+    path = karasev.build(system, choice)
     explanation = "π is linear or affine: τ = exp by following the path ṁ = π(m)p, since no closed form was found"
-    return replace(found, kind=KIND, explanation=f"{explanation}; {found.explanation}")
+    return replace(path, kind=KIND, explanation=f"{explanation}; {path.explanation}")
 
 
 def _sums(x: Sequence[Expression], shifts: Sequence[Expression]) -> tuple[Expression, ...]:

@@ -25,7 +25,7 @@ class Dual:
 
 
 def dual_of(system: System) -> Dual | None:
-    """What formulas for Lie–Poisson structures take for coordinates and covector; None for other π."""
+    """Coordinates and covector in the formulas for Lie–Poisson structures; None for other π."""
     x, p = [symbol(c) for c in system.coordinates], covector_symbols(system.coordinates)
     match system.shape:
         case LiePoisson(algebra):

@@ -46,15 +46,15 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
     Raises `SpecError` if π is not of this form, or the flow of a g_i is none of those above.
     """
-    found = separated(system.coordinates, system.poisson)
-    if found is None:
+    separation = separated(system.coordinates, system.poisson)
+    if separation is None:
         raise refuse(
             f"birealisation {KIND} needs π_ij = g_i(x_i) A_ij g_j(x_j) with constant A; this π is {system.shape}"
         )
     p = covector_symbols(system.coordinates)
-    times = hamiltonian_vector_field(found.matrix, [g * pi for g, pi in zip(found.factors, p, strict=True)])
+    times = hamiltonian_vector_field(separation.matrix, [g * pi for g, pi in zip(separation.factors, p, strict=True)])
     motions = []
-    for c, g, u in zip(system.coordinates, found.factors, times, strict=True):
+    for c, g, u in zip(system.coordinates, separation.factors, times, strict=True):
         motion = _motion(c, g, u, system.positive)
         if motion is None:
             raise refuse(f"birealisation {KIND}: phigen has no formula for the flow of {c}' = {g}", "try karasev")
@@ -62,7 +62,9 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
     x = [symbol(c) for c in system.coordinates]
     alpha = tuple(xi + m.early for xi, m in zip(x, motions, strict=True))
     beta = tuple(xi + m.late for xi, m in zip(x, motions, strict=True))
-    factors = ", ".join(f"{c}: {g}" for c, g in zip(system.coordinates, found.factors, strict=True) if g is not ONE)
+    factors = ", ".join(
+        f"{c}: {g}" for c, g in zip(system.coordinates, separation.factors, strict=True) if g is not ONE
+    )
     return BiRealisation(
         KIND,
         system.coordinates,

@@ -75,13 +75,13 @@ def build(system: System, choice: BirealisationChoice) -> BiRealisation:
 
 
 def _representation(algebra: LieAlgebra) -> Representation:
-    found = algebra.representation or next(candidates(algebra), None)
-    if found is None:
+    representation = algebra.representation or next(candidates(algebra), None)
+    if representation is None:
         raise refuse(
             f"birealisation {KIND}: no faithful matrices of {algebra.name} are known",
             "give them as lie_algebra: {matrices: […]}",
         )
-    return found
+    return representation
 
 
 def _dense(representation: Representation) -> list[Matrix]:
@@ -119,8 +119,8 @@ def _expect_tangent(system: System, representation: Representation, tau: Matrix)
 
 
 def _expect_equal(a: Matrix, b: Matrix, message: str, system: System) -> None:
-    for r, (row, wanted) in enumerate(zip(a, b, strict=True)):
-        for c, (u, v) in enumerate(zip(row, wanted, strict=True)):
+    for r, (row, other_row) in enumerate(zip(a, b, strict=True)):
+        for c, (u, v) in enumerate(zip(row, other_row, strict=True)):
             if not decide_zero("", [("", u - v)], system.positive).holds:
                 raise refuse(
                     f"birealisation {KIND}: {message}: entry ({r + 1}, {c + 1}) is {shortened(u)}, not {shortened(v)}",

@@ -44,17 +44,17 @@ def assembled(
     system: System, parts: Sequence[System], build_part: Builder, choice: BirealisationChoice
 ) -> BiRealisation:
     """The product of the bi-realisations that ``build_part`` makes of the parts."""
-    found = [build_part(part, choice) for part in parts]
-    for part, realisation in zip(parts, found, strict=True):
+    realisations = [build_part(part, choice) for part in parts]
+    for part, realisation in zip(parts, realisations, strict=True):
         if realisation.path:
             names = ", ".join(part.coordinates)
             raise refuse(f"birealisation {KIND}: no closed form is known for the block ({names})", "try karasev")
 
     def joined(name: str) -> tuple[Expression, ...]:
-        values = {c: e for r in found for c, e in zip(r.coordinates, getattr(r, name), strict=True)}
+        values = {c: e for r in realisations for c, e in zip(r.coordinates, getattr(r, name), strict=True)}
         return tuple(values.get(c, ZERO) for c in system.coordinates)
 
-    listed = [f"({', '.join(r.coordinates)}): {r.kind}, {_short(r.explanation)}" for r in found]
+    listed = [f"({', '.join(r.coordinates)}): {r.kind}, {_short(r.explanation)}" for r in realisations]
     return BiRealisation(
         KIND,
         system.coordinates,
@@ -62,10 +62,10 @@ def assembled(
         joined("beta"),
         joined("displacement"),
         joined("increment"),
-        symmetric=all(r.symmetric for r in found),
-        exact=all(r.exact for r in found),
+        symmetric=all(r.symmetric for r in realisations),
+        exact=all(r.exact for r in realisations),
         explanation=f"π is block diagonal, block by block: {'; '.join(listed)}",
-        reference="; ".join(dict.fromkeys(r.reference for r in found)),
+        reference="; ".join(dict.fromkeys(r.reference for r in realisations)),
     )
 
 

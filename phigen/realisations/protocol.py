@@ -1,4 +1,4 @@
-"""What every kind of bi-realisation delivers, and what a builder of one is."""
+"""The protocol of bi-realisations: the record that every kind delivers, and the type of its builder."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class BiRealisation:
 
     @property
     def label(self) -> str:
-        """The kind, and that it is approximate where it is: for every place that names it to the user."""
+        """The kind as shown to users, marked if it is approximate."""
         if self.exact:
             return self.kind
         return f"{self.kind} (approximate" + (")" if self.degree is None else f", Poisson up to degree {self.degree})")

@@ -20,7 +20,7 @@ from phigen.symbolic.numeric import DomainError, evaluate_exactly, is_rational
 from phigen.symbolic.tower import rational
 from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement, sample_point
 
-#: Points, and how many are tried at most.
+#: The number of points, and the largest number of attempts to find them.
 POINTS, ATTEMPTS = 3, 16
 
 Point = Mapping[str, Fraction]
@@ -48,18 +48,20 @@ def brackets_at_points(system: System, realisation: BiRealisation, titles: Seque
                 running.done += 1
     names = symbols_of(*(e for half in maps for e in half), *(e for row in system.poisson for e in row))
     missing = [v for v in variables if v not in names]
-    found: list[list[str]] = []
+    failures_at_points: list[list[str]] = []
     with progress.stage("brackets at points", POINTS) as running:
         for k in range(ATTEMPTS):
             point = sample_point([*names, *missing], system.positive, k)
             try:
-                found.append(_failures(system, maps, slopes, point))
+                failures_at_points.append(_failures(system, maps, slopes, point))
             except DomainError:
                 continue
             running.done += 1
-            if len(found) == POINTS:
+            if len(failures_at_points) == POINTS:
                 break
-    for title, failures in zip(titles, zip(*found, strict=True) if found else [()] * len(titles), strict=True):
+    for title, failures in zip(
+        titles, zip(*failures_at_points, strict=True) if failures_at_points else [()] * len(titles), strict=True
+    ):
         yield _statement(f"bi-realisation: {title}", failures)
 
 

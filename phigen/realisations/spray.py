@@ -37,11 +37,11 @@ from phigen.symbolic.verdict import PROVED
 KIND = "spray"
 REFERENCE = f"{PAPER}, section on Poisson sprays; M. Crainic, I. Mărcuţ, J. Symplectic Geom. 9 (2011)"
 
-#: A Lie series is taken for nilpotent if it ends within so many terms.
+#: A Lie series is taken for nilpotent if it ends within this number of terms.
 LONGEST = 8
 #: A search for a closed form gives up at polynomials with more terms than this.
 SEARCHED_TERMS = 500
-#: What to take for the flat spray where it has no closed form.
+#: The advice for a flat spray without a closed form.
 KARASEV = "; the kind karasev follows the flow of the same spray to round-off"
 
 
@@ -84,8 +84,8 @@ def _closed_flow(spray: Spray, i: int) -> tuple[Expression, Expression] | None:
     rate, rest = divmod(spray.field[i], x)
     if rest == 0 and rate != 0 and tower.is_zero(spray.apply(rate)):
         half = number(Fraction(1, 2)) * tower.expression(rate)
-        own = symbol(spray.space.names[i])
-        return own * (call("exp", -half) - 1), 2 * (own * call("sinh", half))
+        coordinate = symbol(spray.space.names[i])
+        return coordinate * (call("exp", -half) - 1), 2 * (coordinate * call("sinh", half))
     series = _finite_series(spray, x)
     if series is None:
         return None
@@ -121,8 +121,8 @@ def _terminating(system: System, spray: Spray) -> BiRealisation | None:
     if any(part != 0 for f in alpha for k, part in f.items() if k > LONGEST // 2):
         return None
     displacement, increment = zip(*(_differences(spray.space, f) for f in alpha), strict=True)
-    found = _exact(system, spray, displacement, increment, "its flow is nilpotent and Moser's recursion ends")
-    return found if all(s.verdict == PROVED for s in check(system, found)) else None
+    candidate = _exact(system, spray, displacement, increment, "its flow is nilpotent and Moser's recursion ends")
+    return candidate if all(s.verdict == PROVED for s in check(system, candidate)) else None
 
 
 def _exact(

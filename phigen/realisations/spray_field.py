@@ -38,9 +38,9 @@ class Spray:
         return self.space.along(self.field, f)
 
 
-def make_spray(system: System, given: str | Sequence[Expression]) -> Spray:
+def make_spray(system: System, name_or_forces: str | Sequence[Expression]) -> Spray:
     """The spray that a spec asks for, see `build`; SpecError if it is none."""
-    name, forces = _covector_part(system, given)
+    name, forces = _covector_part(system, name_or_forces)
     velocity = hamiltonian_vector_field(system.poisson, covector_symbols(system.coordinates))
     space = Cotangent(system.coordinates, [*velocity, *forces])
     spray = Spray(space, space.tower.convert_all([*velocity, *forces]), name)
@@ -48,14 +48,14 @@ def make_spray(system: System, given: str | Sequence[Expression]) -> Spray:
     return spray
 
 
-def _covector_part(system: System, given: str | Sequence[Expression]) -> tuple[str, Sequence[Expression]]:
-    if not isinstance(given, str):
-        return "given in the spec", _checked(system, given)
-    if given == "natural" or (given == "auto" and isinstance(system.shape, LogCanonical)):
+def _covector_part(system: System, name_or_forces: str | Sequence[Expression]) -> tuple[str, Sequence[Expression]]:
+    if not isinstance(name_or_forces, str):
+        return "given in the spec", _checked(system, name_or_forces)
+    if name_or_forces == "natural" or (name_or_forces == "auto" and isinstance(system.shape, LogCanonical)):
         return "natural", _natural(system)
-    if given in ("auto", "flat"):
+    if name_or_forces in ("auto", "flat"):
         return "flat", [ZERO] * system.dimension
-    raise refuse(f"unknown spray {given!r}", "auto, flat, natural or one expression for each coordinate")
+    raise refuse(f"unknown spray {name_or_forces!r}", "auto, flat, natural or one expression for each coordinate")
 
 
 def _natural(system: System) -> list[Expression]:
@@ -75,7 +75,7 @@ def _checked(system: System, forces: Sequence[Expression]) -> Sequence[Expressio
     allowed = {*system.coordinates, *system.parameter_names, *covector_names(system.coordinates)}
     unknown = [s for s in symbols_of(*forces) if s not in allowed]
     if unknown:
-        raise refuse(f"spray uses {plain(unknown[0])}, which is no coordinate, parameter or p_NAME")
+        raise refuse(f"spray uses {plain(unknown[0])}, which is not a coordinate, a parameter or p_NAME")
     return forces
 
 

@@ -33,7 +33,7 @@ def document(material: Material) -> str:
 
 
 def lead(compilation: Compilation) -> Markup:
-    """What stands at the top."""
+    """The beginning of the page."""
     spec = compilation.spec
     return page.block(
         "lead",
@@ -103,7 +103,7 @@ def _values(values: Mapping[str, float]) -> Markup:
 
 
 def provenance(material: Material) -> Iterator[Markup]:
-    """What the page was made of."""
+    """Provenance: the spec, the version and the command of the page."""
     spec = material.compilation.spec
     pairs = [
         ("phigen", material.compilation.program.version),

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 
 from phigen.drawing.palette import INSTALLED_BY
 
-#: What the page says where matplotlib is missing.
+#: The note in place of figures where matplotlib is missing.
 NO_FIGURES = f"There are no figures on this page, since matplotlib was not installed: {INSTALLED_BY}."
 
 

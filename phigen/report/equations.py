@@ -27,15 +27,15 @@ def equation(left: str, form: Formula | Expression, sign: str = "=") -> list[str
 
 def group(left: Sequence[str], expressions: Sequence[Expression], what: str, sign: str = "=") -> Markup:
     """Equations for ``what``, with names for the parts that they share."""
-    found = parts.readable(expressions)
-    if found.size > LEFT_OUT:
+    formulas = parts.readable(expressions)
+    if formulas.size > LEFT_OUT:
         counts = ", ".join(f"{n} {kind}" for kind, n in operation_counts(list(expressions)).items() if n)
         return page.paragraph(f"{what}: {len(left)} formulas of {counts}; phigen show prints them.", "note")
-    listed = page.equations([equation(name, form, sign) for name, form in zip(left, found.forms, strict=True)])
-    if found.parts:
-        where = page.equations([equation(mathml.name(name), e) for name, e in found.parts])
+    listed = page.equations([equation(name, form, sign) for name, form in zip(left, formulas.forms, strict=True)])
+    if formulas.parts:
+        where = page.equations([equation(mathml.name(name), e) for name, e in formulas.parts])
         listed = page.joined([listed, page.paragraph("where"), where])
-    return listed if found.size <= FOLDED else page.fold(what, listed)
+    return listed if formulas.size <= FOLDED else page.fold(what, listed)
 
 
 def polynomial(left: str, formula: Formula) -> Markup:

@@ -38,7 +38,7 @@ def brief_section(material: Material) -> Markup:
 
 
 def choices_section(compilation: Compilation) -> Markup:
-    """What the compiler chose, and why."""
+    """The choices of the compiler, with their reasons."""
     program = compilation.program
     pairs = [
         ("Poisson tensor", str(compilation.system.shape)),
@@ -113,12 +113,12 @@ def summary_table(summaries: Sequence[Summary]) -> Markup:
 
 def lyapunov_paragraph(spectrum: Spectrum) -> Markup:
     """The exponents, and how well they are known."""
-    found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
+    exponents = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     late, after = page.scientific(spectrum.uncertainty), f"{spectrum.clock} = {spectrum.t:.9g}"
     if len(spectrum.exponents) == 1:
-        said = f"The largest Lyapunov exponent after {after} is {found}."
+        said = f"The largest Lyapunov exponent after {after} is {exponents}."
         return page.paragraph(f"{said} The second half of the time changed it by {late}.")
-    said = f"Lyapunov exponents after {after}: {found}; their sum is {page.scientific(spectrum.total)}."
+    said = f"Lyapunov exponents after {after}: {exponents}; their sum is {page.scientific(spectrum.total)}."
     known = f"The second half of the time changed them by {late}, at most."
     return page.paragraph(f"{said} {known}")
 

@@ -29,7 +29,7 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class LatticeMaterial:
-    """What the page of a lattice is made of; without a run there is neither a trajectory nor a verification.
+    """Material of the page of a lattice; without a run there is neither a trajectory nor a verification.
 
     ``errors`` (frames,) are those of what is conserved, by name; ``energies`` (frames, *sizes) those of the sites.
     ``failure`` says why the run came to no end. ``live`` is the panel, ``spectrum`` are Lyapunov exponents.
@@ -100,12 +100,14 @@ def _method(compilation: Compilation) -> Iterator[Markup]:
         yield page.table("The parts of H, and how their flows move a site", [("", "part"), ("", "flow")], rows)
 
 
-def _run(material: LatticeMaterial, made: LatticeTrajectory) -> Iterator[Markup]:
+def _run(material: LatticeMaterial, trajectory: LatticeTrajectory) -> Iterator[Markup]:
     run = material.run
     assert run is not None
     pairs = [("run", run.name)] + ([("description", run.description)] if run.description else [])
-    pairs.append(("sites", " × ".join(map(str, made.x.shape[2:]))))
-    pairs.append(("steps", f"{made.steps} of {made.h:.9g}, {len(made)} frames to t = {made.t[-1]:.9g}"))
+    pairs.append(("sites", " × ".join(map(str, trajectory.x.shape[2:]))))
+    pairs.append(
+        ("steps", f"{trajectory.steps} of {trajectory.h:.9g}, {len(trajectory)} frames to t = {trajectory.t[-1]:.9g}")
+    )
     yield page.facts(pairs)
     rows = [(name, [("number", page.scientific(float(e.max())))]) for name, e in material.errors.items()]
     yield page.table("Largest errors along the run", [("", "quantity"), ("number", "error")], rows)
@@ -119,17 +121,19 @@ def _run(material: LatticeMaterial, made: LatticeTrajectory) -> Iterator[Markup]
     if material.spectrum:
         yield lyapunov_picture(material.spectrum)
 
-    flat = made.x.ndim == 3
+    flat = trajectory.x.ndim == 3
     caption = "The fields over space, upwards, and time" if flat else "The fields at some times"
-    if places_of(made) is not None:
+    if places_of(trajectory) is not None:
         caption = "The fields at some times; sites are as far apart as there are bonds between them, nearly"
     caption += ", and errors of what is conserved, on a logarithmic scale."
     worst = ", ".join(f"{name} {page.scientific(float(e.max()))}" for name, e in material.errors.items())
     title = "The fields over space and time"
-    yield picture("fields", lattice_figure(made, material.errors, ""), title, f"Largest errors: {worst}.", caption)
+    yield picture(
+        "fields", lattice_figure(trajectory, material.errors, ""), title, f"Largest errors: {worst}.", caption
+    )
     energies = material.energies
     if energies is not None:
         mean = float(np.mean(energies[-1]))
         said = f"Energy per site at the end: {mean:.6g} in the mean, {np.std(energies[-1]):.2g} its spread."
         caption = f"{said} Below, how far the Casimirs of the sites went: the farthest, and the spread."
-        yield picture("sites", sites_figure(made, energies), "Energies and Casimirs of the sites", said, caption)
+        yield picture("sites", sites_figure(trajectory, energies), "Energies and Casimirs of the sites", said, caption)

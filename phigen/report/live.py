@@ -69,32 +69,32 @@ def gathered(
     """The panel for a run: the solver in JavaScript, of the order of the page and of those of ``orders`` below it."""
     if compilation.system.noise:
         return Live({}, why_not=NOISE)
-    found, why_not = solvers(compilation, scheme, orders)
-    return Live(found, run, parameters, why_not)
+    by_order, why_not = solvers(compilation, scheme, orders)
+    return Live(by_order, run, parameters, why_not)
 
 
 def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int]) -> tuple[dict[int, str], str]:
     """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not."""
-    own = compilation.order.order
+    page_order = compilation.order.order
     spec = replace(compilation.spec, reconstruct="", extras=_PRIVATE)
     system = None if spec.lattice else compilation.system
-    found: dict[int, str] = {}
-    for order in (own, *(o for o in orders if o < own or (spec.lattice and o > own))):
+    by_order: dict[int, str] = {}
+    for order in (page_order, *(o for o in orders if o < page_order or (spec.lattice and o > page_order))):
         try:
-            if order == own and emits(compilation):
-                made = compilation
+            if order == page_order and emits(compilation):
+                variant = compilation
             else:
-                made = compile_spec(spec, order=order, scheme=scheme, system=system)
-            (text,) = emit(made.program, "").values()
+                variant = compile_spec(spec, order=order, scheme=scheme, system=system)
+            (text,) = emit(variant.program, "").values()
         except PhigenError as error:
-            if order == own:
+            if order == page_order:
                 return {}, str(error).splitlines()[0]
             continue
-        found[order] = enclosed(text)
-        if sum(map(len, found.values())) > MOST:
-            del found[order]
-    why_not = "" if found else f"its JavaScript would take more than {MOST // 1000} kB of this page"
-    return dict(sorted(found.items())), why_not
+        by_order[order] = enclosed(text)
+        if sum(map(len, by_order.values())) > MOST:
+            del by_order[order]
+    why_not = "" if by_order else f"its JavaScript would take more than {MOST // 1000} kB of this page"
+    return dict(sorted(by_order.items())), why_not
 
 
 def emits(compilation: Compilation) -> bool:
@@ -124,7 +124,7 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
     parameters = live.parameters or {}
     quantities, shown = _quantities(system), _groups(system)
     start, leaves = [float(v) for v in run.initial], [_leaf(system, group) for group in shown]
-    given = {
+    settings = {
         "coordinates": list(system.coordinates),
         "start": start,
         "t0": float(run.start),
@@ -152,7 +152,7 @@ def live_section(compilation: Compilation, live: Live) -> Markup:
         groups=list(enumerate(", ".join(g) for g in shown)),
         folds=[(title, unfolded, map(slid, listed)) for title, unfolded, listed in _folds(system, start, parameters)],
         help=HELP,
-        data=page.data("live-data", given),
+        data=page.data("live-data", settings),
     )
 
 
@@ -170,28 +170,28 @@ def sides(compilation: Compilation) -> list[tuple[int, str, str, str, str]]:
 
 
 def _quantities(system: System) -> list[dict[str, object]]:
-    """What the flow conserves: the energy, and all its Casimirs as one."""
+    """The quantities that the flow conserves: the energy, and all its Casimirs as one."""
     moved = moving(system)
-    found: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "energy error", "casimirs": None}]
-    kept = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
-    if kept:
-        found.append({"name": _named(system, kept), "casimirs": [*kept.values()]})
-    return found
+    quantities: list[dict[str, object]] = [] if ENERGY in moved else [{"name": "energy error", "casimirs": None}]
+    casimirs = {name: i for i, name in enumerate(system.casimirs) if name not in moved}
+    if casimirs:
+        quantities.append({"name": _named(system, casimirs), "casimirs": [*casimirs.values()]})
+    return quantities
 
 
-def _named(system: System, kept: Mapping[str, int]) -> str:
+def _named(system: System, casimirs: Mapping[str, int]) -> str:
     """The label of the errors of Casimirs, which are given by their numbers."""
-    names = ", ".join(kept)
-    if len(kept) > 1:
-        return f"Casimir errors ({names})" if len(kept) <= 3 else f"error of {len(kept)} Casimirs"
-    drawn = any(_leaf(system, group) == kept[names] for group in _groups(system))
+    names = ", ".join(casimirs)
+    if len(casimirs) > 1:
+        return f"Casimir errors ({names})" if len(casimirs) <= 3 else f"error of {len(casimirs)} Casimirs"
+    drawn = any(_leaf(system, group) == casimirs[names] for group in _groups(system))
     return f"distance from the surface (Casimir {names})" if drawn else f"Casimir error ({names})"
 
 
 def _groups(system: System) -> list[Group]:
     """Coordinates that are drawn together, the largest groups first."""
-    found = [group for group in groups(system.coordinates) if len(group) > 1]
-    return sorted(found or [(system.coordinates[0],) * 2], key=len, reverse=True)
+    several = [group for group in groups(system.coordinates) if len(group) > 1]
+    return sorted(several or [(system.coordinates[0],) * 2], key=len, reverse=True)
 
 
 def _leaf(system: System, group: Group) -> int | None:
@@ -200,23 +200,23 @@ def _leaf(system: System, group: Group) -> int | None:
         return -1 if system.dimension == 2 and ENERGY not in moving(system) else None
     coordinates = set(system.coordinates)
     moved, used = moving(system), [set(symbols_of(c)) & coordinates for c in system.casimirs.values()]
-    kept = zip(system.casimirs, used, strict=True)
+    casimirs = zip(system.casimirs, used, strict=True)
     return next(
-        (i for i, (name, names) in enumerate(kept) if name not in moved and names and names <= set(group)), None
+        (i for i, (name, names) in enumerate(casimirs) if name not in moved and names and names <= set(group)), None
     )
 
 
 def _say(system: System, conserved: Sequence[Mapping[str, object]], drawn: bool) -> str:
-    """What there is to see, in a few words."""
+    """The sentence above the panel that describes the picture."""
     said = "Two solvers take the same steps from the same start, in your browser, now. "
-    kept = ["keeps its energy"] if any(not q["casimirs"] for q in conserved) else []
+    properties = ["keeps its energy"] if any(not q["casimirs"] for q in conserved) else []
     if drawn:
-        kept.append(f"never leaves the {'curve' if system.dimension == 2 else 'surface'} drawn here")
-    elif len(conserved) > len(kept):
-        kept.append("keeps its Casimirs")
-    if not kept:
+        properties.append(f"never leaves the {'curve' if system.dimension == 2 else 'surface'} drawn here")
+    elif len(conserved) > len(properties):
+        properties.append("keeps its Casimirs")
+    if not properties:
         return f"{said}{NOTHING}"
-    return f"{said}The true motion {' and '.join(kept)}. Watch which of the two does."
+    return f"{said}The true motion {' and '.join(properties)}. Watch which of the two does."
 
 
 def general(live: Live) -> Iterable[Slider]:

@@ -37,7 +37,7 @@ from phigen.targets.code import lower
 from phigen.targets.js.printing import LANGUAGE
 from phigen.targets.names import Scope
 
-#: The sizes of a run are halved down to so many along an axis, and doubled up to these numbers of sites.
+#: The least number of sites along an axis for halved sizes, and the largest numbers of sites for doubled ones.
 FEWEST, MOST_PAIRS, MOST_IN_CHAIN, MOST_SITES = 8, 160, 1024, 10_000
 #: Numbers of lists that a page holds.
 MOST_NUMBERS = 20_000
@@ -68,8 +68,8 @@ def gathered_lattice(
         return LatticeLive({}, why_not=NOISE)
     if _numbers(compilation.spec, run, start) > MOST_NUMBERS:
         return LatticeLive({}, why_not="the lists of its start are too long for a page")
-    found, why_not = solvers(compilation, scheme, orders)
-    return LatticeLive(found, run, None, why_not, start, _formulas(compilation.spec, run))
+    by_order, why_not = solvers(compilation, scheme, orders)
+    return LatticeLive(by_order, run, None, why_not, start, _formulas(compilation.spec, run))
 
 
 def lattice_script(live: LatticeLive) -> str:
@@ -86,7 +86,7 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
     places = placed(start.bonds, start.sizes[0]) if picture == "graph" else None
     sizes, shown = _sizes(compilation, run, start), _groups(compilation, picture)
     moved = [p for p in spec.parameters if isinstance(_values(spec, run, start, p.name), float)]
-    given = {
+    settings = {
         "picture": picture,
         "axes": list(cell.axes),
         "coordinates": list(spec.coordinates),
@@ -122,12 +122,12 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
         groups=[(k, name) for k, (name, _, _) in enumerate(shown)],
         folds=[("Parameters", len(moved) <= FEW, map(slid, _parameters(spec, run, start, moved)))] if moved else [],
         help=HELP[picture] + about,
-        data=page.data("live-data", given),
+        data=page.data("live-data", settings),
     )
 
 
 def _picture(compilation: Compilation, start: Start) -> str:
-    """How a lattice is drawn: see fields.js."""
+    """The kind of picture of a lattice: see fields.js."""
     cell = compilation.cell
     if start.graph and start.sizes[0] <= MOST_PLACED:
         return "graph"
@@ -137,32 +137,32 @@ def _picture(compilation: Compilation, start: Start) -> str:
 
 
 def _groups(compilation: Compilation, picture: str) -> list[tuple[str, str, list[int]]]:
-    """What can be drawn: its name, its kind, and the numbers of its fields."""
+    """The quantities that can be drawn: name, kind, and the numbers of the fields."""
     fields = compilation.spec.coordinates
     if picture == "moving":
         return [(f"{fields[0]}, {fields[1]}", "field", [0, 1])]
-    found = [(name, "field", [k]) for k, name in enumerate(fields)]
+    views = [(name, "field", [k]) for k, name in enumerate(fields)]
     form = compilation.spec.poisson
     if isinstance(form, LieAlgebraForm) and (form.family, form.size) == ("so", 3):
-        found.insert(0, ("directions of the spins", "direction", [0, 1, 2]))
-    return [*found, ("energy of each site", "energy", [])]
+        views.insert(0, ("directions of the spins", "direction", [0, 1, 2]))
+    return [*views, ("energy of each site", "energy", [])]
 
 
 def _sizes(compilation: Compilation, run: Run, start: Start) -> list[list[int]]:
     """The sizes that a panel offers; those of the run alone where its start is a list."""
-    found, cell = [list(start.sizes)], compilation.cell
+    choices, cell = [list(start.sizes)], compilation.cell
     assert cell is not None
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))
     if start.graph or any(v and (v.listed or v.file) for v in arrays):
-        return found
+        return choices
     step = compilation.program.step
     periods = step.sites.periods  # type: ignore[union-attr]
     most = MOST_PAIRS if cell.relation == PAIRS else MOST_IN_CHAIN if len(cell.axes) == 1 else MOST_SITES
-    while all(n % (2 * p) == 0 and n >= 2 * FEWEST for n, p in zip(found[0], periods, strict=True)):
-        found.insert(0, [n // 2 for n in found[0]])
-    while math.prod(2 * n for n in found[-1]) <= most:
-        found.append([2 * n for n in found[-1]])
-    return found
+    while all(n % (2 * p) == 0 and n >= 2 * FEWEST for n, p in zip(choices[0], periods, strict=True)):
+        choices.insert(0, [n // 2 for n in choices[0]])
+    while math.prod(2 * n for n in choices[-1]) <= most:
+        choices.append([2 * n for n in choices[-1]])
+    return choices
 
 
 def _general(live: Live, sizes: Sequence[Sequence[int]]) -> Iterator[Slider]:
@@ -222,9 +222,9 @@ def _listed(array: Any) -> list[float]:
 
 def _numbers(spec: Spec, run: Run, start: Start) -> int:
     """Numbers that the page would list."""
-    given = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
-    given += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
-    return sum(len(g.get("listed", ())) for g in given) + start.bonds.size
+    arrays = [_given(v, start, name, spec) for name, v in _initial(spec, run).items()]
+    arrays += [_array(spec, run, start, p) for p in spec.parameters if _values(spec, run, start, p.name) is None]
+    return sum(len(g.get("listed", ())) for g in arrays) + start.bonds.size
 
 
 def _formulas(spec: Spec, run: Run) -> str:
@@ -255,21 +255,24 @@ def _sign(spec: Spec, start: Start) -> str:
 
 
 def _quantities(compilation: Compilation) -> list[dict[str, Any]]:
-    """What is conserved: the energy, unless time or forces act, and the Casimirs that they leave as one."""
+    """The conserved quantities: the energy, unless time or forces act, and the conserved Casimirs as one."""
     cell, pushed = compilation.cell, compilation.program.pushed
     assert cell is not None
-    found: list[dict[str, Any]] = [] if cell.driven else [{"name": "energy error", "casimirs": None}]
-    kept = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
-    if kept:
-        found.append(
-            {"name": f"Casimir error{'s' * (len(kept) > 1)} ({', '.join(kept)})", "casimirs": [*kept.values()]}
+    quantities: list[dict[str, Any]] = [] if cell.driven else [{"name": "energy error", "casimirs": None}]
+    casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
+    if casimirs:
+        quantities.append(
+            {
+                "name": f"Casimir error{'s' * (len(casimirs) > 1)} ({', '.join(casimirs)})",
+                "casimirs": [*casimirs.values()],
+            }
         )
-    return found
+    return quantities
 
 
 def _say(compilation: Compilation) -> str:
     said = "Two solvers take the same steps from the same start, in your browser, now. "
-    kept = " and ".join("its Casimirs" if q["casimirs"] else "its energy" for q in _quantities(compilation))
-    if not kept:
+    conserved_words = " and ".join("its Casimirs" if q["casimirs"] else "its energy" for q in _quantities(compilation))
+    if not conserved_words:
         return f"{said}{NOTHING}"
-    return f"{said}The true motion keeps {kept}. Watch which of the two does."
+    return f"{said}The true motion keeps {conserved_words}. Watch which of the two does."

@@ -20,7 +20,7 @@ from phigen.symbolic.arrays import Floats
 
 @dataclass(frozen=True)
 class Material:
-    """What was proved, and what was measured on one run; what could not be had is None, and ``notes`` say why.
+    """Proofs, and measurements on one run; missing parts are None, and ``notes`` have the reason.
 
     ``steps`` are those of the run, in words. ``methods`` are trajectories by their labels, the solver's first;
     ``opening`` has each of the first steps, where ``methods`` do not have all. ``section`` is what its Poincaré section

@@ -19,7 +19,7 @@ FLOWS = 12
 
 
 def method_section(compilation: Compilation) -> Markup:
-    """How a step is made, as formulas."""
+    """The formulas of a step."""
     if compilation.gauss:
         said, blocks = collocation.method(compilation), _collocation(compilation)
     elif compilation.splitting:
@@ -39,14 +39,14 @@ def _collocation(compilation: Compilation) -> list[Markup]:
 
 def _gauge(compilation: Compilation) -> list[Markup]:
     gauge = compilation.gauge
-    taken = [
+    subtracted = [
         f"{mathml.name(s)}<mo>&#x2062;</mo>{mathml.name(c)}" for s, c in zip(gauge.multiples, gauge.free, strict=True)
     ]
-    taken += [f"{mathml.grouped(value)}<mo>&#x2062;</mo>{mathml.name(c)}" for c, value in gauge.fixed.items()]
-    if not taken:
+    subtracted += [f"{mathml.grouped(value)}<mo>&#x2062;</mo>{mathml.name(c)}" for c, value in gauge.fixed.items()]
+    if not subtracted:
         return []
     said = "In what follows, H stands for this: a multiple of a Casimir changes no flow, but the error of a step."
-    gauged = mathml.math(GAUGED + "".join(f"<mo>−</mo>{part}" for part in taken))
+    gauged = mathml.math(GAUGED + "".join(f"<mo>−</mo>{part}" for part in subtracted))
     return [page.heading("Gauge"), page.equations([[gauged]]), page.paragraph(said, "note")]
 
 
@@ -69,15 +69,15 @@ def _series(compilation: Compilation) -> list[Markup]:
 
 
 def _generating_function(compilation: Compilation) -> list[Markup]:
-    found = generating.series_formulas(compilation, None)
-    scaled = [f"{_power('h', i)}<mo>&#x2062;</mo>{_indexed('S', i)}" for i, _ in found.listed]
-    terms = "<mo>+</mo>".join([*scaled, *(["<mo>…</mo>"] if found.beyond else [])])
+    series = generating.series_formulas(compilation, None)
+    scaled = [f"{_power('h', i)}<mo>&#x2062;</mo>{_indexed('S', i)}" for i, _ in series.listed]
+    terms = "<mo>+</mo>".join([*scaled, *(["<mo>…</mo>"] if series.beyond else [])])
     blocks = [page.heading("Generating function")]
     blocks.append(page.equations([[mathml.math(f"{_indexed('S', 'h')}<mo>=</mo>{terms}")]]))
-    blocks += [polynomial(_indexed("S", i), formula) for i, formula in found.listed]
-    if found.beyond:
-        blocks.append(page.paragraph(f"{found.missing[0].upper()}{found.missing[1:]}.", "note"))
-    correction = found.leading
+    blocks += [polynomial(_indexed("S", i), formula) for i, formula in series.listed]
+    if series.beyond:
+        blocks.append(page.paragraph(f"{series.missing[0].upper()}{series.missing[1:]}.", "note"))
+    correction = series.leading
     if correction is None or not correction.size:
         return blocks
     blocks.append(page.heading("Modified Hamiltonian"))
@@ -100,8 +100,8 @@ def _splitting(compilation: Compilation) -> list[Markup]:
 def _flow(compilation: Compilation, k: int, flow: Flow) -> list[Markup]:
     moved = flows.images(flow, compilation.system.coordinates)
     left = [mathml.name(c) for c in moved]
-    own = flows.definitions(flow, compilation.system.coordinates)
-    part = page.equations([equation(mathml.component(flow.letter, k, c), e) for c, e in own])
+    local = flows.definitions(flow, compilation.system.coordinates)
+    part = page.equations([equation(mathml.component(flow.letter, k, c), e) for c, e in local])
     images = group(left, list(moved.values()), f"The flow of {flow.letter}_{k}", "↦")
     return [part, images, page.paragraph(f"This flow: {flow.manner}.", "note")] if moved else [part]
 

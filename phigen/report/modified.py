@@ -11,29 +11,31 @@ from phigen.report.drawable import drawable
 from phigen.study.backward import Constancy, truncation
 
 
-def modified_section(found: Constancy | None, why_not: str) -> Markup:
-    """What was measured, in a table and a figure; or why nothing was."""
+def modified_section(constancy: Constancy | None, why_not: str) -> Markup:
+    """The measurements in a table and a figure; or the reason why there are none."""
     said = (
         "A step of the solver is the exact flow, over the time h, of a Hamiltonian H̃ near H. So it keeps H̃, and H up "
         "to the difference: this is why energy oscillates and does not drift. H̃ is a series in h."
     )
-    if found is None:
+    if constancy is None:
         return page.joined([page.paragraph(said), page.paragraph(f"It was not measured here: {why_not}.", "note")])
     said += " The more of its terms are taken, the less it changes along the trajectory."
-    rows = [_row(m, found) for m in range(len(found.powers))]
+    rows = [_row(m, constancy) for m in range(len(constancy.powers))]
     columns = [("", "Hamiltonian"), ("", "should change like"), ("", "changes like")]
-    columns.append(("number", f"largest change at steps of {found.step:.4g}"))
+    columns.append(("number", f"largest change at steps of {constancy.step:.4g}"))
     blocks = [page.paragraph(said), page.table("How constant it is, relative to the energy", columns, rows)]
     if drawable():
         from phigen.report import pictures
 
-        blocks.append(pictures.constancy_picture(found))
+        blocks.append(pictures.constancy_picture(constancy))
     return page.joined(blocks)
 
 
-def _row(m: int, found: Constancy) -> tuple[str, list[page.Cell]]:
+def _row(m: int, constancy: Constancy) -> tuple[str, list[page.Cell]]:
     observed = (
-        Markup("h<sup>{}</sup>").format(f"{found.observed[m]:.2f}") if isfinite(found.observed[m]) else "rounding"
+        Markup("h<sup>{}</sup>").format(f"{constancy.observed[m]:.2f}")
+        if isfinite(constancy.observed[m])
+        else "rounding"
     )
-    stated = Markup("h<sup>{}</sup>").format(found.powers[m])
-    return truncation(m), [("", stated), ("", observed), ("number", page.scientific(float(found.errors[m].max())))]
+    stated = Markup("h<sup>{}</sup>").format(constancy.powers[m])
+    return truncation(m), [("", stated), ("", observed), ("number", page.scientific(float(constancy.errors[m].max())))]

@@ -74,7 +74,7 @@ def facts(pairs: Iterable[tuple[str, str]]) -> Markup:
 
 
 def fold(summary: str, body: Markup) -> Markup:
-    """What is shown on demand."""
+    """A part of the page that opens on demand."""
     return block("fold", summary=summary, body=body)
 
 
@@ -146,7 +146,7 @@ def _asset(name: str) -> str:
 
 
 def _hash(text: str) -> str:
-    """What a Content-Security-Policy calls an inline element."""
+    """The source expression of an inline element in a Content-Security-Policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
@@ -158,10 +158,10 @@ _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def typeset(text: str) -> Markup:
     """Plain text with formulas in it: S_1, h^2 and 3e-16 as mathematics writes them."""
-    found = str(escape(text))
-    found = _SUBSCRIPT.sub(r"<sub>\1</sub>", found)
-    found = _POWER.sub(r"<sup>\1</sup>", found)
-    return Markup(_DECIMAL.sub(lambda m: "·10" + str(int(m[1])).translate(_SUPERSCRIPTS), found))
+    markup = str(escape(text))
+    markup = _SUBSCRIPT.sub(r"<sub>\1</sub>", markup)
+    markup = _POWER.sub(r"<sup>\1</sup>", markup)
+    return Markup(_DECIMAL.sub(lambda m: "·10" + str(int(m[1])).translate(_SUPERSCRIPTS), markup))
 
 
 def scientific(value: float, digits: int = 2) -> str:

@@ -19,8 +19,8 @@ def panel_page(compilation: Compilation, run: Run) -> str | None:
     if spec.lattice:
         fields = gathered_lattice(compilation, None, run, start_of(spec, run), ())
         body, code, panel = lattice_live_section(compilation, fields), lattice_script(fields), page.FIELDS
-        made = bool(fields.solvers)
+        has_solver = bool(fields.solvers)
     else:
         live = gathered(compilation, None, run, spec.parameters_of(run), ())
-        body, code, panel, made = live_section(compilation, live), script(live), page.CURVES, bool(live.solvers)
-    return page.alone(spec.title or spec.name, body, code, panel) if made else None
+        body, code, panel, has_solver = live_section(compilation, live), script(live), page.CURVES, bool(live.solvers)
+    return page.alone(spec.title or spec.name, body, code, panel) if has_solver else None

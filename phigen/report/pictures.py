@@ -61,21 +61,21 @@ def section_picture(names: Sequence[str], function: str, points: Floats, count: 
     return picture("section", figure, "Poincaré section", caption, caption)
 
 
-def constancy_picture(found: Constancy) -> Markup:
-    """How constant the modified Hamiltonian is."""
-    largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(found.errors)})
+def constancy_picture(constancy: Constancy) -> Markup:
+    """The figure of changes of the modified Hamiltonian."""
+    largest = page.listed({truncation(m): float(e.max()) for m, e in enumerate(constancy.errors)})
     caption = "Changes of H and of H̃ with one and two corrections, relative to the energy. Thin lines have the slopes "
     caption += "that they should have. The dotted line is one unit in the last place of a double."
-    figure, said = figures.constancy_figure(found), f"Largest changes at steps of {found.step:.4g}: {largest}."
+    figure, said = figures.constancy_figure(constancy), f"Largest changes at steps of {constancy.step:.4g}: {largest}."
     return picture("constancy", figure, "Constancy of the modified Hamiltonian", said, caption)
 
 
 def lyapunov_picture(spectrum: Spectrum) -> Markup:
-    """How the Lyapunov exponents converged."""
+    """The figure of the convergence of the Lyapunov exponents."""
     caption = f"How the Lyapunov exponents converge, up to {spectrum.clock} = {spectrum.t:.9g}."
-    found = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
+    exponents = ", ".join(page.scientific(v) for v in spectrum.exponents.tolist())
     return picture(
-        "lyapunov", figures.lyapunov_figure(spectrum), "Lyapunov exponents", f"At the end: {found}.", caption
+        "lyapunov", figures.lyapunov_figure(spectrum), "Lyapunov exponents", f"At the end: {exponents}.", caption
     )
 
 
@@ -114,8 +114,8 @@ def _described(s: Summary) -> str:
 
 
 def _fastest(study: Study, tolerance: float) -> str:
-    found = {curve.label: curve.seconds_for(tolerance) for curve in study.curves}
-    return f"for an error of {page.scientific(tolerance, 1)}, {page.listed(found)}"
+    seconds = {curve.label: curve.seconds_for(tolerance) for curve in study.curves}
+    return f"for an error of {page.scientific(tolerance, 1)}, {page.listed(seconds)}"
 
 
 def _with_few_casimirs(trajectory: Trajectory) -> Trajectory:

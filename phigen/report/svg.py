@@ -15,7 +15,7 @@ from phigen.drawing.palette import PALETTE
 _SVG, _LINK = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d{3,}")
 _FONT = re.compile(r"(?:(\w+) )?([\d.]+)px .*")
-#: What matplotlib writes where nothing was chosen.
+#: Attributes that matplotlib writes with default values.
 _COLOURS = {**{value: f"var(--{role})" for role, value in PALETTE.items()}, "#000000": "var(--ink)"}
 #: Pixels of a page for one point of a figure: the widest fills the column.
 PIXELS = 1.75

@@ -41,10 +41,10 @@ def _tensor(system: System) -> Markup:
 
 
 def _kinds(system: System) -> Markup:
-    """What each name stands for."""
+    """The kinds of names: coordinates, parameters, Casimirs."""
     declared = [c for c in system.casimirs if c in system.declared]
-    found = [c for c in system.casimirs if c not in system.declared]
-    kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", found)]
+    undeclared = [c for c in system.casimirs if c not in system.declared]
+    kinds = [("Casimirs of the spec", declared), ("Casimirs that phigen found", undeclared)]
     kinds.append(("further invariants", list(system.invariants)))
     said = "; ".join(f"{kind}: {', '.join(names)}" for kind, names in kinds if names) or "no Casimirs or invariants"
     return page.paragraph(f"{said[0].upper()}{said[1:]}.", "note")

@@ -1,4 +1,4 @@
-"""What the viewer of a page is given: trajectories, thinned and rounded to what a screen can show."""
+"""Data of the viewer of a page: trajectories, thinned and rounded to the resolution of a screen."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from phigen.symbolic.expression import Expression
 
 #: Numbers of all curves together, rows of one at most, and the steps to which a coordinate is rounded.
 MOST_NUMBERS, MOST_ROWS, STEPS = 90_000, 4_000, 9_999
-#: The viewer shows so many curves.
+#: The largest number of curves in the viewer.
 CURVES = 2
-#: A coordinate name is cut to so many letters where there is little room.
+#: The number of letters to which a coordinate name is cut where there is little room.
 LETTERS = 24
 
 
@@ -43,16 +43,16 @@ def viewer(
     if not shown:
         return Markup("")
     names = [*(c[:LETTERS] for c in first.coordinates), "t"]
-    given = _data(shown, names, axes, _leaf(casimirs, next(iter(shown.values())), axes))
+    view_data = _data(shown, names, axes, _leaf(casimirs, next(iter(shown.values())), axes))
     options = list(enumerate(names))
     return page.block(
         "viewer",
         label=f"The trajectory of {', '.join(names)}. Arrow keys turn it, plus and minus zoom, 0 resets.",
         axes=[(axis, options) for axis in "xyz"],
         curves=list(enumerate(shown, start=1)),
-        last=len(given["curves"][0][0]) - 1,
+        last=len(view_data["curves"][0][0]) - 1,
         until=until,
-        data=page.data("viewer-data", given),
+        data=page.data("viewer-data", view_data),
     )
 
 
@@ -71,10 +71,10 @@ def _leaf(casimirs: Mapping[str, Expression], curve: Trajectory, axes: list[int]
     if not drawable() or len(curve.coordinates) in axes:
         return None
     start = dict(zip(curve.coordinates, curve.x[0].tolist(), strict=True))
-    found = leaf_of(casimirs, [curve.coordinates[axis] for axis in axes], start, curve.parameters)
-    if found is None:
+    leaf = leaf_of(casimirs, [curve.coordinates[axis] for axis in axes], start, curve.parameters)
+    if leaf is None:
         return None
-    lines = net(found, around(found, box_of(_finite(curve)[:, axes])))
+    lines = net(leaf, around(leaf, box_of(_finite(curve)[:, axes])))
     return np.concatenate([part for line in lines for part in (line, np.full((1, 3), np.nan))]) if lines else None
 
 

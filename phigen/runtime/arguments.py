@@ -80,7 +80,7 @@ def start_time(t0: float | None, interface: Interface, more: dict[str, float]) -
     if t0 is None or interface.time:
         return 0.0 if t0 is None else number(t0, "the time t0")
     if "t0" not in interface.parameters:
-        raise TypeError(f"t0 was given, but the Hamiltonian of {interface.name} does not depend on the time")
+        raise TypeError(f"t0 has no meaning: the Hamiltonian of {interface.name} does not depend on the time")
     more["t0"] = t0
     return 0.0
 
@@ -116,7 +116,7 @@ def increments(given: ArrayLike, interface: Interface) -> Floats:
 def expect_no_noise(what: str, interface: Interface) -> None:
     """`TypeError` for what makes steps in parts, which have other random numbers than the whole."""
     if interface.noise:
-        raise TypeError(f"{what} is not offered with noise: parts of a step are not on the same path")
+        raise TypeError(f"{what} is not available with noise: parts of a step are not on the same path")
 
 
 def times_within(times: ArrayLike, t: Floats) -> Floats:
@@ -306,7 +306,7 @@ def real(given: ArrayLike, what: str) -> Floats:
     try:
         kind = np.asarray(given).dtype.kind
         if kind in "SU":
-            raise TypeError("texts are none")
+            raise TypeError("text is not a number")
         if kind != "c":
             return np.array(given, dtype=np.float64)
     except OverflowError:

@@ -28,7 +28,7 @@ def bound(
         if function is None and name in wanted:
             raise ToolchainError(
                 f"the compiled solver has no function {prefix}_{name}\n"
-                "  hint: whatever CC names did not compile what it was given; try gcc or clang"
+                "  hint: the program named in CC did not compile the source it received; try gcc or clang"
             )
         if function is not None:
             function.restype = numbers.get(result, result)

@@ -67,6 +67,8 @@ _OFFERED: dict[str, tuple[Any, tuple[Any, ...]]] = {
     "put_planes": (_INT, (_POINTER, _SIZE, _SIZE, _SIZE, _POINTER)),
     "holds": (_INT, (_POINTER, _SIZE, _SIZE)),
     "set_planes": (_INT, (_POINTER, _SIZE, _SIZE)),
+    "observables": (None, (_POINTER, _POINTER)),
+    "observed_fields": (None, (_POINTER, _POINTER)),
     "set_state": (_INT, (_POINTER, _POINTER)),
     "kick": (_INT, (_POINTER, _POINTER)),
 }
@@ -117,6 +119,7 @@ class CLatticeSession:
         self._c, self._shape, self._before = functions, x0.shape, 0
         self._real: Any = np.float32 if interface.single else np.float64
         self._casimirs = len(interface.casimirs)
+        self._observed = len(interface.observables), len(interface.observed_fields)
         self._kept = 2 if interface.compensated else 1
         self._dear = interface.dear
         sizes = np.array(x0.shape[1:], dtype=np.uintp)
@@ -214,6 +217,16 @@ class CLatticeSession:
         """π∇H (coordinates, *sizes)."""
         return self._filled(self._c.vector_field, self._shape)
 
+    def observables(self) -> Floats:
+        """Observables that are one number each (observables,)."""
+        observed, _ = self._observed
+        return self._filled(self._c.observables, (observed,)) if observed else np.empty(0)
+
+    def observed_fields(self) -> Floats:
+        """Observables with a value at each site (fields, *sizes)."""
+        shape = (self._observed[1], *self._shape[1:])
+        return self._filled(self._c.observed_fields, shape) if shape[0] else np.empty(shape)
+
     def saved(self) -> dict[str, Any]:
         """What `resume` goes on from with the same bits, beside the state."""
         if not hasattr(self._c, "saved"):
@@ -246,7 +259,7 @@ class CLatticeSession:
     def _moved(self, name: str, given: Floats) -> None:
         function = getattr(self._c, name, None)
         if function is None:
-            raise TypeError("this lattice was compiled without kicks: profile fast has them")
+            raise TypeError("this lattice was compiled without kicks; profile fast includes them")
         x = np.ascontiguousarray(given, dtype=self._real)
         status = function(self._address, x.ctypes.data)
         if status:
@@ -324,7 +337,7 @@ class CLattice:
         """
         if not hasattr(self._c, "stages"):
             raise ValueError(
-                f"{self.interface.name} offers no stepping driven by the caller: that needs a split lattice on a grid, "
+                f"{self.interface.name} has no caller-driven stepping: that needs a split lattice on a grid, "
                 "without a seam, compiled with profile fast"
             )
         found = [Stage() for _ in range(self._c.stages() + (not self.interface.noise))]

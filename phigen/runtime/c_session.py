@@ -119,7 +119,7 @@ class CSession:
 
     def _moved(self, function: str, by: Floats) -> None:
         if not hasattr(self._c, function):
-            raise TypeError("the solver was compiled without kicks: its spec leaves them out")
+            raise TypeError("the solver was compiled without kicks: the spec has without: [kicks]")
         with np.errstate(over="ignore"):  # which is found infinite
             given = np.ascontiguousarray(by, dtype=self._real)
         status = getattr(self._c, function)(self.address, given.ctypes.data)

@@ -96,7 +96,7 @@ class CSolver:
     def ensemble(self, members: Members, threads: int | None = None, turned: Floats | None = None) -> Floats:
         """See `phigen.runtime.backend.Backend`."""
         if not hasattr(self._c, "ensemble"):
-            raise TypeError(f"{self.interface.name} was compiled without ensembles: its spec leaves them out")
+            raise TypeError(f"{self.interface.name} was compiled without ensembles: the spec has without: [ensemble]")
         if not len(members) and members.alike:
             self._expect_parameters(members)
         if turned is not None:

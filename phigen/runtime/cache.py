@@ -89,8 +89,8 @@ def build(files: Mapping[str, str], folder: Path | None = None, *, threads: bool
         if found:
             return found
         warnings.warn(
-            f"the cache {folder} cannot be written ({error.strerror or error}); compiled solvers last for this "
-            "process only. Set PHIGEN_CACHE_DIR to a folder of yours",
+            f"the cache {folder} cannot be written ({error.strerror or error}); compiled solvers are lost "
+            "when this process ends. Set PHIGEN_CACHE_DIR to a folder that can be written",
             PhigenWarning,
             stacklevel=2,
         )

@@ -44,9 +44,9 @@ def objection(checkpoint: Path, output: Path | None, *, resume: bool, how: str) 
     What an interrupted run left is not overwritten, and a run that is complete is not made again by going on with it.
     """
     if not resume and checkpoint.exists():
-        return f"{checkpoint} is there, of an interrupted run: go on with {how}, or remove it"
+        return f"{checkpoint} belongs to an interrupted run: continue it with {how}, or remove the file"
     if resume and output is not None and output.exists() and not checkpoint.exists():
-        return f"{output} is there, but not {checkpoint}: its run is complete, and there is nothing to go on with"
+        return f"{output} is there, but not {checkpoint}: its run is complete, and there is nothing to resume"
     return ""
 
 
@@ -54,7 +54,7 @@ def objection_to_frames(part: Path) -> str:
     """Why a run without checkpoints may not put its frames into that file; "" where it may."""
     if not part.exists():
         return ""
-    return f"{part} is there, the frames of an interrupted run: go on with its checkpoints=, or remove it"
+    return f"{part} holds the frames of an interrupted run: continue it with its checkpoints=, or remove the file"
 
 
 def load(path: Path, identity: Mapping[str, Any]) -> Mapping[str, Any]:

@@ -43,7 +43,7 @@ def to_pandas(trajectory: Trajectory) -> pd.DataFrame:
 
 
 def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
-    """A Dataset: ``x`` (t, coordinate, *axes), ``energy`` (t), Casimirs, and parameters that are arrays."""
+    """Return a Dataset: ``x`` (t, coordinate, *axes), ``energy`` (t), Casimirs, observables, arrays of parameters."""
     xarray = _imported("xarray")
     about = trajectory.solver.interface
     axes = trajectory.axes
@@ -55,6 +55,7 @@ def lattice_to_xarray(trajectory: LatticeTrajectory) -> xr.Dataset:
             "x": (("t", "coordinate", *axes), trajectory.x),
             "energy": ("t", trajectory.energy),
             **{f"casimir_{n}": (("t", *axes)[: np.ndim(v)], v) for n, v in trajectory.casimirs.items()},
+            **{n: (("t", *axes)[: np.ndim(v)], v) for n, v in trajectory.observables.items()},
             **{f"parameter_{n}": (shapes[n], v) for n, v in arrays.items() if n in shapes},
             **({"bonds": (("bond", "end"), arrays["bonds"])} if "bonds" in arrays else {}),
         },

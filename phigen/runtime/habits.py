@@ -59,9 +59,12 @@ class OdeResult:
 
 
 #: Arguments of SciPy's that have no place here.
-_SCIPY = {"method": "it is that of the solver; order= changes its order", "jac": "the solver has its derivatives"}
-_SCIPY |= {"args": "parameters are keyword arguments", "vectorized": "there is no function to call"}
-_SCIPY |= dict.fromkeys(["max_step", "first_step", "min_step"], "steps have one size, h=")
+_SCIPY = {
+    "method": "the method is that of the solver; order= changes its order",
+    "jac": "the solver has its derivatives",
+}
+_SCIPY |= {"args": "parameters are keyword arguments", "vectorized": "solve_ivp calls no Python function"}
+_SCIPY |= dict.fromkeys(["max_step", "first_step", "min_step"], "the step size is fixed: h=")
 
 
 def solve_ivp(

@@ -85,11 +85,13 @@ class LatticeInterface(Interface):
     least: tuple[int, ...] = ()
     required: frozenset[str] = frozenset()  # parameters at sites and bonds whose defaults are not one number
     first_open: bool = False  # whether the first axis has open ends
+    open_axes: tuple[bool, ...] = ()
     colour_period: int = 1  # the first axis: after so many planes colours of sites are as before
     graph: bool = False
     pairs: bool = False  # whether each site acts on each other
     compensated: bool = False  # whether the C saves what rounding has left out of the fields
     at_bonds: tuple[str, ...] = ()
+    observed_fields: tuple[str, ...] = ()  # observables with a value at each site
     dear: bool = False  # whether steps take longer than what is kept of them, to go back, takes to be written and read
 
     def is_shared(self, sites: int) -> bool:

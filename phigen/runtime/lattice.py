@@ -6,14 +6,16 @@ import math
 import zipfile
 from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from phigen.display import display
 from phigen.errors import ParameterError, StepError
-from phigen.runtime import arguments, lattice_ensemble, lattice_gradients, runs
+from phigen.runtime import arguments, checkpoint, lattice_ensemble, lattice_gradients, runs
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.gradients import Pullback
 from phigen.runtime.interface import (
@@ -27,6 +29,7 @@ from phigen.runtime.interface import (
     row_steps,
 )
 from phigen.runtime.lattice_frames import Frames, LatticeRun, add_member, stream_path
+from phigen.runtime.lattice_series import LatticeSeries, SeriesRun, expect_table, recordable
 from phigen.runtime.live import LiveLattice
 from phigen.runtime.memory import expect_room
 from phigen.runtime.named import Named
@@ -39,6 +42,7 @@ if TYPE_CHECKING:
 
     from phigen.spec.model import Spec
     from phigen.study.conservation import Unit
+    from phigen.study.spectra import DynamicSpectrum
 
 
 class LatticeSession(Protocol):
@@ -96,6 +100,14 @@ class LatticeSession(Protocol):
         """π∇H (coordinates, *sizes)."""
         ...
 
+    def observables(self) -> Floats:
+        """Observables that are one number each (observables,)."""
+        ...
+
+    def observed_fields(self) -> Floats:
+        """Observables with a value at each site (fields, *sizes)."""
+        ...
+
 
 class LatticeBackend(Protocol):
     """A loaded solver of one target."""
@@ -141,6 +153,7 @@ class LatticeTrajectory:
 
     ``t`` (frames,), ``x`` (frames, coordinates, *sizes), mapped from disk where it was streamed there, ``energy``
     (frames,). ``steps`` were made with step size ``h``; the frames are those of every stride-th step and of the last.
+    ``observed`` (frames, observables) are the observables of the spec that are one number each.
     """
 
     t: Floats
@@ -152,6 +165,7 @@ class LatticeTrajectory:
     coordinates: tuple[str, ...]
     axes: tuple[str, ...]
     solver: LatticeSolver = field(repr=False)
+    observed: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False)
 
     def __len__(self) -> int:
         return len(self.t)
@@ -162,18 +176,14 @@ class LatticeTrajectory:
 
     def _repr_html_(self) -> str:
         """First and last frame, and what was conserved, for notebooks."""
-        from phigen.notation.notebook import lattice_trajectory_html
-
-        return lattice_trajectory_html(self)
+        return cast(str, display("page of a lattice trajectory")(self))
 
     def plot(self) -> Figure:
         """A figure of the fields: a chain over space and time, planes at some times; below, what was conserved.
 
         Notebooks show it; ``.savefig(path)`` writes it. Raises `MissingPackageError` without matplotlib.
         """
-        from phigen.drawing.lattices import lattice_figure
-
-        return lattice_figure(self, self.changes(), "")
+        return cast("Figure", display("figure of a lattice run")(self, self.changes(), ""))
 
     def to_xarray(self) -> xr.Dataset:
         """An `xarray.Dataset`: ``x`` (t, coordinate, *axes), ``energy`` (t), ``casimir_NAME`` (t, *axes) or (t).
@@ -213,6 +223,18 @@ class LatticeTrajectory:
         rows = list(self._casimirs_by_frame())
         return {name: np.array([row[name] for row in rows]) for name in self.solver.interface.casimirs}
 
+    @property
+    def observables(self) -> dict[str, Floats]:
+        """The observables of the spec by name: (frames,), and (frames, *sizes) for those of sites."""
+        about = self.solver.interface
+        numbers = {name: self.observed[:, k] for k, name in enumerate(about.observables)}
+        if not about.observed_fields:
+            return numbers
+        times = self.t.tolist() if about.time else [None] * len(self)
+        frames = zip(self.x, times, strict=True)
+        rows = [self.solver.observables(x, t, parameters=self.parameters) for x, t in frames]
+        return numbers | {name: np.array([row[name] for row in rows]) for name in about.observed_fields}
+
     def _casimirs_by_frame(self) -> Iterator[dict[str, Any]]:
         return (self.solver.casimirs(x, parameters=self.parameters) for x in self.x)
 
@@ -232,6 +254,23 @@ class LatticeTrajectory:
             raise KeyError(f"{coordinate!r} is not a coordinate; there are {', '.join(self.coordinates)}")
         return self.x[:, self.coordinates.index(coordinate)]
 
+    def spectrum(self, of: Sequence[str], *, after: float | None = None) -> DynamicSpectrum:
+        """Return the dynamic structure factor S(q, ω) of coordinates of a grid; see `phigen.study.spectra.spectrum`."""
+        from phigen.study.spectra import spectrum
+
+        return spectrum(self, of, after=after)
+
+    def correlation(
+        self, of: str, other: str | None = None, *, axis: str | None = None, up_to: int, after: float | None = None
+    ) -> Floats:
+        """Return ⟨f(r) g(r + d)⟩ − ⟨f⟩⟨g⟩ of two coordinates, or of one with itself, for d = 0 … ``up_to``.
+
+        The axis of d is the first by default; see `phigen.study.spectra.correlation`.
+        """
+        from phigen.study.spectra import correlation
+
+        return correlation(self, of, other or of, axis or self.axes[0], up_to, after=after)
+
     def at(self, times: ArrayLike) -> Floats:
         """The states (times, coordinates, *sizes) at given times, by steps of the same method from the nearest frame.
 
@@ -240,7 +279,8 @@ class LatticeTrajectory:
         return self.solver.states_at(self, arguments.times_within(times, self.t))
 
     def save(self, path: str | Path) -> None:
-        """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h and parameter_NAME) or the frames as ``.npy``."""
+        """Write ``.npz`` (t, x, energy, coordinates, axes, steps, h, observable_NAME and parameter_NAME), or the frames
+        as ``.npy``."""
         target = stream_path(path)
         if target.suffix == ".npy":
             with replacing(target) as file:
@@ -253,6 +293,7 @@ class LatticeTrajectory:
 
     def _further(self) -> dict[str, Any]:
         about = {"t": self.t, "energy": self.energy, "steps": self.steps, "h": self.h}
+        about |= {f"observable_{name}": values for name, values in self.observables.items()}
         named = {"coordinates": np.array(self.coordinates), "axes": np.array(self.axes)}
         return {**about, **named, **{f"parameter_{name}": value for name, value in self.parameters.items()}}
 
@@ -261,9 +302,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
     """A compiled lattice: ``solver.integrate(x0, h=0.05, steps=1000, stride=10, J=2.0)``, x0 (coordinates, *sizes).
 
     Parameters are keyword arguments, or in ``parameters={…}``; those at sites are arrays (*sizes), or one number for
-    all, those at bonds arrays (bonds,). What is not given has its default of the spec. Graphs take ``bonds`` in the
-    same way, (bonds, 2) numbers of sites from 0. Wrong arguments raise `ValueError` or `TypeError`, a step that
-    cannot be made `phigen.StepError`. Safe to use from several threads.
+    all, those at bonds arrays (bonds,). What is not given has its default of the spec, at the sizes of the state: a
+    list or a file with another number of values raises `SpecError`. Graphs take ``bonds`` in the same way, (bonds, 2)
+    numbers of sites from 0. Wrong arguments raise `ValueError` or `TypeError`, a step that cannot be made
+    `phigen.StepError`. Safe to use from several threads.
     """
 
     def __init__(self, backend: LatticeBackend, interface: LatticeInterface, spec: Spec | None = None) -> None:
@@ -315,13 +357,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             count = run.made(progress)
         except BackendError as error:
             run.discard()
-            run.energy.append(run.session.hamiltonian())
+            run.record()
             kept = np.array([*frames.kept(run.count), error.states[-1]])
             t = np.array([at.t0 + at.h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
-            found = self._trajectory(t, kept, np.array(run.energy), error.step, at)
+            found = self._trajectory(t, kept, run, error.step, at)
             raise self.failure(error, at.h, found, at.values) from error
         t = np.asarray(at.t0 + at.h * marks[:count], dtype=np.float64)
-        found = self._trajectory(t, frames.array, np.array(run.energy), steps, at)
+        found = self._trajectory(t, frames.array, run, steps, at)
         frames.finish(found)
         run.forget()
         return found
@@ -341,13 +383,14 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         progress: Progress | None = None,
         parameters: Mapping[str, Any] | None = None,
         **more: Any,
-    ) -> LatticeTrajectory:
+    ) -> LatticeTrajectory | LatticeSeries:
         """Integrate a run of the spec, the first by default, and return what `integrate` returns.
 
-        The start, the bonds, and parameters at sites and bonds are made as the run says, from its formulas, files and
-        random numbers, at its ``sizes`` or at others. The remaining arguments take the place of the settings of the
-        spec; ``x0`` (coordinates, *sizes) is another start, ``seed`` that of the noise. Raises `ValueError` for a name
-        that is no run, and `SpecError` for a start that does not fit the sizes.
+        A run whose ``record`` has no ``state`` returns what `series` returns. The start, the bonds, and parameters at
+        sites and bonds are made as the run says, from its formulas, files and random numbers, at its ``sizes`` or at
+        others. The remaining arguments take the place of the settings of the spec; ``x0`` (coordinates, *sizes) is
+        another start, ``seed`` that of the noise. Raises `ValueError` for a name that is no run, and `SpecError` for a
+        start that does not fit the sizes.
         """
         from phigen.lattice.states import start_of
 
@@ -355,13 +398,69 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         assert self.spec is not None
         chosen = runs.changed(self.spec, base, runs.Settings(step=step, steps=steps, stride=stride, sizes=sizes))
         start = start_of(self.spec, chosen)
-        return self.integrate(
+        integrate: Any = partial(self.series, of=chosen.record) if chosen.records_numbers else self.integrate
+        made: LatticeTrajectory | LatticeSeries = integrate(
             start.state if x0 is None else x0, float(chosen.step), chosen.steps, chosen.stride,
             t0=float(chosen.start) if self.interface.time else None,
             seed=chosen.seed if seed is None and self.interface.noise else seed,
             output=output, checkpoints=checkpoints, progress=progress,
             parameters=start.arguments | arguments.together(parameters, more),
         )  # fmt: skip
+        return made
+
+    def series(
+        self,
+        x0: ArrayLike,
+        h: float,
+        steps: int,
+        stride: int = 1,
+        *,
+        of: Sequence[str] | None = None,
+        t0: float | None = None,
+        seed: int | None = None,
+        member: int | None = None,
+        step0: int | None = None,
+        output: str | Path | None = None,
+        checkpoints: str | Path | None = None,
+        resume: bool = True,
+        progress: Progress | None = None,
+        parameters: Mapping[str, Any] | None = None,
+        **more: Any,
+    ) -> LatticeSeries:
+        """Integrate as `integrate` does, and record numbers every ``stride`` steps in place of frames.
+
+        ``of`` names them: ``energy``, Casimirs that are sums or products, and observables, by default all but the
+        Casimirs. With ``output``, .csv or .npz, they are written there at the end. With ``checkpoints`` the state and
+        the rows are kept every two seconds. Raises as `integrate`; the ``trajectory`` of a `StepError` is the series.
+        """
+        drawn = {"seed": seed, "member": member, "step0": step0}
+        at = self._beginning(x0, "x0", h, parameters, more, t0, drawn)
+        steps, stride = arguments.count(steps, "steps", 0), arguments.count(stride, "stride", 1)
+        names, known = tuple(("energy", *self.interface.observables) if of is None else of), recordable(self.interface)
+        if strange := [name for name in names if name not in known]:
+            raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(known)}")
+        target, kept = expect_table(output) if output else None, Path(checkpoints) if checkpoints else None
+        if kept and (refused := checkpoint.objection(kept, target, resume=resume, how="resume=True")):
+            raise ValueError(refused)
+        run = SeriesRun(self, at, row_steps(steps, stride), names, kept)
+        try:
+            made = run.made(progress)
+        except BackendError as error:
+            raise self.failure(error, at.h, run.series(error.step), at.values) from error
+        if target:
+            made.save(target)
+        if kept:
+            kept.unlink(missing_ok=True)
+        return made
+
+    def ends_of(self, series: LatticeSeries) -> LatticeTrajectory:
+        """Return the trajectory of the first and the last state of a series; see `LatticeSeries.ends`."""
+        x, about = np.array([series.first, series.last]), self.interface
+        t = np.array([series.t[0], series.t[0] + series.steps * series.h])
+        when = t.tolist() if about.time else [None, None]
+        energy = [self.hamiltonian(state, at, parameters=series.parameters) for state, at in zip(x, when, strict=True)]
+        made = series.steps, series.h, series.parameters
+        return LatticeTrajectory(t, x, np.array(energy), *made, self.coordinates, about.axes, self)
 
     def step(
         self,
@@ -558,6 +657,14 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         kinds = zip(about.casimirs, about.casimir_kinds, found, strict=True)
         return {name: reduced(kind, values) for name, kind, values in kinds}
 
+    def observables(
+        self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
+    ) -> dict[str, Any]:
+        """The observables of the spec of a state, by name: numbers, and arrays (*sizes) for those of sites."""
+        about, session = self.interface, self._seen(x, parameters, more, t)
+        numbers = dict(zip(about.observables, session.observables().tolist(), strict=True))
+        return numbers | dict(zip(about.observed_fields, session.observed_fields(), strict=True))
+
     def vector_field(
         self, x: ArrayLike, t: float | None = None, *, parameters: Mapping[str, Any] | None = None, **more: Any
     ) -> Floats:
@@ -589,7 +696,7 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 raise ValueError(f"{what} has {size} sites along {axis}; neighbours and brackets need {least} or more")
             if size % period:
                 message = f"{what} has {size} sites along {axis}; the colours of sites need multiples of {period}"
-                hint = "a run of such a size in the spec, or scheme='series', makes a solver that takes it"
+                hint = "compile from a spec that has a run of this size, or with scheme='series'"
                 raise ValueError(f"{message}; {hint}")
         if not np.isfinite(found).all():
             place = tuple(np.argwhere(~np.isfinite(found))[0].tolist())
@@ -601,15 +708,13 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         """All parameters: numbers, and arrays over the sites or the bonds; of a graph the bonds too."""
         about = self.interface
         everything = arguments.together(given, more)
+        everything |= self.defaults(everything, sizes)
         bonds = {"bonds": checked_bonds(everything.pop("bonds", None), sizes[0])} if about.graph else {}
         shapes = dict.fromkeys(about.at_sites, tuple(sizes))
         shapes |= dict.fromkeys(about.at_bonds, (len(bonds["bonds"]),) if bonds else ())
         arrays = {n: v for n, v in everything.items() if n in shapes}
         numbers = {n: v for n, v in everything.items() if n not in shapes}
         values: dict[str, Any] = dict(arguments.parameters(about, numbers, {}))
-        missing = sorted(about.required - set(arrays))
-        if missing:
-            raise TypeError(f"parameter {missing[0]!r} has no default for all sizes; give an array, or one number")
         for name, value in arrays.items():
             array = arguments.real(value, f"parameter {name!r}")
             if array.shape not in ((), shapes[name]):
@@ -621,6 +726,21 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
                 raise ValueError(f"parameter {name!r} must be positive at all {where}")
             values[name] = array
         return values | bonds
+
+    def defaults(self, given: Mapping[str, Any], sizes: Sequence[int]) -> dict[str, Floats]:
+        """Defaults of the spec that are formulas, lists, files or random, at the given sizes, of parameters not given.
+
+        Raises `SpecError` for those that do not fit the sizes.
+        """
+        missing = self.interface.required - set(given)
+        if not missing:
+            return {}
+        if self.spec is None:
+            raise TypeError(f"parameter {min(missing)!r} has no default for all sizes; give an array, or one number")
+        from phigen.lattice.states import defaults_at
+
+        bonds = len(checked_bonds(given.get("bonds"), sizes[0])) if self.interface.graph else 0
+        return defaults_at(self.spec, missing, tuple(sizes), bonds)
 
     def _beginning(
         self,
@@ -656,7 +776,9 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
             if wrong := self.interface.single and arguments.beyond_single({**state, **values, "the step h": h}):
                 return ParameterError(f"{name}: {wrong}", **{**told, "step": 0})
             given = ", ".join(f"{n} = {v!r}" for n, v in values.items() if np.ndim(v) == 0)
-            message = f"{name}: no step can be made with {given}: what is computed from parameters alone is not finite"
+            message = (
+                f"{name}: no step can be made with {given}: a coefficient computed from parameters alone is not finite"
+            )
             return ParameterError(message, **{**told, "step": 0})
         where = f"step {error.step} of size {h!r} failed" if error.step >= 0 else "a step failed"
         if error.members:
@@ -676,9 +798,10 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         there = ", ".join(f"{f} = {float(x[(k, *site)])!r}" for k, f in enumerate(self.coordinates))
         return f"since H is not finite at the start: at the site ({', '.join(map(str, site))}), where {there}"
 
-    def _trajectory(self, t: Floats, x: Floats, energy: Floats, steps: int, at: Beginning) -> LatticeTrajectory:
-        about = self.interface
-        return LatticeTrajectory(t, x, energy, steps, at.h, at.values, self.coordinates, about.axes, self)
+    def _trajectory(self, t: Floats, x: Floats, run: LatticeRun, steps: int, at: Beginning) -> LatticeTrajectory:
+        axes, observed = self.interface.axes, np.array(run.observed).reshape(len(t), -1)
+        energy = np.array(run.energy)
+        return LatticeTrajectory(t, x, energy, steps, at.h, at.values, self.coordinates, axes, self, observed)
 
 
 def checked_bonds(bonds: Any, sites: int) -> NDArray[np.int64]:

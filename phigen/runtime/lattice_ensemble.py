@@ -40,6 +40,7 @@ def ensemble(
     marks = row_steps(steps, max(steps, 1) if stride is None else arguments.count(stride, "stride", 1))
     begin = np.broadcast_to(t0, count).tolist()
     sizes = [arguments.step_size(size) for size in np.broadcast_to(h, count)]
+    given = {**given, **solver.defaults(given, start.shape[2:])}  # made once for all members
     values = [
         solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])
         for m in range(count)

@@ -36,6 +36,7 @@ class LatticeRun:
     frames: Frames
     checkpoints: Path | None
     energy: list[float] = field(default_factory=list)
+    observed: list[Floats] = field(default_factory=list)
     count: int = 0
     session: Any = None
     saved: Mapping[str, Any] = field(default_factory=dict)  # what a session of a checkpoint goes on from
@@ -77,25 +78,22 @@ class LatticeRun:
 
     def _store(self, state: Floats) -> None:
         self.frames.put(self.count, state)
-        self.energy.append(self.session.hamiltonian())
+        self.record()
         self.count += 1
 
+    def record(self) -> None:
+        """Add the energy and the observables of the state to those of the frames."""
+        self.energy.append(self.session.hamiltonian())
+        self.observed.append(self.session.observables())
+
     def _identity(self) -> dict[str, Any]:
-        at = self.at
-        arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
-        numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
-        hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
-        marks = [len(self.marks), int(self.marks[-1]), int(self.marks[min(1, len(self.marks) - 1)])]
-        hashes |= {"t0": at.t0.hex()} if at.t0 else {}
-        hashes |= {"draws": repr(at.draws)} if at.draws != FIRST_DRAWS else {}
-        about = {"solver": self.solver.backend.identity, "h": at.h, "sizes": list(at.x.shape), "steps": marks}
-        return {**about, "parameters": numbers, "arrays": hashes}
+        return identity_of(self.solver, self.at, self.marks)
 
     def _save(self, mark: int) -> None:
         if self.checkpoints:
             self.frames.flush()
             arrays = {"state": self.session.state(), "count": np.array(self.count), "energy": np.array(self.energy)}
-            arrays |= self.session.saved()
+            arrays |= {"observed": np.array(self.observed), **self.session.saved()}
             if self.frames.path is None:
                 arrays["frames"] = self.frames.array[: self.count]
             Checkpoint(self._identity(), arrays).save(self.checkpoints)
@@ -106,11 +104,24 @@ class LatticeRun:
             return self.at.x
         arrays = checkpoint.load(self.checkpoints, self._identity())
         self.count, self.energy = int(arrays["count"]), arrays["energy"].tolist()
+        self.observed = list(arrays["observed"])
         self.frames.restore(arrays.get("frames"), self.count)
         if not np.array_equal(self.frames.array[self.count - 1], arrays["state"], equal_nan=True):
             raise MismatchError(f"the frames beside {self.checkpoints} are not those of its run")
         self.saved = arrays
         return np.asarray(arrays["state"])
+
+
+def identity_of(solver: LatticeSolver, at: Beginning, marks: Any) -> dict[str, Any]:
+    """Return all that decides the rows at the steps ``marks`` of an integration, as plain data."""
+    arrays = {name: np.asarray(value) for name, value in at.values.items() if np.ndim(value)}
+    numbers = {name: float(value) for name, value in at.values.items() if not np.ndim(value)}
+    hashes = {name: hashlib.sha256(a.tobytes()).hexdigest() for name, a in {**arrays, "": at.x}.items()}
+    rows = [len(marks), int(marks[-1]), int(marks[min(1, len(marks) - 1)])]
+    hashes |= {"t0": at.t0.hex()} if at.t0 else {}
+    hashes |= {"draws": repr(at.draws)} if at.draws != FIRST_DRAWS else {}
+    about = {"solver": solver.backend.identity, "h": at.h, "sizes": list(at.x.shape), "steps": rows}
+    return {**about, "parameters": numbers, "arrays": hashes}
 
 
 class Frames:
@@ -187,7 +198,7 @@ def stream_path(path: str | Path) -> Path:
     """The path of a file that frames can go to. Raises `ValueError` for any other."""
     found = Path(path)
     if found.suffix not in STREAMS:
-        raise ValueError(f"frames go to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
+        raise ValueError(f"frames are written to files that end in {' or '.join(STREAMS)}, not {str(path)!r}")
     return found
 
 

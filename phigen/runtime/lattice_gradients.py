@@ -44,6 +44,7 @@ def pullback(
     times = np.broadcast_to(t0, len(start))
     each = [arguments.step_size(size) for size in np.broadcast_to(h, len(start))]
     made = filled(f"{rows} frames", (rows, *start.shape))
+    given = {**given, **solver.defaults(given, start.shape[2:])}  # made once for all members
     x0_bar, found = np.empty_like(start), list[dict[str, Floats]]()
     for m, x in enumerate(start):
         values = solver.values({n: own[n][m] if n in own else v for n, v in given.items()}, {}, start.shape[2:])

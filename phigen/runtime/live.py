@@ -167,6 +167,13 @@ class LiveLattice(LiveSession):
         """H of the state."""
         return self._lattice.hamiltonian()
 
+    @property
+    def observables(self) -> dict[str, Any]:
+        """The observables of the spec at the state, by name: numbers, and arrays (*sizes) for those of sites."""
+        about, session = self.solver.interface, self._lattice
+        numbers = dict(zip(about.observables, session.observables().tolist(), strict=True))
+        return numbers | dict(zip(about.observed_fields, session.observed_fields(), strict=True))
+
     def copy(self) -> LiveLattice:
         """An independent copy."""
         twin = object.__new__(LiveLattice)

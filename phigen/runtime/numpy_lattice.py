@@ -20,6 +20,7 @@ from phigen.runtime.interface import (
 )
 from phigen.runtime.memory import expect_room
 from phigen.runtime.modules import load_module
+from phigen.scheme.policies import StartPolicy
 
 
 class NumpyLatticeSession:
@@ -41,7 +42,7 @@ class NumpyLatticeSession:
         self._clock, self._draws = Clock(t0), draws
         try:
             _, self._sites = module._started(x0, parameters, *([t0] if timed else []))
-            module._coefficients(self._sites, 1e-100)
+            module._coefficients(self._sites, StartPolicy().probe_step)
         except ValueError:
             raise BackendError("BAD_ARGUMENT", 0, self._x[None]) from None
         self._sites.seed, self._sites.member = draws.seed, draws.member
@@ -147,6 +148,21 @@ class NumpyLatticeSession:
     def vector_field(self) -> Floats:
         """π∇H (coordinates, *sizes)."""
         return np.asarray(self._module._vector_field(self._sites.parameters, self._x, self._sites))
+
+    def observables(self) -> Floats:
+        """Observables that are one number each (observables,)."""
+        if not hasattr(self._module, "_observables"):
+            return np.empty(0)
+        with np.errstate(all="ignore"):
+            densities = self._module._observables(self._sites.parameters, self._x, self._sites)
+            return np.asarray(self._module._reduced(densities, self._sites))
+
+    def observed_fields(self) -> Floats:
+        """Observables with a value at each site (fields, *sizes)."""
+        if not hasattr(self._module, "_observed_fields"):
+            return np.empty((0, *self._x.shape[1:]))
+        with np.errstate(all="ignore"):
+            return np.asarray(self._module._observed_fields(self._sites.parameters, self._x, self._sites))
 
 
 class NumpyLattice:

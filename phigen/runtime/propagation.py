@@ -39,7 +39,7 @@ class Propagation:
 
     def __post_init__(self) -> None:
         if not isinstance(self.solver, Solver | LatticeSolver):
-            raise TypeError(f"a propagator is that of a compiled solver, not of {self.solver!r}")
+            raise TypeError(f"a propagator needs a compiled solver, not {self.solver!r}")
         if isinstance(self.solver, Solver):
             arguments.start_time(self.t0, self.solver.interface, {})
             self.solver.values(self.shared, {})  # type: ignore[arg-type]
@@ -111,7 +111,7 @@ class Propagation:
         One run back for each number of a member's result. Not for lattices.
         """
         if self.axes > 1:
-            raise TypeError("of lattices there are no whole Jacobians; take what goes backwards, forward=False")
+            raise TypeError("lattices have no full Jacobians; use reverse mode, forward=False")
         start, members, own = self._members(x0, parameters)
         shape = self.shape((len(members), start[-1]))
         by_x0, by = np.empty((*shape, start[-1])), {name: np.empty(shape) for name in parameters}

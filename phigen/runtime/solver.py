@@ -673,7 +673,7 @@ class Solver(Named[Backend, Interface]):
             given = ", ".join(f"{name} = {value!r}" for name, value in parameters.items())
             message = f"{name}: no step can be made"
             if given:
-                message += f" with {given}: what is computed from parameters alone is not finite"
+                message += f" with {given}: a coefficient computed from parameters alone is not finite"
             if self.interface.monitored:
                 message += f"{', or' if given else ':'} where it starts the monitor is not positive"
             return ParameterError(message, step=0, status=error.status, trajectory=trajectory, members=error.members)

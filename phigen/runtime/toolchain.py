@@ -104,7 +104,7 @@ def find() -> Compiler:
             return found
         reasons.append(f"{_PACKAGE} {found}")
     if set(reasons) == {f"{c} {_NOT_FOUND}" for c in _CANDIDATES}:
-        reasons = [f"none of {', '.join(_CANDIDATES)} is there"]
+        reasons = [f"none of {', '.join(_CANDIDATES)} was found"]
     apart = "\n  " if any("\n" in reason for reason in reasons) else " "
     raise NoCompilerError(f"no C compiler works:{apart}{f';{apart}'.join(reasons)}\n  hint: {_HINT}")
 
@@ -148,14 +148,14 @@ def compile_library(
     except subprocess.TimeoutExpired as error:
         raise ToolchainError(
             f"{compiler} did not finish within {timeout:g} s\n"
-            "  hint: a lower order makes smaller code; `phigen show` tells its operation counts"
+            "  hint: a lower order makes smaller code; `phigen show` prints the operation counts"
         ) from error
     if failure:
         hint = "the code is C99 and should compile everywhere; try another compiler by CC=gcc or CC=clang"
         raise ToolchainError(f"{compiler} {failure}\n  hint: {hint}")
 
 
-_NOT_FOUND = "is not there"
+_NOT_FOUND = "was not found"
 
 
 def _command(named: str) -> tuple[str, ...]:
@@ -181,7 +181,7 @@ def _answering(command: tuple[str, ...]) -> Compiler | str:
         code, said = _run([*command, "--version"], _TRIAL_TIMEOUT, errors=False)
         version = next((line.strip() for line in said.splitlines() if line.strip()), "")
         if code or not version:
-            return f"does not tell its version: --version {_ended(code, said) if code else 'printed nothing'}"
+            return f"does not report its version: --version {_ended(code, said) if code else 'printed nothing'}"
         with tempfile.TemporaryDirectory(prefix="phigen-") as folder:
             return _tried(command, version, Path(folder))
     except subprocess.TimeoutExpired as error:
@@ -218,9 +218,9 @@ def _made(command: Sequence[str], flags: Sequence[str], sources: Sequence[Path],
     if head is None:
         return "reported success, but wrote no library"
     if not head.startswith(_LIBRARIES):
-        return f"reported success, but wrote {'something that is no library' if head else 'an empty file'}"
+        return f"reported success, but wrote {'a file that is not a library' if head else 'an empty file'}"
     if head.startswith(_ELF) and int.from_bytes(head[16:18], "little" if head[5] == 1 else "big") != _ELF_SHARED:
-        return "reported success, but what it wrote is no shared library"
+        return "reported success, but its output is not a shared library"
     return ""
 
 
@@ -237,7 +237,7 @@ def _ended(code: int, said: str) -> str:
     how = f"failed with exit code {code}" if code > 0 else f"was ended by {signal.Signals(-code).name}"
     lines = said.strip().splitlines()
     if not lines:
-        return f"{how}, and said nothing"
+        return f"{how} without a message"
     shown = "\n".join(f"    {line}" for line in lines[:_MESSAGE_LINES])
     more = f"\n    … {len(lines) - _MESSAGE_LINES} more lines" if len(lines) > _MESSAGE_LINES else ""
     return f"{how}:\n{shown}{more}"

@@ -6,11 +6,12 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from phigen.display import display
 from phigen.runtime import arguments
 from phigen.runtime.interface import Floats, Interface
 from phigen.runtime.tables import Column, write
@@ -65,18 +66,14 @@ class Trajectory:
 
     def _repr_html_(self) -> str:
         """First and last row, and what was conserved, for notebooks."""
-        from phigen.notation.notebook import trajectory_html
-
-        return trajectory_html(self)
+        return cast(str, display("page of a trajectory")(self))
 
     def plot(self) -> Figure:
         """A figure of the orbit in phase space, and below it the errors of energy and Casimirs over time.
 
         Notebooks show it; ``.savefig(path)`` writes it. Raises `MissingPackageError` without matplotlib.
         """
-        from phigen.drawing.figures import run_figure
-
-        return run_figure({"phigen": self}, {})
+        return cast("Figure", display("figure of runs")({"phigen": self}, {}))
 
     def to_xarray(self) -> xr.Dataset:
         """An `xarray.Dataset`: ``x`` (t, coordinate), ``energy``, ``casimir_NAME`` and observables (t).

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.kernel import EXPONENTS, Kernel, Output
 from phigen.scheme.path import PathSlopes, path_of, used_by_path
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import Adjoint, PathAdjoint
@@ -102,13 +102,7 @@ def completed(
     held = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
         held["gauge"] = (LEVEL,)
-    early = pulled_back(
-        prepare,
-        "prepare_adjoint",
-        {"coef_bar": prepare.outputs[0].values},
-        held,
-        "cotangents of the parameters, from those of the coefficients",
-    )
+    early = _prepare_adjoint(prepare, held)
     late = refresh and pulled_back(
         refresh,
         "refresh_adjoint",
@@ -118,6 +112,25 @@ def completed(
     )
     idle = _idle(coefficients, held)
     return Adjoint(tuple(_without(kernel, idle) for kernel in steps), early, late, path)
+
+
+def _prepare_adjoint(prepare: Kernel, held: Mapping[str, Sequence[str]]) -> Kernel:
+    """The transpose of ``prepare``; what is pulled back through matrix exponentials, if any, is an input of its own."""
+    stored = list(prepare.outputs[0].values)
+    exponents = [e for start, n in prepare.exponentials for e in stored[start : start + n * n]]
+    values = stored[: len(stored) - len(exponents)]
+    seeds = {"coef_bar": [*values, *[ZERO] * len(exponents)]}
+    purpose = "cotangents of the parameters, from those of the coefficients"
+    if {s for symbols in held.values() for s in symbols}.isdisjoint(symbols_of(*exponents)):
+        return pulled_back(prepare, "prepare_adjoint", seeds, held, purpose)
+    found = pulled_back(prepare, "prepare_adjoint", seeds | {EXPONENTS: exponents}, held, purpose)
+    inner = Kernel(
+        "exponents",
+        "the matrices tA whose exponentials are coefficients",
+        prepare.inputs,
+        (Output("exponents", tuple(exponents)),),
+    )
+    return replace(found, exponentials=prepare.exponentials, exponents=inner)
 
 
 def _idle(coefficients: Coefficients, held: Mapping[str, Sequence[str]]) -> list[bool]:

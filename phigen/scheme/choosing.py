@@ -14,9 +14,10 @@ from typing import Any, Protocol
 
 from phigen.errors import Diagnostic, Location, SpecError
 from phigen.geometry.system import System
-from phigen.scheme import alternation, nystrom
+from phigen.scheme import alternation, near_integrable, nystrom
 from phigen.scheme.alternation import Alternation, Schedule
 from phigen.scheme.lowering import cost
+from phigen.scheme.near_integrable import NearIntegrable
 from phigen.scheme.nystrom import Nystrom
 from phigen.scheme.order import Order
 from phigen.splitting.flow import Flow
@@ -69,6 +70,8 @@ def plan(system: System, splitting: Splitting, wanted: int, composition: str) ->
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
+    if splitting.small is not None and _unsuited(system, splitting, splitting.small):
+        splitting = replace(splitting, small=None)
     if system.forces:  # a force is no part that kicks
         choice = planned(system, splitting, wanted, composition, lambda: ())
         return with_carrier(choice, system.time) if system.time else choice
@@ -76,6 +79,11 @@ def plan(system: System, splitting: Splitting, wanted: int, composition: str) ->
         return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
     choice = planned(system, splitting, wanted, composition, lambda: _kicks_in_time(system, splitting))
     return with_carrier(choice, system.time)
+
+
+def _unsuited(system: System, splitting: Splitting, small: int) -> bool:
+    """Whether there are forces, or the time is in A, to which its conjugate has to belong."""
+    return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
 def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
@@ -97,6 +105,8 @@ def with_carrier(choice: Choice, time: str) -> Choice:
     flows = choice.splitting.flows
     if isinstance(choice.method, Nystrom):
         return replace(choice, carrier=1 - (choice.splitting.kick or 0))
+    if isinstance(choice.method, NearIntegrable):
+        return replace(choice, carrier=0)  # e belongs to A, which does not depend on the time
     if not is_dated(flows[-1], time):
         return replace(choice, carrier=len(flows) - 1)
     free = [flow for flow in flows if not is_dated(flow, time)]
@@ -118,6 +128,11 @@ def planned(
     even = wanted + wanted % 2
     note = "" if even == wanted else f"order {wanted} was asked for; a symmetric method has even order"
     order = Order(even, 0, note)
+    near = near_integrable.find(composition, even)
+    if near and splitting.small is not None:
+        return _near_integrable(splitting, order, near)
+    if composition in near_integrable.NAMES and near:
+        raise _nothing_small(system, splitting, composition)
     named = composition in nystrom.NAMES
     if named or composition == "auto":
         found = list(_applicable(kicks_of, even, composition))
@@ -134,6 +149,23 @@ def planned(
     return Choice(order, recommended, arranged(splitting))
 
 
+def _near_integrable(splitting: Splitting, order: Order, method: NearIntegrable) -> Choice:
+    """The choice of a method for H = A + εB, with the flow of A first."""
+    assert splitting.small is not None
+    large, small = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
+    why = f"H_2 is small, of size ε: errors {method.errors}"
+    return Choice(order, method, Splitting((large, small), small=1), why)
+
+
+def _nothing_small(system: Host, splitting: Splitting, composition: str) -> SpecError:
+    """Why a method for near-integrable systems does not apply."""
+    count = len(splitting.flows)
+    beside = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
+    message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {beside}"
+    hint = "small: true of a parameter says that what it multiplies is small"
+    return SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
+
+
 def chosen(splitting: Splitting, order: Order, method: Nystrom, kick: Kick) -> Choice:
     """The choice of a method of Nyström type."""
     return Choice(order, method, _arranged(splitting, method, kick), _why(method))
@@ -141,6 +173,8 @@ def chosen(splitting: Splitting, order: Order, method: Nystrom, kick: Kick) -> C
 
 def orders(composition: str) -> list[int]:
     """The orders that a name offers."""
+    if composition in near_integrable.NAMES:
+        return near_integrable.orders(composition)
     return nystrom.orders(composition) if composition in nystrom.NAMES else alternation.orders(composition)
 
 

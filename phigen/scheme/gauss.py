@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from phigen.errors import SpecError
-from phigen.gauss.kernels import StageMap, change_kernel, field_kernel, frame_kernel, stage_map
+from phigen.gauss.kernels import (
+    StageMap,
+    at_unknowns,
+    change_kernel,
+    field_kernel,
+    frame_kernel,
+    stage_map,
+    vector_field,
+)
 from phigen.gauss.realisation import Realisation, collective, direct
 from phigen.gauss.tableau import MOST_STAGES, tableau
 from phigen.geometry.system import System
@@ -97,7 +105,7 @@ def build_gauss(system: System, gauge: Gauge, realisation: Realisation, order: O
     coefficients = Coefficients(system.parameter_names)
     slope, change = field_kernel(points, coefficients), change_kernel(points, coefficients)
     frame = frame_kernel(points, coefficients)
-    tangent = _tangent(points, slope, change, coefficients) if spec.extras.tangent else None
+    tangent = _tangent(points, coefficients) if spec.extras.tangent else None
     prepare = Kernel(
         "prepare",
         "everything that depends on parameters only",
@@ -144,17 +152,19 @@ def _full(kernel: Kernel, coefficients: Coefficients) -> Kernel:
     )
 
 
-def _tangent(points: StageMap, slope: Kernel, change: Kernel, coefficients: Coefficients) -> GaussTangent:
+def _tangent(points: StageMap, coefficients: Coefficients) -> GaussTangent:
     """The Jacobians along coordinates, not the time, then along the unknowns."""
     names = (*points.system.coordinates, *points.unknowns)
     kernels = []
-    for kernel, name in ((slope, "slope_jacobian"), (change, "change_jacobian")):
-        columns = [derivatives(kernel.roots, s) for s in names]
-        flat = coefficients.hoist([c[i] for i in range(len(kernel.roots)) for c in columns])
+    for values, name, subject in (
+        (vector_field(points, at_unknowns(points)), "slope", "the derivatives of the unknowns"),
+        (points.change, "change", "the change"),
+    ):
+        columns = [derivatives(values, s) for s in names]
+        flat = coefficients.hoist([c[i] for i in range(len(values)) for c in columns])
         inputs = {"coef": coefficients.slots, "x": points.start, "z": points.unknowns}
-        purpose = f"the Jacobian of {'the derivatives of the unknowns' if kernel is slope else 'the change'}"
-        purpose += " along x, and along the unknowns"
-        kernels.append(Kernel(f"stage_{name}", purpose, inputs, (Output("slopes", tuple(flat)),)))
+        purpose = f"the Jacobian of {subject} along x, and along the unknowns"
+        kernels.append(Kernel(f"stage_{name}_jacobian", purpose, inputs, (Output("slopes", tuple(flat)),)))
     return GaussTangent(*(_full(k, coefficients) for k in kernels))
 
 

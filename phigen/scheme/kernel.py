@@ -14,6 +14,9 @@ from phigen.symbolic.expression import Expression
 #: Arguments of kernels that are numbers, not arrays: the step, or the time of a flow; the time.
 SCALARS = ("h", "t")
 
+#: The input of a transpose that holds the cotangents of matrices whose exponentials are taken.
+EXPONENTS = "exponents_bar"
+
 
 class Role(Enum):
     """Purpose of a kernel at a site of a lattice, by which loops choose the arrays that they read and write."""
@@ -48,6 +51,10 @@ class Kernel:
 
     ``inputs`` maps the name of an argument to the symbols that its entries stand for. ``named`` are values
     worth a name of their own in the output (momenta, second derivatives).
+
+    ``exponentials`` are the parts of the first output, by start and number of rows, that hold a matrix A, in whose
+    place exp(A) − 1 is returned. Of the transpose of such a kernel, ``exponents`` computes these A one after the other;
+    their cotangents, from those of exp(A) − 1 in the input ``coef_bar``, are the input `EXPONENTS`.
     """
 
     name: str
@@ -56,6 +63,8 @@ class Kernel:
     outputs: tuple[Output, ...]
     named: tuple[tuple[str, Expression], ...] = ()
     role: Role = Role.OTHER
+    exponentials: tuple[tuple[int, int], ...] = ()
+    exponents: Kernel | None = None
 
     @property
     def reads_start(self) -> bool:

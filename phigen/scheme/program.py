@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from phigen._version import __version__
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.steps import Step
-from phigen.spec.model import NO_EXTRAS, Extras, Parameter
+from phigen.spec.model import NO_EXTRAS, Extras, Parameter, Reduction
 from phigen.symbolic.symbols import LEVEL
 
 if TYPE_CHECKING:
@@ -41,17 +41,24 @@ class About:
 
 @dataclass(frozen=True)
 class Observables:
-    """The Hamiltonian, the Casimirs, the vector field, and the observables that the spec names, if it names any."""
+    """The Hamiltonian, the Casimirs, the vector field, and the observables that the spec names, if it names any.
+
+    Of lattices ``named`` has the densities of observables, which ``reductions`` make numbers of; ``at_sites`` has those
+    that are fields, whose names are ``fields``.
+    """
 
     energy: Kernel
     casimirs: Kernel
     vector_field: Kernel
     named: Kernel | None = None
+    reductions: tuple[Reduction, ...] = ()
+    at_sites: Kernel | None = None
+    fields: tuple[str, ...] = ()
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
         """All of them."""
-        return (self.energy, self.casimirs, self.vector_field, *([self.named] if self.named else []))
+        return (self.energy, self.casimirs, self.vector_field, *(k for k in (self.named, self.at_sites) if k))
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -28,6 +28,7 @@ from phigen.scheme.tangent import explicit_jacobian
 from phigen.spec.model import Extras, Spec
 from phigen.splitting.flow import Flow
 from phigen.splitting.ring import KICK, TIME
+from phigen.symbolic.readable import shortened
 from phigen.symbolic.symbols import LEVEL
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ def build_splitting(
     flows = [*sources, *choice.splitting.flows]
     held = (LEVEL,) if monitor else ()
     coefficients = Coefficients([*system.parameter_names, *held, TIME, KICK], [*system.times, *system.increments[:1]])
+    _expect_steady(system, flows, monitor)
+    coefficients.include(e for flow in flows for e in flow.exponentials)
     kernels = tuple(_flow_kernel(system, flow, k, coefficients, monitor) for k, flow in enumerate(flows, 1))
     tangents = tuple(_tangents(system, kernels, coefficients)) if extras.tangent else ()
     attitude = None
@@ -126,7 +129,8 @@ def _step(
         "prepare",
         "everything that depends on parameters and the time of a flow only",
         {"params": system.parameter_names, **{name: symbols for name, symbols in inputs.items() if symbols}},
-        (Output("coef", tuple(coefficients.values)),),
+        (Output("coef", tuple(coefficients.prepared)),),
+        exponentials=coefficients.blocks,
     )
     step = Splitting(prepare, flows, schedule, method, tangents, refresh=refresh)
     if adjoint:
@@ -179,6 +183,19 @@ def _operations(step: Splitting) -> dict[str, int]:
         for what, number in operation_counts(kernel.roots).items():
             counted[what] += number * times[part]
     return dict(counted)
+
+
+def _expect_steady(system: System, flows: Sequence[Flow], monitor: Logarithmic | None) -> None:
+    """`SpecError` for matrix exponentials whose time depends on the state."""
+    for flow in flows if monitor else ():
+        if flow.exponentials:
+            message = "monitor: log: the flow of {} takes a matrix exponential, whose time must not depend on the state"
+            diagnostic = Diagnostic(
+                message.format(shortened(flow.hamiltonian)),
+                system.locations.get(("monitor",)) or system.locations.get(("hamiltonian",)),
+                "scheme: series takes a monitor with every H",
+            )
+            raise SpecError([diagnostic])
 
 
 def _expect_no_modified(system: System, extras: Extras) -> None:

@@ -14,7 +14,8 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeVar
 
 from phigen.scheme.kernel import Kernel, Output
-from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, symbols_of, topological
+from phigen.splitting.matrices import MatrixExponential
+from phigen.symbolic.expression import Expression, fold, rebuild, substitute, symbol, symbols_of, topological, total
 from phigen.symbolic.symbols import COEFFICIENT, RENEWED, Symbol, coefficient, kind_of
 
 T = TypeVar("T")
@@ -29,14 +30,16 @@ TABLE, NOW = "coef", "now"
 class Coefficients:
     """The table of state-independent values; `hoist` fills it and is idempotent on equal values.
 
-    ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Of the latter nobody
-    knows the place in the table before it is full: until `settled` they are symbols of their own kind.
+    ``values`` are those of ``prepare``, ``renewed`` those that depend on ``inputs`` of a step. Between them lie the
+    entries of ``exponentials``, exp(tA) − 1. Of these two nobody knows the place in the table before it is full: until
+    `settled` they are symbols of their own kinds.
     """
 
     def __init__(self, static: Iterable[str], inputs: Iterable[str] = ()) -> None:
         self._static, self._inputs = set(static), set(inputs)
         self.values: list[Expression] = []
         self.renewed: list[Expression] = []
+        self.exponentials: list[MatrixExponential] = []
         self._index: dict[int, Symbol] = {}
 
     @property
@@ -47,12 +50,32 @@ class Coefficients:
     @property
     def table(self) -> tuple[str, ...]:
         """The symbols of all coefficients so far, those that are renewed in each step last."""
-        return (*self.slots, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
+        entries = (name for e in self.exponentials for name in e.symbols)
+        return (*self.slots, *entries, *(Symbol(RENEWED, k) for k in range(len(self.renewed))))
 
     @property
     def everything(self) -> list[Expression]:
-        """What the symbols of the table stand for."""
-        return [*self.values, *self.renewed]
+        """What the symbols of the table stand for; of entries of an exponential, a sum of all that they depend on."""
+        sums = (total(e.exponents) for e in self.exponentials for _ in e.rates)
+        return [*self.values, *sums, *self.renewed]
+
+    @property
+    def prepared(self) -> list[Expression]:
+        """What ``prepare`` stores: the values, and the entries of tA, which `blocks` take the exponentials of."""
+        return [*self.values, *(e for exponential in self.exponentials for e in exponential.exponents)]
+
+    @property
+    def blocks(self) -> tuple[tuple[int, int], ...]:
+        """Where the matrices tA begin in the table, with their sizes."""
+        found, start = [], len(self.values)
+        for exponential in self.exponentials:
+            found.append((start, exponential.size))
+            start += exponential.size**2
+        return tuple(found)
+
+    def include(self, exponentials: Iterable[MatrixExponential]) -> None:
+        """Make room for matrix exponentials, each once."""
+        self.exponentials += [e for e in dict.fromkeys(exponentials) if e not in self.exponentials]
 
     def empty(self) -> Coefficients:
         """A table with the same symbols and no values."""
@@ -121,10 +144,11 @@ class Coefficients:
 
         Every coefficient has its place: those that are renewed in each step come after those that are not.
         """
-        if not self.renewed:
+        late = self.table[len(self.values) :]
+        if not late:
             return made
-        places = [coefficient(len(self.values) + k) for k in range(len(self.renewed))]
-        names: dict[str, Expression] = {Symbol(RENEWED, k): symbol(place) for k, place in enumerate(places)}
+        places = [coefficient(len(self.values) + k) for k in range(len(late))]
+        names: dict[str, Expression] = {name: symbol(place) for name, place in zip(late, places, strict=True)}
         listed = list(_expressions(made))
         renamed = {id(e): r for e, r in zip(listed, substitute(listed, names), strict=True)}
         settled: T = _rebuilt(made, renamed, (*self.slots, *places))

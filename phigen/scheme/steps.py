@@ -16,14 +16,6 @@ from phigen.scheme.alternation import Schedule
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.path import PathSlopes, Recurrences
 
-#: How far an implicit step may lead, in sizes of the state and of what the vector field says, if the energy is lost.
-PLAUSIBLE = 1.5
-
-#: Into how many pieces a path is cut, a power of 2, and after how many pieces, of all paths that were tried, the solve
-#: of a step is given up: measured on the corpus, steps that take more are wrong by as much as the state, as a rule.
-LONGEST_PATH, MOST_PIECES = 128, 512
-
-
 #: The end of the name of a kernel of lattices that is the transpose of another.
 BACK = "_back"
 
@@ -227,12 +219,6 @@ class Path(_Staged):
         return self.back.curvature if self.back else None
 
 
-#: Sweeps over the stages end where the next one would change so little, in sizes of the unknowns: 2e-17 leaves a linear
-#: drift of energy and Casimirs. Or they end when STALLS changes below ROUNDING were not less than those before. After
-#: MOST_RISING sweeps one after the other that change more than those before, the step is too large.
-SOLVED, ROUNDING, STALLS, MOST_RISING = 2e-18, 2e-14, 2, 3
-
-
 @dataclass(frozen=True)
 class GaussTangent:
     """The Jacobians of the vector field of a stage, along the start of the step and the unknowns, and of the change."""
@@ -390,12 +376,19 @@ class Partners:
     """The sites of a graph or all pairs: half the energies of a site with others, and what moves it, by parameters.
 
     ``varied`` is the latter with its derivative along variations of the fields, where a step solves an `Equation`.
+    ``observed`` are the densities of observables of bonds and pairs.
     """
 
     energy: Gather
     field: Gather
     graph: bool = False
     varied: Gather = Gather((), ())
+    observed: Gather = Gather((), ())
+
+    @property
+    def gathers(self) -> tuple[Gather, ...]:
+        """All sums, also those of nothing."""
+        return (self.energy, self.field, self.varied, self.observed)
 
 
 @dataclass(frozen=True)
@@ -512,7 +505,7 @@ class Sweeps(_Scheduled):
     def sums(self) -> int:
         """The most sums over other sites that are held for each."""
         swept = [sweep.gather for sweep in self.sweeps if sweep.gather]
-        return max(len(g.names) for g in (*swept, self.others.energy, self.others.field, self.others.varied))
+        return max(len(g.names) for g in (*swept, *self.others.gathers))
 
     @property
     def kernels(self) -> tuple[Kernel, ...]:
@@ -522,7 +515,7 @@ class Sweeps(_Scheduled):
         swept_kernels = [sweep.kernel for sweep in swept]
         swept_kernels += self.equation.kernels if self.equation else ()
         gathers = [sweep.gather for sweep in swept if sweep.gather]
-        gathers += [self.others.energy, self.others.field, self.others.varied]
+        gathers += self.others.gathers
         own = (*swept_kernels, *(k for g in gathers for k in g.kernels))
         return _present((self.prepare, self.refresh, *own, *self.transposed))
 

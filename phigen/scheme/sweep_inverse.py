@@ -6,8 +6,10 @@ damp, a multiple of a field that is added to it is divided away; other damping i
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import wraps
+from typing import TypeVar
 
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
@@ -17,7 +19,25 @@ from phigen.scheme.sweep_collecting import collecting
 from phigen.symbolic.expression import ONE, ZERO, Expression, gradient, rebuild, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import PRESENT, Symbol
 
+T = TypeVar("T")
 
+
+def once(function: Callable[[Program, Sweeps], T]) -> Callable[[Program, Sweeps], T]:
+    """Keep the last result for calls with the same two objects: a printer asks dozens of times for each."""
+    last: list[tuple[Program, Sweeps, T]] = []
+
+    @wraps(function)
+    def result(program: Program, step: Sweeps) -> T:
+        entry = last[0] if last else None
+        if entry is None or entry[0] is not program or entry[1] is not step:
+            entry = (program, step, function(program, step))
+            last[:] = [entry]
+        return entry[2]
+
+    return result
+
+
+@once
 def can_be_undone(program: Program, step: Sweeps) -> bool:
     """Whether the transpose of a step finds the fields before its sweeps from those after them."""
     if not step.adjoint or step.equation:
@@ -28,6 +48,7 @@ def can_be_undone(program: Program, step: Sweeps) -> bool:
     return found and all(parities.get(s, EVEN) == EVEN for s in summed)
 
 
+@once
 def transposes(program: Program, step: Sweeps) -> list[list[Kernel]]:
     """The transposes of the sweeps of each part, which undo them and collect where they can."""
     kernels = {kernel.name: kernel for kernel in step.adjoint.steps} if step.adjoint else {}

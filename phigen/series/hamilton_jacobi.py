@@ -141,13 +141,13 @@ class HamiltonJacobi:
         return self._graphs.first(terms)
 
     def reach(self, terms: int) -> None:
-        """So many terms will be asked for. Where α is a series in p this starts anew, so it is said in good time."""
+        """Announce the number of terms, before the first is computed: where α is a series in p, this starts again."""
         if terms <= self._most:
             return
         self._most = terms
         if tuple(self._source(terms)) != self.alpha:
-            for kept in ("alpha", "_polynomials", "_graphs"):
-                self.__dict__.pop(kept, None)
+            for cached_name in ("alpha", "_polynomials", "_graphs"):
+                self.__dict__.pop(cached_name, None)
 
     @cached_property
     def _polynomials(self) -> _Recursion:
@@ -248,10 +248,10 @@ class _Recursion:
             raise OverflowError(f"S_{i} has {len(self._found[-1])} terms")
         if even:
             return self._zero
-        found = self._taylor.coefficients(self._target)[i]
+        coefficient = self._taylor.coefficients(self._target)[i]
         for rate in self._slope(self._found[-1], self._times) if moves else ():
-            found = found + rate * self.ring.constant(Fraction(1, 2))
-        return found * self.ring.constant(Fraction(1, i + 1))
+            coefficient = coefficient + rate * self.ring.constant(Fraction(1, 2))
+        return coefficient * self.ring.constant(Fraction(1, i + 1))
 
 
 def beginning(ring: Any, times: Sequence[str], i: int) -> dict[str, Any]:

@@ -56,22 +56,26 @@ def modified_series(
     Raises `OverflowError` if a correction has more than `MOST_TERMS` monomials.
     """
     symbols = [*parameters, FRACTION, *times]
-    kept = polynomial_series(
+    generating = polynomial_series(
         hamiltonian, alpha, coordinates, symbols, min(terms, power + 1), symmetric=symmetric, times=times
     )
-    found = _Recursion(kept, alpha, coordinates, times)
+    recursion = _Recursion(generating, alpha, coordinates, times)
     for r in range(1, power + 2):
-        found.advance(r, vanishing=symmetric and r % 2 == 0)
-    return ModifiedSeries(kept.tower, tuple(found.terms))
+        recursion.advance(r, vanishing=symmetric and r % 2 == 0)
+    return ModifiedSeries(generating.tower, tuple(recursion.terms))
 
 
 class _Recursion:
     """The state of the recursion: H_0 … H_{r−1}, and the slopes of s_1 … s_r along the coordinates."""
 
     def __init__(
-        self, kept: PolynomialSeries, alpha: Sequence[Expression], coordinates: Sequence[str], times: Sequence[str]
+        self,
+        generating: PolynomialSeries,
+        alpha: Sequence[Expression],
+        coordinates: Sequence[str],
+        times: Sequence[str],
     ) -> None:
-        self.tower, self.kept = kept.tower, kept.terms
+        self.tower, self.kept = generating.tower, generating.terms
         self.alpha, self.coordinates, self.times = alpha, coordinates, times
         self.last = self.tower.zero  # s_(r−1)
         self.momenta = [momentum(c) for c in coordinates]
@@ -90,8 +94,8 @@ class _Recursion:
         known = self._integral(
             self.tower.combine([*levels, *(half * self.tower.derivative(self.last, t) for t in self.times)])
         )
-        wanted = self.kept[r - 1] if r <= len(self.kept) else self.tower.zero
-        correction = wanted - self._at_one(known)
+        target = self.kept[r - 1] if r <= len(self.kept) else self.tower.zero
+        correction = target - self._at_one(known)
         if len(correction) > MOST_TERMS:
             raise OverflowError(f"H_{r - 1} has {len(correction)} terms")
         self._keep(correction, known + self.tower.variable(FRACTION) * correction)

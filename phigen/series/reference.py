@@ -41,11 +41,11 @@ def generating_function(hamiltonian: Any, source: Source, x: Sequence[Any], time
     ``hamiltonian`` is H, ``source`` gives the a_μ: see `closed_form` and `phigen.series.reference_paths`. ``times`` is
     the time, if H depends on it.
     """
-    found: list[Any] = []
+    terms: list[Any] = []
     while True:
-        i = len(found)
-        found.append(_coefficient(i, taylor(hamiltonian, [*x, *times], i), source(i), found, x, times) / (i + 1))
-        yield found[-1]
+        i = len(terms)
+        terms.append(_coefficient(i, taylor(hamiltonian, [*x, *times], i), source(i), terms, x, times) / (i + 1))
+        yield terms[-1]
 
 
 def closed_form(alpha: Sequence[Any], p: Sequence[Any]) -> Source:
@@ -103,9 +103,11 @@ def _coefficient(
         functions,
         lambda k, j: momentum.combined(source[k], j) if k < len(x) else back.get(j, functions.ring.zero),
     )
-    found = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
-    zero = functions.seems_zero(found) and functions.vanishes(found)  # of even index in a symmetric bi-realisation
-    return sympy.Integer(0) if zero else functions.expression(found)
+    coefficient = functions.total([displacement.combined(energy, i), *map(functions.element, rates)])
+    zero = functions.seems_zero(coefficient) and functions.vanishes(
+        coefficient
+    )  # of even index in a symmetric bi-realisation
+    return sympy.Integer(0) if zero else functions.expression(coefficient)
 
 
 class Series:

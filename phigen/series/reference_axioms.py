@@ -25,7 +25,7 @@ def defects(
     p: Sequence[Any],
     d: int,
 ) -> Iterator[tuple[str, Any]]:
-    """The parts that are not seen to be 0, with what they are of; ``poisson`` is the matrix π(x).
+    """The parts that do not reduce to 0, each with its name; ``poisson`` is the matrix π(x).
 
     ``alpha`` and ``beta`` are the a_μ and b_μ with 0 < |μ| ≤ d.
     """
@@ -34,12 +34,12 @@ def defects(
     parts = _Parts([*alpha, *beta], [c for entry in tensor.values() for c in entry.values()], x, p)
     functions, at_alpha, at_beta = parts.functions, parts.deviation(0), parts.deviation(n)
     for m in range(d):
-        found = {}
+        residuals = {}
         for (i, j), entry in tensor.items():
-            found[f"{{α_{x[i]}, α_{x[j]}}}"] = parts.bracket(i, j, m) - at_alpha.combined(entry, m)
-            found[f"{{β_{x[i]}, β_{x[j]}}}"] = parts.bracket(n + i, n + j, m) + at_beta.combined(entry, m)
-        found |= {f"{{α_{x[i]}, β_{x[j]}}}": parts.bracket(i, n + j, m) for i in range(n) for j in range(n)}
-        for name, rest in found.items():
+            residuals[f"{{α_{x[i]}, α_{x[j]}}}"] = parts.bracket(i, j, m) - at_alpha.combined(entry, m)
+            residuals[f"{{β_{x[i]}, β_{x[j]}}}"] = parts.bracket(n + i, n + j, m) + at_beta.combined(entry, m)
+        residuals |= {f"{{α_{x[i]}, β_{x[j]}}}": parts.bracket(i, n + j, m) for i in range(n) for j in range(n)}
+        for name, rest in residuals.items():
             if not functions.vanishes(rest):
                 yield f"{name} in degree {m}", functions.expression(rest)
 

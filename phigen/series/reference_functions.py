@@ -1,4 +1,4 @@
-"""Polynomials in functions, by sympy: what the second derivation computes with, and how it proves that something is 0.
+"""Polynomials in functions, by sympy: the arithmetic of the second derivation, and its proofs that an expression is 0.
 
 A *function* is what does not expand: x, a parameter, exp(x), sin(x), π, and of powers 1/b, b^{1/q} and b^{cx}. Powers
 whose exponent is a sum make products, and so do tan u = sin u/cos u, tanh u = sinh u/cosh u and |u| = u sign u.
@@ -105,19 +105,19 @@ class Functions:
     def vanishes(self, element: Any) -> bool:
         """True proves that the element is 0 where it is defined; False, only that the relations do not make it 0."""
         for f in reversed(self._generators):  # what a relation refers to is listed before
-            found = _relation(f)
-            if found is None:
+            relation = _relation(f)
+            if relation is None:
                 continue
-            power, value = found
+            power, value = relation
             parts = {e: c for (e,), c in self.split(element, [f]).items()}
             if set(parts) <= {0}:
                 continue
-            own, g = self._generators[f], self.element(value)
+            generator, g = self._generators[f], self.element(value)
             if power < 0:  # f g = 1, so a multiple has no f
                 top = max(parts)
                 element = self.total(c * g ** (top - e) for e, c in parts.items())
             else:  # f^power = g
-                element = self.total(c * own ** (e % power) * g ** (e // power) for e, c in parts.items())
+                element = self.total(c * generator ** (e % power) * g ** (e // power) for e, c in parts.items())
         return bool(element == 0)
 
     def seems_zero(self, element: Any) -> bool:
@@ -158,8 +158,8 @@ def _list_functions(expressions: Iterable[Any], listed: dict[Any, None]) -> None
         if parts != [(e, 1)]:
             _list_functions([a for a, _ in parts], listed)
             continue
-        found = _relation(e)
-        _list_functions([found[1]] if found else [], listed)
+        relation = _relation(e)
+        _list_functions([relation[1]] if relation else [], listed)
         listed[e] = None
 
 
@@ -178,7 +178,7 @@ def _relation(f: Any) -> tuple[int, Any] | None:
 
 
 def _factors(e: Any) -> list[tuple[Any, int]]:
-    """What e is a product of, as pairs of an expression and the power of it; of a function, the function alone."""
+    """Factors of e, as pairs of an expression and its power; a function is its own only factor."""
     if e.is_Mul:
         return [(a, 1) for a in e.args]
     if isinstance(e, sympy.Abs | sympy.sign):
@@ -201,11 +201,11 @@ def _powers(base: Any, exponent: Any) -> list[tuple[Any, int]]:
         return [(base ** (sympy.sign(c) * m / c.q), abs(int(c.p)))]
     whole, rest = divmod(int(c.p), int(c.q))
     content, primitive = (sympy.S.One, base) if base.is_number else base.primitive()
-    found = [(content**c, 1), (primitive ** sympy.Rational(1, c.q), rest)]
+    powers = [(content**c, 1), (primitive ** sympy.Rational(1, c.q), rest)]
     if whole > 0:
-        found.append((primitive, whole))
+        powers.append((primitive, whole))
     elif primitive.could_extract_minus_sign():
-        found += [(sympy.Integer(-1) ** whole, 1), (1 / -primitive, -whole)]
+        powers += [(sympy.Integer(-1) ** whole, 1), (1 / -primitive, -whole)]
     else:
-        found.append((1 / primitive, -whole))
-    return [(f, n) for f, n in found if n and f != 1]
+        powers.append((1 / primitive, -whole))
+    return [(f, n) for f, n in powers if n and f != 1]

@@ -21,19 +21,19 @@ from phigen.series.reference_functions import Functions
 
 def paths(poisson: Any, x: Sequence[Any], p: Sequence[Any], s: Any) -> Iterator[list[Any]]:
     """m_1(s), m_2(s), … without end, each n expressions in x, p and s; ``poisson`` is the matrix π(x)."""
-    found: list[list[Any]] = []
+    path_terms: list[list[Any]] = []
     while True:
-        found.append(_part(poisson, found, x, p, s))
-        yield found[-1]
+        path_terms.append(_part(poisson, path_terms, x, p, s))
+        yield path_terms[-1]
 
 
-def _part(poisson: Any, found: Sequence[Sequence[Any]], x: Sequence[Any], p: Sequence[Any], s: Any) -> list[Any]:
+def _part(poisson: Any, lower_terms: Sequence[Sequence[Any]], x: Sequence[Any], p: Sequence[Any], s: Any) -> list[Any]:
     """m_k from those before it."""
-    below, n = len(found), len(x)
+    below, n = len(lower_terms), len(x)
     tensor = [[taylor(poisson[a, b], x, below) for b in range(n)] for a in range(n)]
     every = [c for row in tensor for entry in row for c in entry.values()]
-    functions = Functions([*every, *p, s, *(m for part in found for m in part)])
-    deviation = Series(functions, lambda k, j: functions.element(found[j - 1][k]))
+    functions = Functions([*every, *p, s, *(m for part in lower_terms for m in part)])
+    deviation = Series(functions, lambda k, j: functions.element(lower_terms[j - 1][k]))
     return [_centred(functions, _velocity(functions, deviation, row, p, below), s) for row in tensor]
 
 
@@ -46,10 +46,10 @@ def _velocity(functions: Functions, deviation: Series, row: Sequence[Any], p: Se
 
 def _centred(functions: Functions, velocity: Any, s: Any) -> Any:
     """The integral over s whose mean from 0 to 1 is 0."""
-    own, rational = functions.element(s), sympy.QQ
+    time, rational = functions.element(s), sympy.QQ
     return functions.expression(
         functions.total(
-            c * (own ** (e + 1) * rational(1, e + 1) - rational(1, (e + 1) * (e + 2)))
+            c * (time ** (e + 1) * rational(1, e + 1) - rational(1, (e + 1) * (e + 2)))
             for (e,), c in functions.split(velocity, [s]).items()
         )
     )

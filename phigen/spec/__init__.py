@@ -34,8 +34,8 @@ def load(path: str | PathLike[str]) -> Spec:
             data = stream.read(limits.FILE_BYTES + 1)
     except (OSError, ValueError) as error:
         if "\n" in file:
-            message = "the name of a spec file was expected, and this is a text of several lines"
-            raise SpecError([Diagnostic(message, hint="phigen.spec.loads(text) reads it")]) from error
+            message = "expected the name of a spec file, found a text of several lines"
+            raise SpecError([Diagnostic(message, hint="phigen.spec.loads(text) reads a spec from a text")]) from error
         if isinstance(error, FileNotFoundError):
             raise SpecError([resources.missing(file)]) from error
         reason = getattr(error, "strerror", None) or str(error)

@@ -55,7 +55,7 @@ class Declarations:
 
     @property
     def relation(self) -> str:
-        """How sites are related; empty for an ordinary spec."""
+        """Relation between sites; empty for an ordinary spec."""
         return self.lattice.relation if self.lattice else ""
 
     @property
@@ -66,27 +66,31 @@ class Declarations:
 
     def _at_bonds(self, names: Mapping[str, Expression]) -> dict[str, tuple[str, str]]:
         """Names that have a value at bonds only."""
-        own = {n for n, p in self.parameters.items() if p.at == "bonds"}
-        found = {n for n, e in names.items() if own.intersection(symbols_of(e))} if own else set()
-        return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in found}
+        bond_parameters = {n for n, p in self.parameters.items() if p.at == "bonds"}
+        bond_names = (
+            {n for n, e in names.items() if bond_parameters.intersection(symbols_of(e))} if bond_parameters else set()
+        )
+        return {n: (f"{n!r} has a value at every bond, not at sites", "use it in bonds:") for n in bond_names}
 
     def _counters(self) -> dict[str, tuple[str, str]]:
         """The names of indices and sizes, which are no part of a density."""
-        why, hint = "what is written here holds for all sites alike", "what differs is a parameter at: sites"
+        why, hint = "this expression must be the same for all sites", "a parameter at: sites has a value for each site"
         listed = [n for i in self.lattice.indices for n in (i, f"N_{i}")] if self.lattice else []
         return {n: (f"{why}; {n!r} depends on the site" if n[:2] != "N_" else f"{why} and sizes", hint) for n in listed}
 
     def indices(self, names: Mapping[str, Expression], ends: tuple[str, ...] = ()) -> Indices | None:
-        """What may have an index: whatever depends on the site."""
+        """Names that may have an index: those that depend on the site."""
         if self.lattice is None or not self.indexed:
             return None
-        found = self.neighbours
-        varying = {n: e for n, e in names.items() if found.places(e)}
+        neighbours = self.neighbours
+        varying = {n: e for n, e in names.items() if neighbours.places(e)}
         hint = "an array is declared {value: …, at: sites}"
         same = {n: (f"{n!r} is the same at all sites", hint) for n in names if n not in varying}
-        bonds = {n: (f"{n!r} belongs to the bond, not to its ends", "write it without index") for n in same if ends}
+        bonds = {
+            n: (f"{n!r} belongs to the bond, not to its ends", f"write {n} without an index") for n in same if ends
+        }
         at_bonds = {n: bonds.get(n, why) for n, why in self._at_bonds(names).items()}
-        return Indices(found, varying, {**same, **at_bonds}, ends)
+        return Indices(neighbours, varying, {**same, **at_bonds}, ends)
 
     def bond_scope(self, *, dated: bool = False) -> Scope:
         """For brackets along bonds and, ``dated``, densities of bonds and pairs: sites are the ends a and b."""
@@ -95,7 +99,7 @@ class Declarations:
         indices = self.indices(names, ENDS)
         local = indices.names if indices else {}
         what = "a pair" if self.relation == "pairs" else "a bond"
-        ends = {n: (f"{n!r} is at which end of {what}?", f"write {n}[a] or {n}[b]") for n in local}
+        ends = {n: (f"{n!r} needs an end of {what}", f"write {n}[a] or {n}[b]") for n in local}
         others = {n: e for n, e in names.items() if n not in local}
         others |= {n: symbol(n) for n, p in self.parameters.items() if p.at == "bonds"}
         refused = self.refused | self._counters() | ends | ({} if dated else self._timeless())
@@ -145,7 +149,7 @@ class Declarations:
 
     def _timeless(self) -> dict[str, tuple[str, str]]:
         """The refusal of the time where nothing may depend on it."""
-        hint = "the Hamiltonian, invariants, sections and exact solutions may"
+        hint = "only the Hamiltonian, invariants, sections and exact solutions may"
         refused = {n: (f"this must not depend on the time, as {n!r} does", hint) for n in sorted(self.dated)}
         return refused | ({self.time: (f"this must not depend on the time {self.time!r}", hint)} if self.time else {})
 
@@ -171,10 +175,10 @@ class Declarations:
     def numbers(self) -> Scope:
         """No declared name at all: for defaults and initial values."""
         declared = (*self.coordinates, *self.parameters, *self.definitions, *filter(None, [self.time]))
-        return Scope({}, {n: (f"expected a number; {n!r} stands for something that varies", "") for n in declared})
+        return Scope({}, {n: (f"expected a number; {n!r} is not constant", "") for n in declared})
 
     def inside(self, within: tuple[Any, ...], coordinates: tuple[str, ...], message: str) -> Declarations:
-        """What can be used in a structure that has other coordinates; ``message`` begins the refusal of others."""
+        """Declarations for a structure with coordinates of its own; ``message`` begins the refusal of other names."""
         lost = [c for c in self.coordinates if c not in coordinates]
         gone = {n for n, e in self.definitions.items() if any(s in lost for s in symbols_of(e))}
         return replace(
@@ -261,31 +265,31 @@ def declare(raw: Raw, reader: Reader) -> Declarations:
     return declared
 
 
-def _lattice(given: Raw | None, reader: Reader) -> Lattice | None:
-    """How sites are related; None for an ordinary spec."""
-    if given is None:
+def _lattice(raw: Raw | None, reader: Reader) -> Lattice | None:
+    """Read ``lattice:``, the relation between sites; None for an ordinary spec."""
+    if raw is None:
         return None
-    nodes = [node for node in given.get("axes", ()) if node is not None]
+    nodes = [node for node in raw.get("axes", ()) if node is not None]
     axes = tuple(dict.fromkeys(node.text for node in nodes))
     for index, node in enumerate(nodes):
         if node.text in axes[:index] and nodes[index].text in [n.text for n in nodes[:index]]:
             reader.error(node, f"lattice: the axis {node.text!r} is given twice")
         elif node.text in SPEC_FUNCTIONS or node.text in CONSTANTS:
-            reader.error(node, f"lattice: {node.text!r} means something else in expressions", RENAME)
-    boundary = given.get("boundary", "periodic")
-    if "boundary" in given and not axes and ("graph" in given or "pairs" in given):
-        reader.problems.add("lattice: boundary belongs to axes", reader.locations["lattice", "boundary"])
+            reader.error(node, f"lattice: {node.text!r} is the name of a function or a constant", RENAME)
+    boundary = raw.get("boundary", "periodic")
+    if "boundary" in raw and not axes and ("graph" in raw or "pairs" in raw):
+        reader.problems.add("lattice: boundary needs axes", reader.locations["lattice", "boundary"])
     if isinstance(boundary, str):
         boundary = [boundary] * len(axes)
     if len(boundary) != len(nodes) and axes:
         message = (
             f"lattice: {counted(len(boundary), 'boundary', 'boundaries')} for {counted(len(nodes), 'axis', 'axes')}"
         )
-        reader.problems.add(message, reader.locations["lattice", "boundary"], "one word is for all axes")
-    graph = given.get("graph")
-    if not (axes or graph or "pairs" in given):  # what was wrong is reported
+        reader.problems.add(message, reader.locations["lattice", "boundary"], "a single word holds for all axes")
+    graph = raw.get("graph")
+    if not (axes or graph or "pairs" in raw):  # what was wrong is reported
         return Lattice(("i",), ("periodic",))
-    return Lattice(axes, tuple(b or "periodic" for b in boundary), graph.text if graph else "", "pairs" in given)
+    return Lattice(axes, tuple(b or "periodic" for b in boundary), graph.text if graph else "", "pairs" in raw)
 
 
 def _declare_parameters(raw: Raw, declared: Declarations) -> None:
@@ -301,30 +305,31 @@ def _declare_parameters(raw: Raw, declared: Declarations) -> None:
         if not declared.declare(key, "parameter"):
             continue
         options: dict[str, Any] = {"value": value} if isinstance(value, Scalar) else value or {}
-        at, given, array = options.get("at", "all"), options.get("value"), None
+        at, entry, array = options.get("at", "all"), options.get("value"), None
         _expect_place(name, at, declared)
-        if at != "all" and not (isinstance(given, Scalar) and given.is_numeric):
-            number, array = None, values(given, declared)
-        elif given is not None and not isinstance(given, Scalar):
+        if at != "all" and not (isinstance(entry, Scalar) and entry.is_numeric):
+            number, array = None, values(entry, declared)
+        elif entry is not None and not isinstance(entry, Scalar):
             number = declared.reader.problems.add(
                 f"the value of the parameter {name!r} is a number", key.location, "arrays are at: sites or at: bonds"
             )
         else:
-            number = declared.number(given, numbers)
+            number = declared.number(entry, numbers)
         positive = options.get("positive", False)
         if number is not None and positive and number <= 0:
             message = f"the parameter {name!r} is positive by declaration, but its value is {options['value'].text}"
             declared.reader.error(options["value"], message)
         # A value with an error is reported; the name stays declared, so that its uses are not reported too.
         value = Fraction(1) if number is None else number
-        description = options.get("description", "")
-        declared.parameters[name] = Parameter(name, value, positive, description, at, array)
+        description, unit = options.get("description", ""), options.get("unit", "")
+        small = options.get("small", False)
+        declared.parameters[name] = Parameter(name, value, positive, description, at, array, unit, small)
 
 
 def _expect_place(name: str, at: str, declared: Declarations) -> None:
-    """That there are sites, or bonds, at which a parameter has values."""
-    wanted = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(at)
-    if wanted and declared.relation not in wanted:
+    """Report a parameter with values at sites or bonds where the spec has none."""
+    relations = {"sites": ("grid", "graph", "pairs"), "bonds": ("graph",)}.get(at)
+    if relations and declared.relation not in relations:
         needs = "a lattice with a graph" if at == "bonds" and declared.relation else "specs with lattice:"
         place = declared.reader.locations["parameters", name, "at"]
         declared.reader.problems.add(f"parameters: at: {at} is for {needs}", place)

@@ -29,10 +29,12 @@ from phigen.spec.names import (
     FAMILY_HELP,
     IDENTIFIER,
     KEPT,
+    OVER,
     PARTS,
     PROFILES,
     REALS,
     RECONSTRUCTIONS,
+    REDUCTIONS,
     SCHEMES,
     SPEC_NAME,
     STRUCTURES,
@@ -57,9 +59,16 @@ PARAMETER = Record(
     "a parameter",
     (
         Field("value", VALUES, "default value", required=True),
-        Field("at", Choice(("all", "sites", "bonds")), "lattices: where it has a value of its own", default="all"),
+        Field(
+            "at",
+            Choice(("all", "sites", "bonds")),
+            "lattices: sites or bonds, each with a value of its own",
+            default="all",
+        ),
         Field("positive", Boolean(), "the value is always greater than 0; simplifications may use it", default=False),
-        Field("description", PROSE, "what it means"),
+        Field("small", Boolean(), "splittings: the terms with this factor are a small part of H", default=False),
+        Field("description", PROSE, "the meaning of the parameter"),
+        Field("unit", INLINE, "its unit, such as kg.m2; documentation only, nothing is converted"),
     ),
 )
 CANONICAL = Record(
@@ -105,17 +114,24 @@ def _structure(what: str, nested: int, *more: Field) -> Record:
     if nested:
         names = ListOf(NAME, least=1)
         block = _structure(
-            "a block of a product", nested - 1, Field("coordinates", names, "those of the block", required=True)
+            "a block of a product",
+            nested - 1,
+            Field("coordinates", names, "the coordinates of the block", required=True),
         )
         pullback = Record(
             "pullback",
             (
                 Field("of", _structure("of", nested - 1), "a form in the coordinates that map defines", required=True),
-                Field("map", MapOf(NAME, FORMULA, least=1), "these coordinates, by name, as functions", required=True),
-                Field("inverse", FORMULAS, "the coordinates of the spec as functions of them, if phigen cannot tell"),
+                Field(
+                    "map",
+                    MapOf(NAME, FORMULA, least=1),
+                    "the coordinates of the form, as functions of those of the spec",
+                    required=True,
+                ),
+                Field("inverse", FORMULAS, "the inverse of map, if phigen cannot find it"),
             ),
         )
-        forms.append(Field("product", ListOf(block, least=2), "blocks side by side, without brackets between them"))
+        forms.append(Field("product", ListOf(block, least=2), "blocks, with zero brackets between them"))
         forms.append(Field("pullback", pullback, "a structure in other coordinates"))
     keys = tuple(f.key for f in forms)
     instead: tuple[str, ...] = ()
@@ -137,9 +153,14 @@ SPRAY = Either({Scalar: Choice(("auto", "flat", "natural")), Sequence: ListOf(FO
 BIREALISATION = Record(
     "birealisation",
     (
-        Field("kind", KIND, "auto picks by the shape of π", required=True),
-        Field("side", Choice(("q", "p")), "which half canonical-euler takes implicitly", default="q"),
-        Field("of", KIND, "product, pullback: the kind for the blocks, for what is pulled back", default="auto"),
+        Field("kind", KIND, "the kind; auto chooses by the form of π", required=True),
+        Field("side", Choice(("q", "p")), "canonical-euler: the half of the coordinates that is implicit", default="q"),
+        Field(
+            "of",
+            KIND,
+            "product, pullback: the kind for the blocks, or for the form that is pulled back",
+            default="auto",
+        ),
         Field("tau", TAU, "group-map: a rational function of P = Σ p_i E_i, or a matrix with entries in p_NAME"),
         Field("alpha", ListOf(FORMULA, least=1), "custom: α(x, p), one expression per coordinate, momenta are p_NAME"),
         Field("beta", ListOf(FORMULA, least=1), "custom: β(x, p), one expression per coordinate, momenta are p_NAME"),
@@ -154,7 +175,12 @@ SOLVER = Record(
         Field("tolerance", Formula(), "auto, or the tolerance of the solve", default="auto"),
         Field("max_iterations", Integer(1, 1000), "iterations before a step fails", default=20),
         Field("lanes", Boolean(), "C: many steps, and ensembles, eight at a time; longer code", default=True),
-        Field("compensated", Boolean(), "C of lattices that split: less rounding, in more time", default=False),
+        Field(
+            "compensated",
+            Boolean(),
+            "C of split lattices: compensated summation, less rounding in more time",
+            default=False,
+        ),
     ),
 )
 LATTICE = Record(
@@ -170,7 +196,7 @@ LATTICE = Record(
         Field(
             "graph", NAME, "the name of a list of bonds, which is given at run time; x[a] and x[b] are x at the ends"
         ),
-        Field("pairs", Choice(("all",)), "each site is paired with each other"),
+        Field("pairs", Choice(("all",)), "all: every site is paired with every other"),
     ),
     one=("axes", "graph", "pairs"),
     exactly=True,
@@ -178,9 +204,9 @@ LATTICE = Record(
 DENSITIES = Record(
     "hamiltonian",
     (
-        Field("sites", FORMULA, "of each site"),
-        Field("bonds", FORMULA, "of each bond of a graph, from a to b"),
-        Field("pairs", FORMULA, "of each pair, a and b"),
+        Field("sites", FORMULA, "the terms of each site"),
+        Field("bonds", FORMULA, "the terms of each bond of a graph, from a to b"),
+        Field("pairs", FORMULA, "the terms of each pair, a and b"),
     ),
     some=True,
 )
@@ -188,8 +214,23 @@ CASIMIR = Record(
     "a Casimir",
     (
         Field("value", FORMULA, "the density", required=True),
-        Field("at", Choice(("sites", "sum", "product")), "lattices: one for each site, or their sum or product"),
+        Field(
+            "at", Choice(("sites", "sum", "product")), "lattices: a Casimir of each site, or the sum or product of all"
+        ),
     ),
+)
+OBSERVABLE = Record(
+    "an observable of a lattice",
+    (
+        Field("mean", FORMULA, "the mean of a density over sites, bonds or pairs"),
+        Field("sum", FORMULA, "its sum"),
+        Field("max", FORMULA, "its largest value at a site"),
+        Field("min", FORMULA, "its least value at a site"),
+        Field("over", Choice(OVER), "the sites, bonds or pairs of the density", default="sites"),
+    ),
+    one=REDUCTIONS,
+    exactly=True,
+    example="{mean: x}",
 )
 FORCES = Record(
     "forces",
@@ -246,19 +287,27 @@ RUN = Record(
         Field("step", CONSTANT, "step size h", required=True),
         Field("steps", Integer(1, limits.STEPS, limit=True), "number of steps"),
         Field("duration", CONSTANT, "time span instead of the number of steps; a multiple of the step"),
-        Field("until", CONSTANT, "the time where it ends, by a part of a step, instead of the number of steps"),
-        Field("stop", FORMULA, "it ends where this expression passes through 0"),
+        Field("until", CONSTANT, "the end time, reached by a shorter last step, instead of the number of steps"),
+        Field("stop", FORMULA, "the run ends where this expression passes through 0"),
         Field("start", CONSTANT, "the time at the start, 0 if not given; for systems with a time"),
-        Field("seed", Integer(0, limits.SEED), "noise: which random numbers are taken", default=0),
-        Field("members", Integer(1, limits.MEMBERS), "noise: so many paths from the same start", default=1),
-        Field("stride", Integer(1, limits.STEPS, limit=True), "every how many steps are stored", default=1),
-        Field("every", CONSTANT, "the time between states that are stored, instead of the stride"),
-        Field("parameters", MapOf(NAME, VALUES), "values that differ from the defaults"),
+        Field("seed", Integer(0, limits.SEED), "noise: the seed of the random numbers", default=0),
+        Field(
+            "members", Integer(1, limits.MEMBERS), "noise: the number of paths from the same initial state", default=1
+        ),
+        Field(
+            "stride",
+            Integer(1, limits.STEPS, limit=True),
+            "the number of steps from one stored state to the next",
+            default=1,
+        ),
+        Field("every", CONSTANT, "the time from one stored state to the next, instead of the stride"),
+        Field("parameters", MapOf(NAME, VALUES), "parameter values that differ from the defaults"),
         Field("exact", FORMULAS, "closed form by coordinate, in t and x0_NAME for initial values"),
-        Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to run beside it"),
+        Field("compare", ListOf(Choice(CLASSICAL_METHODS)), "classical methods to compare with"),
         Field("section", FORMULA, "Poincaré section: where this expression passes through 0, as direction says"),
         Field("direction", Choice(DIRECTIONS), "how the section is crossed: rising, falling or both", default="rising"),
-        Field("average", AVERAGE, "time averages of the observables: which rows they are over"),
+        Field("record", ListOf(NAME, least=1), "columns of the output: state, energy, Casimirs, observables; or all"),
+        Field("average", AVERAGE, "time averages of the observables: the rows to average over"),
         Field("description", PROSE, "what the run shows"),
     ),
     one=("steps", "duration", "until"),
@@ -268,30 +317,40 @@ RUN = Record(
 
 #: What a sweep keeps; which observables there are is known later.
 KEPT_WORD = Name(
-    r"\w+|\w+ *\( *\w+ *\)", "what is kept", "one of " + ", ".join(KEPT) + ", or M, mean(M), std(M) of an observable M"
+    r"\w+|\w+ *\( *\w+ *\)",
+    "a result of a sweep",
+    "one of " + ", ".join(KEPT) + ", or M, mean(M), std(M), error(M) of an observable M",
 )
 
 AXIS = Record(
     "a range",
     (
-        Field("from", CONSTANT, "the first value, or the least that is drawn"),
-        Field("to", CONSTANT, "the last value, or the largest that is drawn"),
-        Field("count", Integer(1, limits.SWEPT, limit=True), "how many values; without it they are drawn"),
-        Field("scale", Choice(("linear", "log")), "how values are spaced, or drawn", default="linear"),
+        Field("from", CONSTANT, "the first value, or the smallest random value"),
+        Field("to", CONSTANT, "the last value, or the largest random value"),
+        Field("count", Integer(1, limits.SWEPT, limit=True), "the number of values; without it values are random"),
+        Field("scale", Choice(("linear", "log")), "spacing or distribution of the values", default="linear"),
     ),
 )
 SWEEP = Record(
     "a sweep",
     (
-        Field("run", RUN_NAME, "which run is made many times; the first if not given"),
+        Field("run", RUN_NAME, "the run to repeat; the first if not given"),
         Field(
             "over",
             MapOf(NAME, Either({Scalar: CONSTANT, Sequence: ListOf(CONSTANT, least=1), Mapping: AXIS}), least=1),
             "values of parameters, initial coordinates, step, start: a grid; random: N and seed, or file: members.csv",
             required=True,
         ),
-        Field("keep", ListOf(KEPT_WORD, least=1), "what is stored of each member; also observables M, mean(M), std(M)"),
-        Field("frames", Integer(1, limits.STEPS, limit=True), "also the states of every so many steps"),
+        Field(
+            "keep",
+            ListOf(KEPT_WORD, least=1),
+            "results to store for each member; also M, mean(M), std(M), error(M) of observables M",
+        ),
+        Field(
+            "frames",
+            Integer(1, limits.STEPS, limit=True),
+            "also store states: the number of steps from one to the next",
+        ),
         Field("description", PROSE, "what the sweep shows"),
     ),
 )
@@ -304,8 +363,8 @@ def _switch(key: str, *words: str) -> Kind:
 #: Keys of runs that are looked for beside them.
 _IN_RUNS = {f.key: f"{f.key}: belongs to a run, runs: {{NAME: {{{f.key}: …}}}}" for f in RUN.fields}
 _IN_RUNS["step"] += "; monitor: adapts steps to the motion"
-_IN_RUNS["precision"] = "order: is that of the error; real: float is single precision"
-_IN_RUNS["tolerance"] = "solver: {tolerance: …}; steps have one size, and their error is that of order and step"
+_IN_RUNS["precision"] = "order: sets the order of the error; real: float is single precision"
+_IN_RUNS["tolerance"] = "solver: {tolerance: …} bounds the inner solve; order and step set the error of a step"
 
 SPEC = Record(
     "a spec",
@@ -327,9 +386,10 @@ SPEC = Record(
             MapOf(NAME, Either({Scalar: CONSTANT, Mapping: PARAMETER})),
             "run-time arguments of the generated code, with defaults",
         ),
+        Field("inputs", ListOf(NAME, least=1), "parameters that change while it runs: the inputs of an FMU"),
         Field("time", TIME, "the name of the time, for a Hamiltonian that depends on it"),
         Field("definitions", FORMULAS, "named sub-expressions, usable in every expression"),
-        Field("lattice", LATTICE, "how many like sites are related; the coordinates are those of every site"),
+        Field("lattice", LATTICE, "identical sites on a grid, on a graph, or all paired; each has the coordinates"),
         Field("poisson", POISSON, "the Poisson structure, in one of its forms", required=True),
         Field(
             "hamiltonian",
@@ -344,8 +404,8 @@ SPEC = Record(
         Field("invariants", FORMULAS, "further first integrals by name; checked"),
         Field(
             "observables",
-            FORMULAS,
-            "quantities to record by name; also with sign, min, max, heaviside, if(a < b, c, d)",
+            MapOf(NAME, Either({Scalar: FORMULA, Mapping: OBSERVABLE})),
+            "quantities to record by name, also with sign, min, max, heaviside, if(a < b, c, d); of lattices {mean: x}",
         ),
         Field(
             "birealisation", Either({Scalar: KIND, Mapping: BIREALISATION}), "the bi-realisation to use", default="auto"
@@ -367,8 +427,13 @@ SPEC = Record(
             "scheme gauss: whether steps are exact Poisson maps, or to truncation only",
             default="exact",
         ),
-        Field("profile", Choice(PROFILES), "small is short and readable, without blocks and searches", default="fast"),
-        Field("real", Choice(REALS), "the numbers of the C; float goes with the profile small", default="double"),
+        Field(
+            "profile",
+            Choice(PROFILES),
+            "fast, or small: short readable code, without blocks and gauge search",
+            default="fast",
+        ),
+        Field("real", Choice(REALS), "the number type of the C; float needs profile: small", default="double"),
         Field("without", ListOf(Choice(PARTS)), "parts of the code to leave out"),
         Field("solver", SOLVER, "the inner solve of a step"),
         Field("tangent", Boolean(), "also generate step_tangent, the derivative of a step", default=False),
@@ -378,7 +443,7 @@ SPEC = Record(
         Field(
             "modified_hamiltonian",
             Integer(0, limits.CORRECTIONS, limit=True),
-            "also generate the modified Hamiltonian, with so many correction terms",
+            "also generate the modified Hamiltonian, with this number of corrections",
             default=0,
         ),
         Field(

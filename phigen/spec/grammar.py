@@ -72,7 +72,7 @@ class Scope:
     piecewise: bool = False
 
     def lookup(self, name: str) -> Expression | None:
-        """What a name stands for; declared names win over constants."""
+        """Expression that a name stands for; declared names win over constants."""
         if name in self.names:
             return self.names[name]
         if name in self.refused:
@@ -139,30 +139,30 @@ def tokens(source: str, report: Report) -> list[Token] | None:
         message = f"the expression has {len(source)} characters, more than the limit of {limits.EXPRESSION_LENGTH}"
         report(message, 0, "name parts of it under definitions", limit=True)
         return None
-    found: list[Token] = []
-    told: set[str] = set()
+    result: list[Token] = []
+    reported: set[str] = set()
     for match in _TOKEN.finditer(source):
         kind = match.lastgroup
         assert kind is not None
         text, index = match.group(kind), match.start(kind)
-        if kind == "other" and text not in told:
+        if kind == "other" and text not in reported:
             shape = shown(text) if text.isascii() and text.isprintable() else describe(text)
             report(f"the character {shape} does not belong in an expression", index, _CHARACTER_HINTS.get(text, ""))
-            told.add(text)
+            reported.add(text)
         if kind == "other":
             if text not in _MEANT:
                 return None
             kind, text = "operator", _MEANT[text]
-        found.append(Token(kind, text, index))
+        result.append(Token(kind, text, index))
         if kind == "end":
             break
-    return found
+    return result
 
 
 def names_in(source: str) -> list[str]:
     """The names an expression mentions, in order, without reporting errors."""
-    found = tokens(source, lambda message, index, hint="", *, limit=False: None)
-    return [t.text for t in found or [] if t.kind == "name"]
+    listed = tokens(source, lambda message, index, hint="", *, limit=False: None)
+    return [t.text for t in listed or [] if t.kind == "name"]
 
 
 def parse(source: str, scope: Scope, report: Report) -> Expression | None:
@@ -177,11 +177,11 @@ def parse(source: str, scope: Scope, report: Report) -> Expression | None:
         failed = True
         report(message, index, hint, limit=limit)
 
-    found = tokens(source, note)
-    if found is None:
+    source_tokens = tokens(source, note)
+    if source_tokens is None:
         return None
     try:
-        result = Parser(found, scope, note).whole()
+        result = Parser(source_tokens, scope, note).whole()
     except _AbandonedError:
         return None
     return None if failed else result
@@ -192,8 +192,8 @@ class Parser:
 
     nothing = symbol(Symbol("unknown", ""))  # stands for what has an error
 
-    def __init__(self, found: list[Token], scope: Scope, report: Report) -> None:
-        self.tokens, self.scope, self.report = found, scope, report
+    def __init__(self, source_tokens: list[Token], scope: Scope, report: Report) -> None:
+        self.tokens, self.scope, self.report = source_tokens, scope, report
         self.position = self.depth = self.nodes = 0
         self.unknown: set[str] = set()
 
@@ -386,8 +386,8 @@ class Parser:
             arguments.append(self.nested(self.sum, opening))
         self.close(opening)
         if len(arguments) != arity:
-            wanted = "1 argument" if arity == 1 else f"{arity} arguments"
-            self.report(f"{token.text} takes {wanted}, not {len(arguments)}", token.index)
+            signature = "1 argument" if arity == 1 else f"{arity} arguments"
+            self.report(f"{token.text} takes {signature}, not {len(arguments)}", token.index)
             return ONE
         return self.applied(token, arguments)
 
@@ -396,15 +396,15 @@ class Parser:
         name = token.text
         if not self.scope.piecewise:
             hint = "H, brackets, Casimirs and what steps depend on need derivatives"
-            raise self.abandon(f"{name} is for observables and stop alone", token.index, hint)
+            raise self.abandon(f"{name} is allowed in observables and stop only", token.index, hint)
         arguments = [self.nested(self.condition if name == "if" else self.sum, opening)]
         while self.accept(","):
             arguments.append(self.nested(self.sum, opening))
         self.close(opening)
         arity = PIECEWISE_FUNCTIONS[name]
         if len(arguments) != arity:
-            wanted = "a condition and 2 values" if name == "if" else counted(arity, "argument")
-            self.report(f"{name} takes {wanted}, not {counted(len(arguments), 'argument')}", token.index)
+            signature = "a condition and 2 values" if name == "if" else counted(arity, "argument")
+            self.report(f"{name} takes {signature}, not {counted(len(arguments), 'argument')}", token.index)
             return ONE
         return _PIECEWISE[name](*arguments)
 

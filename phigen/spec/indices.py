@@ -23,10 +23,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Indices:
-    """What may have an index, and which.
+    """Names that may have an index, and the indices that they may have.
 
-    ``names`` maps what has a value at sites to that at the site itself; ``refused`` has messages and hints for names
-    that have none. On a grid an index says how far away; on a bond, ``ends`` are what it may be.
+    ``names`` maps names with values at sites to the expression at the site itself; ``refused`` has messages and hints
+    for names without. On a grid an index is an offset from the site; on a bond it is one of ``ends``.
     """
 
     neighbours: Neighbours
@@ -55,23 +55,23 @@ class Indices:
     def _end(self, parser: Parser, opening: Token) -> str:
         token = parser.advance()
         if token.text not in self.ends:
-            message = f"the index {shown(token.text)} is no end of a bond or pair"
+            message = f"the index {shown(token.text)} is not an end of a bond or pair"
             raise parser.abandon(message, token.index, "write [a] or [b]")
         self._closed(parser, opening)
         return token.text
 
     def _offset(self, parser: Parser, opening: Token) -> tuple[int, ...]:
-        axes, found = self.neighbours.axes, dict[str, int]()
+        axes, steps = self.neighbours.axes, dict[str, int]()
         while True:
             token = parser.advance()
             if token.text not in axes:
                 raise parser.abandon(*self._no_axis(token))
-            if token.text in found:
+            if token.text in steps:
                 raise parser.abandon(f"the axis {token.text!r} is in this index twice", token.index)
-            found[token.text] = self._step(parser)
+            steps[token.text] = self._step(parser)
             if not parser.accept(","):
                 self._closed(parser, opening)
-                return tuple(found.get(axis, 0) for axis in axes)
+                return tuple(steps.get(axis, 0) for axis in axes)
 
     def _no_axis(self, token: Token) -> tuple[str, int, str]:
         axes = self.neighbours.axes

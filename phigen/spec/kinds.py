@@ -35,7 +35,7 @@ Schema = dict[str, Any]
 
 @dataclass
 class Reader:
-    """What reading produces beside the values: the errors, the place of every part, and what its key is for."""
+    """Results of reading beside the values: the errors, and the place and the purpose of every part."""
 
     problems: Problems
     locations: dict[Path, Location] = field(default_factory=dict)
@@ -67,8 +67,8 @@ class Kind:
 
     def mismatch(self, node: Node, path: Path, reader: Reader, hint: str = "") -> None:
         """Report a node of the wrong kind; without a better hint, with what its key is for."""
-        found = f"{label(path)}expected {self.expected}, found {kind_of(node)}"
-        reader.error(node, found, hint or reader.purposes.get(path, ""))
+        message = f"{label(path)}expected {self.expected}, found {kind_of(node)}"
+        reader.error(node, message, hint or reader.purposes.get(path, ""))
 
 
 @dataclass(frozen=True)
@@ -347,20 +347,20 @@ class Record(Kind):
     def _meant(self, name: str, node: MappingNode) -> str:
         """The key that a name which is none stands for, of those that are like it one that is not there; or ""."""
         known = [f.key for f in self.fields]
-        found = intended(name, known, MEANT)
-        if found in node.entries and found != MEANT.get(name):
-            found = intended(name, [k for k in known if k not in node.entries], MEANT) or found
-        return found
+        key = intended(name, known, MEANT)
+        if key in node.entries and key != MEANT.get(name):
+            key = intended(name, [k for k in known if k not in node.entries], MEANT) or key
+        return key
 
     def _hint(self, name: str, node: MappingNode) -> str:
-        """What is meant by the name of a key that is none."""
+        """Hint for an unknown key: the place of the key, or the name that is probably meant."""
         meant, known = MEANT.get(name, name), [f.key for f in self.fields]
         misplaced = self.elsewhere.get(name) or ("" if meant in known else self.elsewhere.get(meant, ""))
-        found = self._meant(name, node)
-        return misplaced or (f"did you mean {found!r}?" if found else "") or self.instructions()
+        key = self._meant(name, node)
+        return misplaced or (f"did you mean {key!r}?" if key else "") or self.instructions()
 
     def instructions(self, node: Node | None = None) -> str:
-        """How the mapping is written, for who wrote something else: where that is the name of a key, with this key."""
+        """Hint with the form of the mapping, for a node of another form; if the node names a key, with this key."""
         named = next((f for f in self.fields if isinstance(node, Scalar) and f.key == node.text), None)
         if named is not None and isinstance(named.kind, Record) and named.kind.example:
             return f"write {{{named.key}: {named.kind.example}}}"
@@ -371,11 +371,13 @@ class Record(Kind):
         """Report missing keys, and keys that exclude each other."""
         known = [f.key for f in self.fields]
         strange = set(node.entries) - set(known)  # reported already
-        given = {*node.entries, *(self._meant(name, node) for name in strange)}
-        for wanted in self.fields:
-            if wanted.required and wanted.key not in given:
+        present = {*node.entries, *(self._meant(name, node) for name in strange)}
+        for key_field in self.fields:
+            if key_field.required and key_field.key not in present:
                 reader.error(
-                    node, f"{self.what}: the key {wanted.key!r} is missing", f"{wanted.key}: {wanted.description}"
+                    node,
+                    f"{self.what}: the key {key_field.key!r} is missing",
+                    f"{key_field.key}: {key_field.description}",
                 )
         forms = [name for name in node.entries if name in self.one]
         for name in forms[1:]:

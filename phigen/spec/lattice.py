@@ -23,13 +23,13 @@ COUPLINGS = {"bonds": "graph", "pairs": "pairs"}
 _WANTED = {"graph": "lattice: {graph: NAME}", "pairs": "lattice: {pairs: all}"}
 
 
-def densities(given: Any, declared: Declarations) -> tuple[Expression, Expression]:
+def densities(raw: Any, declared: Declarations) -> tuple[Expression, Expression]:
     """H of a site, and of a bond or pair, from ``hamiltonian:``, an expression or a mapping."""
-    if not isinstance(given, dict):
-        return declared.formula(given, declared.dated_scope()) or ZERO, ZERO
-    sites, coupling = declared.formula(given.get("sites"), declared.dated_scope()), ZERO
+    if not isinstance(raw, dict):
+        return declared.formula(raw, declared.dated_scope()) or ZERO, ZERO
+    sites, coupling = declared.formula(raw.get("sites"), declared.dated_scope()), ZERO
     for key, needed in COUPLINGS.items():
-        node = given.get(key)
+        node = raw.get(key)
         if node is None:
             continue
         if declared.relation != needed:
@@ -42,10 +42,10 @@ def densities(given: Any, declared: Declarations) -> tuple[Expression, Expressio
     return sites or ZERO, coupling
 
 
-def casimirs(given: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, Expression], dict[str, str]]:
+def casimirs(raw: Mapping[str, Any], declared: Declarations) -> tuple[dict[str, Expression], dict[str, str]]:
     """The densities of Casimirs, and whether they belong to sites, to a sum or to a product, where the spec says it."""
-    found, kinds = {}, {}
-    for name, (key, entry) in given.items():
+    formulas, kinds = {}, {}
+    for name, (key, entry) in raw.items():
         options = entry if isinstance(entry, dict) else {"value": entry}
         value = declared.formula(options.get("value"), declared.scope())
         if "at" in options:
@@ -53,8 +53,8 @@ def casimirs(given: Mapping[str, Any], declared: Declarations) -> tuple[dict[str
             if declared.lattice is None:
                 declared.reader.error(key, f"{name}: at is for specs with lattice:", "give the expression alone")
         if value is not None:
-            found[name] = value
-    return found, kinds
+            formulas[name] = value
+    return formulas, kinds
 
 
 def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapping[str, str], **parts: Any) -> Lattice:
@@ -63,16 +63,30 @@ def with_kinds(lattice: Lattice, casimirs: Mapping[str, Expression], kinds: Mapp
     return replace(lattice, kinds={**local, **kinds}, **parts)
 
 
+_SECTIONS = "sections are those of ordinary systems; observables: of the lattice are recorded at every frame"
+
+#: Keys of runs that lattices do not have: the reasons, and what to do.
+_ABSENT_IN_RUNS = {
+    "exact": "closed forms are those of ordinary systems; phigen show --expand prints a lattice as one",
+    "section": _SECTIONS,
+    "direction": _SECTIONS,
+    "until": "runs of lattices end after whole steps: give steps, or duration, a multiple of the step",
+    "every": "frames are ends of steps: give stride; trajectory.at([t, …]) in Python makes states between",
+    "stop": "runs of lattices end after whole steps: give steps; observables: are recorded at every frame",
+    "members": "sweeps: integrates many members, each with its own path",
+}
+
+
 def run_of_lattice(name: str, raw: Raw, declared: Declarations) -> LatticeRun | None:
-    """What a run says of sizes, bonds, the initial state, and parameters that are arrays."""
+    """Read the sizes, bonds, initial state and array parameters of a run."""
     if declared.lattice is None:
         for key in ("sizes", "bonds"):
             if key in raw:
                 _fail(name, key, f"{key} is for specs with lattice:", declared)
         return None
-    for key in ("exact", "section", "direction", "until", "every", "stop", "members"):
+    for key, hint in _ABSENT_IN_RUNS.items():
         if key in raw:
-            _fail(name, key, f"{key} is not available for lattices", declared)
+            _fail(name, key, f"{key} is not available for lattices", declared, hint)
     return LatticeRun(
         _sizes(name, raw, declared), _state(name, raw.get("initial"), declared), _bonds(name, raw, declared)
     )
@@ -84,16 +98,16 @@ def _fail(name: str, key: str, message: str, declared: Declarations, hint: str =
 
 def _sizes(name: str, raw: Raw, declared: Declarations) -> tuple[int, ...]:
     sizes, axes = raw.get("sizes"), declared.lattice.axes if declared.lattice else ()
-    wanted = len(axes) or 1
+    number = len(axes) or 1
     if sizes is None:
         if axes and ("runs", name, "sizes") not in declared.reader.locations:
-            example = ", ".join(["32"] * wanted)
+            example = ", ".join(["32"] * number)
             declared.reader.problems.add(
                 f"the run {name!r} has no sizes", declared.reader.locations["runs", name], f"sizes: [{example}]"
             )
         return ()
-    if len(sizes) != wanted:
-        what = f"{counted(wanted, 'axis', 'axes')} {', '.join(axes)}" if axes else "the number of sites"
+    if len(sizes) != number:
+        what = f"{counted(number, 'axis', 'axes')} {', '.join(axes)}" if axes else "the number of sites"
         _fail(name, "sizes", f"sizes: {counted(len(sizes), 'size')} for {what}", declared)
     sites = 1
     for size in sizes:
@@ -105,57 +119,57 @@ def _sizes(name: str, raw: Raw, declared: Declarations) -> tuple[int, ...]:
 
 
 def _bonds(name: str, raw: Raw, declared: Declarations) -> tuple[tuple[int, int], ...] | str:
-    given = raw.get("bonds")
+    bonds = raw.get("bonds")
     if declared.relation != "graph":
-        if given is not None:
+        if bonds is not None:
             _fail(name, "bonds", "bonds are for lattice: {graph: NAME}", declared)
         return ()
-    if given is None:
+    if bonds is None:
         place, hint = declared.reader.locations["runs", name], "bonds: edges.csv, or bonds: [[0, 1], [1, 2]]"
         declared.reader.problems.add(f"the run {name!r} has no bonds", place, hint)
         return ()
-    if isinstance(given, str):
-        if not given.endswith(".csv"):
-            _fail(name, "bonds", f"bonds: the file {shown(given)} must end in .csv", declared)
-        return given
+    if isinstance(bonds, str):
+        if not bonds.endswith(".csv"):
+            _fail(name, "bonds", f"bonds: the file {shown(bonds)} must end in .csv", declared)
+        return bonds
     pairs = []
-    for index, pair in enumerate(given):
+    for index, pair in enumerate(bonds):
         if pair is None or None in pair:
             continue
         if len(pair) != 2 or pair[0] == pair[1]:
-            message = f"bonds: {pair} is no bond of two different sites"
+            message = f"bonds: {pair} is not a bond of two different sites"
             declared.reader.problems.add(message, declared.reader.locations["runs", name, "bonds", index])
         else:
             pairs.append((pair[0], pair[1]))
     return tuple(pairs)
 
 
-def _state(name: str, given: Any, declared: Declarations) -> dict[str, Values]:
+def _state(name: str, initial: Any, declared: Declarations) -> dict[str, Values]:
     """Initial values by field, or of all fields under the name ``""``."""
     fields = declared.coordinates
-    if given is None:
+    if initial is None:
         return {}
-    if isinstance(given, Scalar):
-        if not given.text.endswith(".npy"):
+    if isinstance(initial, Scalar):
+        if not initial.text.endswith(".npy"):
             hint = "initial: {…} by field, or {random: sphere, seed: 1}"
-            declared.reader.error(given, f"initial: the file {shown(given.text)} must end in .npy", hint)
-        return {"": Values(file=given.text)}
-    if isinstance(given, list):
-        if len(given) != len(fields) and not declared.incomplete:
+            declared.reader.error(initial, f"initial: the file {shown(initial.text)} must end in .npy", hint)
+        return {"": Values(file=initial.text)}
+    if isinstance(initial, list):
+        if len(initial) != len(fields) and not declared.incomplete:
             _fail(
                 name,
                 "initial",
-                f"initial: {counted(len(given), 'value')} for {counted(len(fields), 'field')}",
+                f"initial: {counted(len(initial), 'value')} for {counted(len(fields), 'field')}",
                 declared,
             )
-        found = {c: values(node, declared) for c, node in zip(fields, given, strict=False)}
-    elif "random" in given and "random" not in fields:
-        return {"": values(given, declared, whole=True) or Values()}
+        state = {c: values(node, declared) for c, node in zip(fields, initial, strict=False)}
+    elif "random" in initial and "random" not in fields:
+        return {"": values(initial, declared, whole=True) or Values()}
     else:
-        for c, (key, _) in given.items():
+        for c, (key, _) in initial.items():
             if c not in fields and not declared.incomplete:
                 declared.reader.error(key, f"{shown(c)} is not a coordinate", did_you_mean(c, fields))
-        if missing := [c for c in fields if c not in given]:
+        if missing := [c for c in fields if c not in initial]:
             _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
-        found = {c: values(node, declared) for c, (_, node) in given.items()}
-    return {c: v for c, v in found.items() if v is not None}
+        state = {c: values(node, declared) for c, (_, node) in initial.items()}
+    return {c: v for c, v in state.items() if v is not None}

@@ -1,4 +1,4 @@
-"""What a spec file says, as data: the first stage of the compiler.
+"""Content of a spec file as data: the first stage of the compiler.
 
 Nothing here is checked mathematically. Expressions have their definitions substituted and use the names
 of the spec's coordinates and parameters as symbols; ``p_NAME`` in a custom bi-realisation is the
@@ -48,8 +48,10 @@ class Values:
 class Parameter:
     """A run-time argument of the generated code, with its default.
 
+    ``small`` says that what it multiplies is a small part of H.
     ``at`` says of a lattice whether it is one number (``all``), or an array with a value at each of the ``sites`` or
-    ``bonds``; ``values`` are its defaults where they are not all ``value``.
+    ``bonds``; ``values`` are its defaults where they are not all ``value``. ``unit`` is text for readers: nothing is
+    converted.
     """
 
     name: str
@@ -58,6 +60,8 @@ class Parameter:
     description: str = ""
     at: str = "all"
     values: Values | None = None
+    unit: str = ""
+    small: bool = False
 
 
 @dataclass(frozen=True)
@@ -161,7 +165,7 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class Extras:
-    """What is asked of the code beside the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
+    """Functions of the code beside the solver: ``tangent`` adds ``step_tangent``, the derivative of a step.
 
     ``modified_hamiltonian`` adds the function of that name, with so many correction terms; 0 for none. ``without`` are
     parts to leave out (`phigen.spec.names.PARTS`). ``adjoint`` adds the transpose of a step and of a run, along state
@@ -225,13 +229,19 @@ class Run:
     every: Fraction | None = None  # of physical time between rows that are stored, in place of the stride
     average: AverageChoice = AverageChoice()
     stop: Expression | None = None  # it ends where this passes through 0
+    record: tuple[str, ...] = ()  # columns of the output: state, energy, Casimirs, observables; all by default
     description: str = ""
     lattice: LatticeRun | None = None
+
+    @property
+    def records_numbers(self) -> bool:
+        """Whether no states are recorded."""
+        return bool(self.record) and "state" not in self.record
 
 
 @dataclass(frozen=True)
 class LatticeRun:
-    """What a run of a lattice says besides.
+    """Further settings of a run of a lattice.
 
     ``sizes`` are those of the axes; where there are none, the number of sites. ``state`` has initial values by field,
     or of all fields under the name ``""``. ``bonds`` are pairs of sites, counted from 0, or a file with them.
@@ -259,20 +269,20 @@ class Axis:
 
     @property
     def size(self) -> int:
-        """How many values there are, 0 if they are drawn."""
+        """Number of values, 0 if they are drawn."""
         return len(self.values) or self.count
 
 
 @dataclass(frozen=True)
 class Statistic:
-    """What a sweep keeps of an observable: ``mean`` or ``std`` over the run, or, for "", its value at the end."""
+    """Value of an observable that a sweep stores: one of `STATISTICS` over the run, or, for "", the last."""
 
     observable: str
     of: str = ""
 
     @classmethod
     def read(cls, word: str, observables: Iterable[str]) -> Statistic | None:
-        """Return what ``M``, ``mean(M)`` or ``std(M)`` asks for; None if that is nothing."""
+        """Return what ``M``, ``mean(M)``, ``std(M)`` or ``error(M)`` asks for; None if that is nothing."""
         function, opened, rest = word.partition("(")
         name = rest.removesuffix(")").strip() if opened else function
         known = name in observables and (not opened or (function in STATISTICS and rest.endswith(")")))
@@ -299,14 +309,26 @@ class Sweep:
 
 
 @dataclass(frozen=True)
+class Reduction:
+    """Reduction of the density of an observable to one number: its ``kind`` is one of `phigen.spec.names.REDUCTIONS`.
+
+    ``over`` says what the density belongs to: ``sites``, ``bonds`` or ``pairs``.
+    """
+
+    kind: str
+    over: str = "sites"
+
+
+@dataclass(frozen=True)
 class Lattice:
-    """That the coordinates of a spec are those of every site of a lattice, and how sites are related.
+    """Relation between the sites of a lattice, each of which has the coordinates of the spec.
 
     ``axes`` name the directions of a grid, with the ``boundary`` of each: ``periodic`` or ``open``. ``graph`` is the
     name of the list of bonds; ``pairs`` says that each site is paired with each other. ``poisson`` and ``hamiltonian``
     of the spec are those of a site. ``bonds`` is the density of H of a bond or a pair. ``brackets`` maps (f, g), as
     symbols of two different sites, to their bracket, in one order of the two. ``kinds`` says of Casimirs whether they
-    are those of ``sites``, a ``sum`` or a ``product``.
+    are those of ``sites``, a ``sum`` or a ``product``. ``reductions`` says how observables are reduced to one number;
+    those without a reduction are fields, with a value at each site.
     """
 
     axes: tuple[str, ...] = ()
@@ -316,6 +338,7 @@ class Lattice:
     bonds: Expression = ZERO
     brackets: Mapping[tuple[str, str], Expression] = field(default_factory=dict)
     kinds: Mapping[str, str] = field(default_factory=dict)
+    reductions: Mapping[str, Reduction] = field(default_factory=dict)
 
     @property
     def indices(self) -> tuple[str, ...]:
@@ -330,7 +353,7 @@ class Lattice:
 
 @dataclass(frozen=True)
 class SpecForces:
-    """What ``forces:`` and ``damping:`` say: ζ and f by coordinates, where they are not 0, and λ."""
+    """Forces of ``forces:`` and ``damping:``: ζ and f by coordinates, where they are not 0, and λ."""
 
     covector: Mapping[str, Expression] = field(default_factory=dict)
     vector: Mapping[str, Expression] = field(default_factory=dict)
@@ -367,6 +390,7 @@ class Spec:
     forces: SpecForces = SpecForces()
     noise: Mapping[str, SpecNoise] = field(default_factory=dict)
     parameters: tuple[Parameter, ...] = ()
+    inputs: tuple[str, ...] = ()  # the parameters that change while a program runs
     casimirs: Mapping[str, Expression] = field(default_factory=dict)
     invariants: Mapping[str, Expression] = field(default_factory=dict)
     observables: Mapping[str, Expression] = field(default_factory=dict)  # to record; nothing is proved of them
@@ -395,6 +419,12 @@ class Spec:
     source: str = ""
     locations: Mapping[tuple[Any, ...], Location] = field(default_factory=dict)
     written: Spec | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Names of the observables that are one number each; of a lattice those of sites are none."""
+        lattice = self.lattice
+        return tuple(name for name in self.observables if lattice is None or name in lattice.reductions)
 
     @property
     def dimension(self) -> int:

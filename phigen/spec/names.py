@@ -107,14 +107,21 @@ DIRECTIONS = ("rising", "falling", "both")
 #: What a sweep may vary besides parameters and initial values, and what it may keep.
 SWEEP_NAMES = ("step", "start", "seed")
 KEPT = ("final", "energy_error", "casimir_error", "lyapunov", "crossings")
-#: What a sweep may keep of an observable M: M at the end, and mean(M) and std(M) over the run.
-STATISTICS = ("mean", "std")
+#: How the density of an observable of a lattice becomes one number; those that add up densities.
+REDUCTIONS = ("mean", "sum", "max", "min")
+ADDITIVE = ("mean", "sum")
+#: What the density of an observable may belong to.
+OVER = ("sites", "bonds", "pairs")
+#: What a sweep may keep of an observable M beside M at the end: over the run its mean(M), its standard deviation
+#: std(M), and error(M), the standard error of the mean.
+STATISTICS = ("mean", "std", "error")
 
 #: How attitudes are given.
 RECONSTRUCTIONS = ("quaternion", "matrix")
 
 #: Compositions of the flows of the parts of a splitting, and all.
-FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient")
+NEAR_INTEGRABLE = ("saba-4-2", "saba-6-2", "saba-8-2", "saba-10-2", "aba-8-4", "aba-8-6-4", "aba-10-6-4")
+FLOW_COMPOSITIONS = ("blanes-moan", "blanes-moan-rkn", "nystrom", "force-gradient", *NEAR_INTEGRABLE)
 COMPOSITIONS = (
     "auto",
     "none",

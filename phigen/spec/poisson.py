@@ -34,25 +34,25 @@ Rows = list[list[Scalar | None] | None]
 Pairs = dict[tuple[int, int], tuple[Scalar, Expression]]
 
 
-def poisson_form(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+def poisson_form(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
     """The form of ``poisson:``, or ``None`` after errors."""
     for form, read in _FORMS.items():
-        if form in given:
-            return read(given[form], declared if form in ("matrix", "brackets") else replace(declared, indexed=False))
+        if form in raw:
+            return read(raw[form], declared if form in ("matrix", "brackets") else replace(declared, indexed=False))
     return None
 
 
-def brackets_of_sites(given: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
+def brackets_of_sites(raw: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
     """The brackets of fields of different sites of a lattice, in one order: on a grid, or along bonds."""
-    if "bonds" in given:
-        return _along_bonds(given["bonds"], declared)
-    return _of_neighbours(given.get("brackets") or {}, declared) if declared.relation == "grid" else {}
+    if "bonds" in raw:
+        return _along_bonds(raw["bonds"], declared)
+    return _of_neighbours(raw.get("brackets") or {}, declared) if declared.relation == "grid" else {}
 
 
-def _of_neighbours(given: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
-    found: dict[tuple[str, str], tuple[Scalar, Expression]] = {}
+def _of_neighbours(table: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
+    brackets: dict[tuple[str, str], tuple[Scalar, Expression]] = {}
     space, scope = declared.neighbours, declared.scope()
-    for key, row in given.values():
+    for key, row in table.values():
         for other, cell in (row or {}).values():
             if "[" not in other.text or key.text not in declared.coordinates:
                 continue
@@ -64,23 +64,23 @@ def _of_neighbours(given: Mapping[str, Any], declared: Declarations) -> dict[tup
                 declared.reader.error(other, f"{other.text!r} is at the site itself", f"write {base}")
                 continue
             back = base, space.at(key.text, minus(offset))
-            if back in found and space.shifted([neg(value)], minus(offset))[0] is not found[back][1]:
-                where = found[back][0].location
+            if back in brackets and space.shifted([neg(value)], minus(offset))[0] is not brackets[back][1]:
+                where = brackets[back][0].location
                 message = f"{{{key.text}, {other.text}}} is not written as the negative of its mirror image"
                 declared.reader.error(other, message, f"that is in line {where.line}, column {where.column}")
-            elif back not in found:
-                found[key.text, space.at(base, offset)] = other, value
-    return {pair: value for pair, (_, value) in found.items()}
+            elif back not in brackets:
+                brackets[key.text, space.at(base, offset)] = other, value
+    return {pair: value for pair, (_, value) in brackets.items()}
 
 
-def _along_bonds(given: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
+def _along_bonds(table: Mapping[str, Any], declared: Declarations) -> dict[tuple[str, str], Expression]:
     if declared.relation != "graph":
         message = "poisson: bonds needs lattice: {graph: NAME}"
         _fail(declared, ("bonds",), message, 'neighbours on a grid are named in brackets: {x: {"y[i+1]": …}}')
         return {}
-    found: dict[tuple[str, str], Expression] = {}
+    brackets: dict[tuple[str, str], Expression] = {}
     space, scope = declared.neighbours, declared.bond_scope()
-    for key, row in given.values():
+    for key, row in table.values():
         first = declared.neighbour(key, ENDS)
         for other, cell in (row or {}).values():
             second, value = declared.neighbour(other, ENDS), declared.formula(cell, scope)
@@ -88,13 +88,13 @@ def _along_bonds(given: Mapping[str, Any], declared: Declarations) -> dict[tuple
                 continue
             pair = space.at(*first), space.at(*second)
             if {first[1], second[1]} != {(end,) for end in ENDS}:
-                declared.reader.error(other, "a bracket along a bond is one of its two ends, a and b", "x[a] with x[b]")
-            elif pair[::-1] in found and found[pair[::-1]] is not neg(value):
+                declared.reader.error(other, "a bracket along a bond couples its two ends, a and b", "x[a] with x[b]")
+            elif pair[::-1] in brackets and brackets[pair[::-1]] is not neg(value):
                 message = f"{{{pair[0]}, {pair[1]}}} is not written as the negative of {{{pair[1]}, {pair[0]}}}"
                 declared.reader.error(other, message, "give one of them")
-            elif pair[::-1] not in found:
-                found[pair] = value
-    return found
+            elif pair[::-1] not in brackets:
+                brackets[pair] = value
+    return brackets
 
 
 def _fail(declared: Declarations, path: tuple[Any, ...], message: str, hint: str = "") -> None:
@@ -107,7 +107,7 @@ def _entries(
     """A size×size matrix of expressions; errors name the row."""
     what, before = ".".join(str(p) for p in path if isinstance(p, str)), len(declared.reader.problems.found)
     if len(rows) != size:
-        hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix is square"
+        hint = "one for each coordinate" if size == len(declared.coordinates) else "the matrix must be square"
         _fail(declared, path, f"{what}: expected {counted(size, 'row')}, found {len(rows)}", hint)
     matrix = []
     for i, row in enumerate(rows):
@@ -133,10 +133,10 @@ def _dimension(declared: Declarations, otherwise: int) -> int:
     return otherwise if declared.incomplete else len(declared.coordinates)
 
 
-def _brackets(given: Mapping[str, Any], declared: Declarations) -> PoissonForm:
+def _brackets(table: Mapping[str, Any], declared: Declarations) -> PoissonForm:
     pairs: Pairs = {}
     scope = declared.scope()
-    for key, row in given.values():
+    for key, row in table.values():
         i = declared.coordinate(key)
         for other, cell in (row or {}).values():
             if "[" in other.text and declared.relation == "grid":  # see `_of_neighbours`
@@ -168,18 +168,18 @@ def _state(
         pairs[i, j] = b, value
 
 
-def _canonical(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+def _canonical(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
     seen: dict[str, str] = {}
     for key in ("q", "p"):
-        for node in given.get(key, ()):
+        for node in raw.get(key, ()):
             if node is None or declared.coordinate(node) is None:
                 continue
             if node.text in seen:
                 declared.reader.error(node, f"canonical: {node.text!r} is already in {seen[node.text]}")
             seen.setdefault(node.text, key)
-    if "q" not in given or "p" not in given:
+    if "q" not in raw or "p" not in raw:
         return None
-    q, p = given["q"], given["p"]
+    q, p = raw["q"], raw["p"]
     if len(q) != len(p):
         return _fail(declared, ("canonical",), f"canonical: {len(q)} positions q, but {len(p)} momenta p")
     if None in q or None in p:
@@ -187,14 +187,14 @@ def _canonical(given: Mapping[str, Any], declared: Declarations) -> PoissonForm 
     return CanonicalForm(tuple(node.text for node in q), tuple(node.text for node in p))
 
 
-def _lie_algebra(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
-    sign = -1 if given.get("sign") == "minus" else 1
-    if "name" in given:
-        return _family(given["name"], sign, declared)
-    if "matrices" in given:
-        return _spanned(given["matrices"], sign, declared)
-    if "structure_constants" in given:
-        return _structure_constants(given["structure_constants"], sign, declared)
+def _lie_algebra(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+    sign = -1 if raw.get("sign") == "minus" else 1
+    if "name" in raw:
+        return _family(raw["name"], sign, declared)
+    if "matrices" in raw:
+        return _spanned(raw["matrices"], sign, declared)
+    if "structure_constants" in raw:
+        return _structure_constants(raw["structure_constants"], sign, declared)
     return None
 
 
@@ -214,25 +214,28 @@ def _family(node: Scalar, sign: int, declared: Declarations) -> PoissonForm | No
     return LieAlgebraForm(sign=sign, family=family, size=n)
 
 
-def _spanned(given: list[Rows | None], sign: int, declared: Declarations) -> PoissonForm | None:
-    path, n = ("lie_algebra", "matrices"), _dimension(declared, len(given))
-    if len(given) != n:
+def _spanned(rows_of_matrices: list[Rows | None], sign: int, declared: Declarations) -> PoissonForm | None:
+    path, n = ("lie_algebra", "matrices"), _dimension(declared, len(rows_of_matrices))
+    if len(rows_of_matrices) != n:
         _fail(
             declared,
             path,
-            f"lie_algebra: {counted(len(given), 'matrix', 'matrices')} for {counted(n, 'coordinate')}",
+            f"lie_algebra: {counted(len(rows_of_matrices), 'matrix', 'matrices')} for {counted(n, 'coordinate')}",
             "one for each coordinate",
         )
     scope = declared.constants("a matrix of a Lie algebra")
-    size = len(given[0] or ())
-    matrices = [_entries(m, (*path, i), declared, scope, size) if m is not None else None for i, m in enumerate(given)]
+    size = len(rows_of_matrices[0] or ())
+    matrices = [
+        _entries(m, (*path, i), declared, scope, size) if m is not None else None
+        for i, m in enumerate(rows_of_matrices)
+    ]
     return LieAlgebraForm(sign=sign, matrices=tuple(m for m in matrices if m is not None))
 
 
-def _structure_constants(given: Mapping[str, Any], sign: int, declared: Declarations) -> PoissonForm:
+def _structure_constants(table: Mapping[str, Any], sign: int, declared: Declarations) -> PoissonForm:
     scope, stated = declared.constants("a structure constant"), dict[int, Pairs]()
     constants: dict[int, dict[int, dict[int, Expression]]] = {}
-    for first, row in given.values():
+    for first, row in table.values():
         for second, sums in (row or {}).values():
             for third, cell in (sums or {}).values():
                 i, j, k = (_basis_index(key, declared) for key in (first, second, third))
@@ -253,18 +256,18 @@ def _basis_index(key: Scalar, declared: Declarations) -> int | None:
     )
 
 
-def _nambu(given: list[Scalar | None], declared: Declarations) -> PoissonForm | None:
-    wanted = len(declared.coordinates) - 2
-    if len(given) != wanted and not declared.incomplete:
-        _fail(declared, ("nambu",), f"nambu: expected n-2 = {wanted} Casimirs, found {len(given)}")
-    casimirs = [declared.formula(node, declared.scope()) for node in given]
+def _nambu(nodes: list[Scalar | None], declared: Declarations) -> PoissonForm | None:
+    number = len(declared.coordinates) - 2
+    if len(nodes) != number and not declared.incomplete:
+        _fail(declared, ("nambu",), f"nambu: expected n-2 = {number} Casimirs, found {len(nodes)}")
+    casimirs = [declared.formula(node, declared.scope()) for node in nodes]
     return NambuForm(tuple(c for c in casimirs if c is not None))
 
 
-def _product(given: list[Mapping[str, Any] | None], declared: Declarations) -> PoissonForm | None:
+def _product(entries: list[Mapping[str, Any] | None], declared: Declarations) -> PoissonForm | None:
     seen: dict[str, Scalar] = {}
     blocks: list[tuple[tuple[str, ...], PoissonForm | None]] = []
-    for i, block in enumerate(given):
+    for i, block in enumerate(entries):
         nodes = [node for node in (block or {}).get("coordinates", ()) if node is not None]
         for node in nodes:
             if declared.coordinate(node) is not None and node.text in seen:
@@ -276,13 +279,15 @@ def _product(given: list[Mapping[str, Any] | None], declared: Declarations) -> P
         blocks.append((names, poisson_form(block or {}, inner)))
     missing = [c for c in declared.coordinates if c not in seen]
     if missing and not declared.incomplete:
-        return _fail(declared, ("product",), f"product: {missing[0]!r} is in no block", "every coordinate is in one")
+        return _fail(
+            declared, ("product",), f"product: {missing[0]!r} is in no block", "every coordinate belongs to one block"
+        )
     complete = tuple((names, form) for names, form in blocks if form is not None)
     return ProductForm(complete) if len(complete) == len(blocks) else None
 
 
-def _pullback(given: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
-    image, other = given.get("map"), given.get("of")
+def _pullback(raw: Mapping[str, Any], declared: Declarations) -> PoissonForm | None:
+    image, other = raw.get("map"), raw.get("of")
     if image is None or other is None:
         return None
     n = len(declared.coordinates)
@@ -291,27 +296,27 @@ def _pullback(given: Mapping[str, Any], declared: Declarations) -> PoissonForm |
         _fail(declared, ("pullback", "map"), message)
     for name, (key, _) in image.items():
         if name in declared.nodes or name in declared.coordinates or name in SPEC_FUNCTIONS:
-            declared.reader.error(key, f"pullback: {name!r} has a meaning already", "choose another name")
+            declared.reader.error(key, f"pullback: {name!r} is in use already", "choose another name")
     names = tuple(image)
     forward = [declared.formula(node, declared.scope()) for _, node in image.values()]
     within = (*declared.within, "pullback", "of")
     inner = declared.inside(within, names, "this structure is in the coordinates of the map and cannot use")
     form = poisson_form(other, inner)
-    backward = _inverse(given["inverse"], declared, inner) if "inverse" in given else None
+    backward = _inverse(raw["inverse"], declared, inner) if "inverse" in raw else None
     if form is None or None in forward:
         return None
     return PullbackForm(names, form, tuple(e for e in forward if e is not None), backward)
 
 
 def _inverse(
-    given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, inner: Declarations
+    entries: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, inner: Declarations
 ) -> tuple[Expression, ...] | None:
-    for key, _ in given.values():
+    for key, _ in entries.values():
         declared.coordinate(key)
-    missing = [c for c in declared.coordinates if c not in given]
+    missing = [c for c in declared.coordinates if c not in entries]
     if missing and not declared.incomplete:
         return _fail(declared, ("pullback", "inverse"), f"pullback: inverse does not give {missing[0]!r}")
-    return tuple(inner.formula(given[c][1], inner.scope()) or ZERO for c in declared.coordinates if c in given)
+    return tuple(inner.formula(entries[c][1], inner.scope()) or ZERO for c in declared.coordinates if c in entries)
 
 
 _FORMS: dict[str, Callable[[Any, Declarations], PoissonForm | None]] = {

@@ -20,8 +20,8 @@ def shown(value: object, length: int = 60) -> str:
 
 def did_you_mean(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:
     """``did you mean 'x1'?``, or nothing when no candidate is meant; see `intended`."""
-    found = intended(word, candidates, others)
-    return f"did you mean {found!r}?" if found else ""
+    candidate = intended(word, candidates, others)
+    return f"did you mean {candidate!r}?" if candidate else ""
 
 
 def intended(word: str, candidates: Iterable[str], others: Mapping[str, str] = MappingProxyType({})) -> str:

@@ -1,4 +1,4 @@
-"""What of a line of YAML needs quotes because it has an index, ``x[i+1]``, inside { } or [ ]."""
+"""Parts of a line of YAML that need quotes: expressions with an index, ``x[i+1]``, inside { } or [ ]."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from typing import Any
@@ -12,7 +12,7 @@ from phigen.spec.declarations import Declarations
 from phigen.spec.grammar import Scope
 from phigen.spec.lattice import run_of_lattice
 from phigen.spec.model import AverageChoice, Run, Values
-from phigen.spec.problems import counted, did_you_mean, shown
+from phigen.spec.problems import counted, did_you_mean, one_of, shown
 from phigen.spec.values import values as site_values
 from phigen.spec.yaml_source import Scalar
 from phigen.symbolic.expression import Expression, substitute, symbol, symbols_of
@@ -24,15 +24,18 @@ _ADAPTING = ("auto", "adaptive", "variable")
 NEAR_INTEGER = Fraction(1, 10**9)
 
 
-def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
-    """The run of that name. After errors, which are reported, some of its values are stand-ins."""
+def run(name: str, raw: Mapping[str, Any], declared: Declarations, recordable: Mapping[str, str]) -> Run:
+    """The run of that name. After errors, which are reported, some of its values are stand-ins.
+
+    ``recordable`` maps what ``record`` may name to "", other names of the spec to why it may not.
+    """
     numbers = declared.numbers()
-    given = raw.get("step")
-    if given is not None and given.text in _ADAPTING and given.text not in numbers.names:
-        hint = "steps have one size; monitor: makes them equal in another time, which adapts them to the motion"
-        _fail(name, "step", f"step: {given.text} is no number", declared, hint)
-        given = None
-    step = declared.number(given, numbers)
+    step_node = raw.get("step")
+    if step_node is not None and step_node.text in _ADAPTING and step_node.text not in numbers.names:
+        hint = "the step size is fixed; monitor: makes steps equal in another time, which adapts them to the motion"
+        _fail(name, "step", f"step: {step_node.text} is not a number", declared, hint)
+        step_node = None
+    step = declared.number(step_node, numbers)
     if step == 0:
         _fail(name, "step", "the step is 0", declared)
         step = None
@@ -42,10 +45,12 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
     duration = declared.number(raw.get("duration"), numbers)
     steps = steps if until is not None else _steps(name, raw, duration, step, declared)
     every = declared.number(raw.get("every"), numbers)
-    if every is not None and (every <= 0 or "stride" in raw):
-        _fail(name, "every", "every must be positive, and there is no stride beside it", declared)
+    if every is not None and every <= 0:
+        _fail(name, "every", f"every: {raw['every'].text} is not positive", declared)
+    elif every is not None and "stride" in raw:
+        _fail(name, "every", "every and stride exclude each other", declared, "give one of them")
     if "direction" in raw and "section" not in raw:
-        _fail(name, "direction", "direction: there is no section", declared)
+        _fail(name, "direction", "direction needs a section", declared, "section: x1 records where x1 passes through 0")
     stride = raw.get("stride", 1)
     if steps is not None and stride > max(steps, 1):
         _fail(name, "stride", f"the stride {stride} is longer than the run of {steps} steps", declared)
@@ -70,6 +75,7 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
         every=every,
         stop=_crossed(name, "stop", raw, declared, replace(declared.dated_scope(), piecewise=True)),
         average=_average(raw.get("average"), declared),
+        record=_recorded(name, raw.get("record"), declared, recordable),
         description=raw.get("description", ""),
         lattice=replace(lattice, arrays=arrays) if lattice else None,
     )
@@ -77,6 +83,23 @@ def run(name: str, raw: Mapping[str, Any], declared: Declarations) -> Run:
 
 def _fail(name: str, key: str, message: str, declared: Declarations, hint: str = "") -> None:
     declared.reader.problems.add(message, declared.reader.locations["runs", name, key], hint)
+
+
+def _recorded(
+    name: str, nodes: Sequence[Scalar | None] | None, declared: Declarations, recordable: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Return ``record`` of a run; ``recordable`` has the columns that there are, and why others are none."""
+    words: list[str | None] = []
+    for node in nodes or ():
+        word = node.text if node is not None else None
+        if node is not None and recordable.get(node.text, "?"):
+            known = [column for column, reason in recordable.items() if not reason]
+            reason = recordable.get(node.text) or "is no column of the output"
+            hint = "state records all fields" if node.text in recordable else did_you_mean(node.text, known)
+            declared.reader.error(node, f"record: {shown(node.text)} {reason}", hint or one_of(known))
+            word = None
+        words.append(word)
+    return without_repetition(words, ("runs", name, "record"), declared)
 
 
 def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageChoice:
@@ -88,17 +111,17 @@ def _average(raw: Mapping[str, Any] | None, declared: Declarations) -> AverageCh
 
 def _crossed(name: str, key: str, raw: Mapping[str, Any], declared: Declarations, scope: Scope) -> Expression | None:
     """An expression whose zeros are looked for along the run, so that it has to change."""
-    found = declared.formula(raw.get(key), scope)
+    section = declared.formula(raw.get(key), scope)
     changing = {*declared.coordinates, *filter(None, [declared.time])}
-    if found is not None and not declared.incomplete and changing.isdisjoint(symbols_of(found)):
+    if section is not None and not declared.incomplete and changing.isdisjoint(symbols_of(section)):
         _fail(name, key, f"{key}: {shown(raw[key].text)} depends neither on a coordinate nor on the time", declared)
-    return found
+    return section
 
 
-def _start(name: str, given: Scalar | None, declared: Declarations) -> Fraction:
-    if given is not None and not declared.time:
+def _start(name: str, node: Scalar | None, declared: Declarations) -> Fraction:
+    if node is not None and not declared.time:
         _fail(name, "start", "start: this system has no time", declared, "time: t declares the name of the time")
-    return declared.number(given, declared.numbers()) or Fraction(0)
+    return declared.number(node, declared.numbers()) or Fraction(0)
 
 
 def _steps(
@@ -146,7 +169,7 @@ def _steps_until(
 
 
 def whole(ratio: Fraction) -> int | None:
-    """How many steps a ratio of times is, but for the rounding of decimals; None if it is no whole number."""
+    """Number of steps in a ratio of times, up to the rounding of decimals; None if it is not a whole number."""
     steps = round(ratio)
     return steps if abs(ratio - steps) <= NEAR_INTEGER * abs(ratio) else None
 
@@ -169,24 +192,22 @@ def with_step(run: Run, step: Fraction, *, parts: bool = False) -> Run:
     return replace(run, step=step, steps=max(1, int(span / step)), until=run.start + span)
 
 
-def _initial(name: str, given: Any, declared: Declarations) -> tuple[Fraction, ...]:
+def _initial(name: str, raw: Any, declared: Declarations) -> tuple[Fraction, ...]:
     n, scope = len(declared.coordinates), declared.numbers()
-    if isinstance(given, Scalar):
-        declared.reader.error(given, "initial: expected a list or a mapping", "[0.1, 1], or {x1: 0.1, x2: 1}")
+    if isinstance(raw, Scalar):
+        declared.reader.error(raw, "initial: expected a list or a mapping", "[0.1, 1], or {x1: 0.1, x2: 1}")
         return ()
-    if isinstance(given, dict):
-        values = {
-            k: (declared.coordinate(key), _single(node, scope, key, declared)) for k, (key, node) in given.items()
-        }
+    if isinstance(raw, dict):
+        values = {k: (declared.coordinate(key), _single(node, scope, key, declared)) for k, (key, node) in raw.items()}
         missing = [c for c in declared.coordinates if c not in values]
         if missing:
             _fail(name, "initial", f"initial: no value for {', '.join(missing[:10])}", declared)
         return tuple(values[c][1] or Fraction(0) for c in declared.coordinates if c in values)
-    if given is None:
+    if raw is None:
         return ()
-    if len(given) != n and not declared.incomplete:
-        _fail(name, "initial", f"initial: {counted(len(given), 'value')} for {counted(n, 'coordinate')}", declared)
-    return tuple(declared.number(node, scope) or Fraction(0) for node in given)
+    if len(raw) != n and not declared.incomplete:
+        _fail(name, "initial", f"initial: {counted(len(raw), 'value')} for {counted(n, 'coordinate')}", declared)
+    return tuple(declared.number(node, scope) or Fraction(0) for node in raw)
 
 
 def _single(node: Any, scope: Scope, key: Scalar, declared: Declarations) -> Fraction | None:
@@ -199,12 +220,12 @@ def _single(node: Any, scope: Scope, key: Scalar, declared: Declarations) -> Fra
 
 
 def _overrides(
-    given: Mapping[str, tuple[Scalar, Any]], declared: Declarations
+    raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations
 ) -> tuple[dict[str, Fraction], dict[str, Values]]:
     """The values of parameters, numbers and arrays."""
     values: dict[str, Fraction] = {}
     arrays: dict[str, Values] = {}
-    for name, (key, node) in given.items():
+    for name, (key, node) in raw.items():
         parameter = declared.parameters.get(name)
         if parameter is not None and parameter.at != "all":
             array = site_values(node, declared)
@@ -222,23 +243,23 @@ def _overrides(
     return values, arrays
 
 
-def _exact(given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
-    if not given:
+def _exact(raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations) -> dict[str, Expression]:
+    if not raw:
         return {}
-    own = {declared.time or "t": symbol(ELAPSED)} | {f"x0_{c}": symbol(initial(c)) for c in declared.coordinates}
+    symbols = {declared.time or "t": symbol(ELAPSED)} | {f"x0_{c}": symbol(initial(c)) for c in declared.coordinates}
     for name in (*declared.parameters, *declared.definitions):
-        if name in own:
-            message = f"the name {name!r} has a meaning of its own in the exact solution of a run"
+        if name in symbols:
+            message = f"the name {name!r} is reserved in the exact solution of a run"
             declared.reader.error(declared.nodes[name], message, "choose another name")
     dated = {n: declared.definitions[n] for n in declared.dated - declared.varying}
     at = dict(zip(dated, substitute(list(dated.values()), {declared.time: symbol(ELAPSED)}), strict=True))
-    scope = declared.constants("an exact solution", own | at)
+    scope = declared.constants("an exact solution", symbols | at)
     hints = {c: (scope.refused[c][0], f"initial values are written x0_{c}") for c in declared.coordinates}
     # A coordinate t is no obstacle: an exact solution is about the time.
-    refused = {n: why for n, why in {**scope.refused, **hints}.items() if n not in own}
+    refused = {n: why for n, why in {**scope.refused, **hints}.items() if n not in symbols}
     scope = Scope(scope.names, refused, scope.open)
     values = {}
-    for name, (key, node) in given.items():
+    for name, (key, node) in raw.items():
         expression = declared.formula(node, scope)
         if declared.coordinate(key) is not None and expression is not None:
             values[name] = expression

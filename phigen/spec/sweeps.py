@@ -10,7 +10,7 @@ from phigen.spec import limits
 from phigen.spec.declarations import Declarations
 from phigen.spec.kinds import Integer, Kind, Text
 from phigen.spec.model import Axis, Run, Statistic, Sweep
-from phigen.spec.names import KEPT, SWEEP_NAMES
+from phigen.spec.names import KEPT, STATISTICS, SWEEP_NAMES
 from phigen.spec.problems import did_you_mean, one_of, shown
 from phigen.spec.runs import whole, without_repetition
 from phigen.spec.yaml_source import Scalar
@@ -45,7 +45,7 @@ def sweep(
             words[key] = _WORDS[key].read(value, (key,), declared.reader)
         elif value is not None:
             axes += _axis(node, value, declared)
-    found = Sweep(
+    result = Sweep(
         name=name,
         run=run,
         over=tuple(axes),
@@ -57,10 +57,10 @@ def sweep(
         description=raw.get("description", ""),
     )
     incomplete = len(axes) + len(words) < len(raw.get("over") or {}) or None in words.values()
-    _expect_sense(found, runs.get(run), place, declared, incomplete=incomplete)
-    if run in runs and (end := end_of_its_own(found, runs[run], monitored=monitored)):
-        _fail((*place, "run") if raw.get("run") else place, end, declared, "give it steps: in place of that")
-    return found
+    _expect_sense(result, runs.get(run), place, declared, incomplete=incomplete)
+    if run in runs and (end := end_of_its_own(result, runs[run], monitored=monitored)):
+        _fail((*place, "run") if raw.get("run") else place, end, declared, "give the run steps: instead")
+    return result
 
 
 def _kept(
@@ -72,19 +72,21 @@ def _kept(
         word = node.text.replace(" ", "") if node is not None else None
         if node is not None and word not in KEPT and Statistic.read(str(word), observables) is None:
             known = [*KEPT, *observables]
-            hint = did_you_mean(node.text, known) or one_of([*known, *(f"mean({name})" for name in observables)])
+            hint = did_you_mean(node.text, known) or one_of(
+                [*known, *(f"{of}({name})" for name in observables for of in STATISTICS)]
+            )
             declared.reader.error(node, f"keep: {shown(node.text)} is not known", hint)
             word = None
         words.append(word)
     return without_repetition(words, (*place, "keep"), declared) if nodes is not None else ("final",)
 
 
-def end_of_its_own(found: Sweep, run: Run, *, monitored: bool) -> str:
-    """What is said where a run does not end with its last whole step, or not each member does; else nothing."""
-    said = f"members of a sweep make whole steps, all as many; the run {run.name} ends"
+def end_of_its_own(sweep: Sweep, run: Run, *, monitored: bool) -> str:
+    """Refusal of a run that does not end, for all members, with its last whole step; otherwise empty."""
+    said = f"all members of a sweep make the same number of whole steps; the run {run.name} ends"
     if run.stop is not None:
         return f"{said} where its stop: is met"
-    moved = {"step", "start"} & {axis.name for axis in found.over}
+    moved = {"step", "start"} & {axis.name for axis in sweep.over}
     if run.duration is not None and "step" in moved:
         return f"{said} after the duration {float(run.duration):.9g}"
     if run.until is not None and (monitored or moved or whole((run.until - run.start) / run.step) is None):
@@ -111,7 +113,7 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         return []
     if isinstance(value, Scalar):
         declared.reader.error(
-            value, f"over: {name} has one value", "give a range, {from: 1, to: 3, count: 100}, or a list"
+            value, f"over: {name} has only one value", "give a range, {from: 1, to: 3, count: 100}, or a list"
         )
         return []
     if name == "seed" and name not in (*declared.parameters, *declared.coordinates):
@@ -120,21 +122,21 @@ def _axis(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         values = [declared.number(node, numbers) for node in value]
         if None in values:
             return []
-        found = Axis(name, tuple(float(v) for v in values if v is not None))
+        axis = Axis(name, tuple(float(v) for v in values if v is not None))
     else:
         ends = [declared.number(value.get(end), numbers) for end in ("from", "to")]
         if None in ends:
             declared.reader.error(key, f"over: {name} needs from and to", "{from: 1, to: 3, count: 100}")
             return []
         first, last = (float(end or 0) for end in ends)
-        found = Axis(name, (), (first, last), value.get("count", 0), value.get("scale", "linear"))
-    lowest = min(found.values or found.ends)
-    if found.scale == "log" and lowest <= 0:
+        axis = Axis(name, (), (first, last), value.get("count", 0), value.get("scale", "linear"))
+    lowest = min(axis.values or axis.ends)
+    if axis.scale == "log" and lowest <= 0:
         declared.reader.error(key, f"over: {name} on a logarithmic scale reaches {lowest:g}")
     parameter = declared.parameters.get(name)
     if parameter is not None and parameter.positive and lowest <= 0:
         declared.reader.error(key, f"over: the parameter {name!r} is positive by declaration, but reaches {lowest:g}")
-    return [found]
+    return [axis]
 
 
 def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
@@ -144,36 +146,36 @@ def _draws(key: Scalar, value: Any, declared: Declarations) -> list[Axis]:
         numbers = tuple(float(n) for n in read if n is not None)
         return [Axis("seed", numbers)] if len(numbers) == len(value) else []
     if "count" not in value or len(value) > 1:
-        declared.reader.error(key, "over: seed numbers draws: it has a count, and nothing else", "seed: {count: 10}")
+        declared.reader.error(key, "over: seed takes a count, and nothing else", "seed: {count: 10}")
         return []
     return [Axis("seed", count=value["count"])]
 
 
 def _expect_sense(
-    found: Sweep, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
+    sweep: Sweep, run: Run | None, place: tuple[Any, ...], declared: Declarations, *, incomplete: bool
 ) -> None:
-    grid = [axis for axis in found.over if axis.size]
-    drawn = [axis for axis in found.over if not axis.size]
+    grid = [axis for axis in sweep.over if axis.size]
+    drawn = [axis for axis in sweep.over if not axis.size]
     over = (*place, "over")
-    if found.file and (found.over or found.random):
-        _fail(over, "over: a file has all values; it stands alone", declared)
-    if found.random and grid:
+    if sweep.file and (sweep.over or sweep.random):
+        _fail(over, "over: a file holds all values; remove the other keys", declared)
+    if sweep.random and grid:
         _fail(over, f"over: {grid[0].name} has a count, but random members are drawn", declared, "leave out the count")
-    if drawn and not (found.random or incomplete or any(axis.name == "seed" for axis in grid)):
-        hint = "add a count, or seed: {count: 10} for so many draws"
+    if drawn and not (sweep.random or incomplete or any(axis.name == "seed" for axis in grid)):
+        hint = "add a count, or seed: {count: 10} for 10 random members"
         _fail((*over, drawn[0].name), f"over: {drawn[0].name} has no count", declared, hint)
-    if not (found.over or found.file or incomplete):
+    if not (sweep.over or sweep.file or incomplete):
         _fail(over, "over: there is nothing to vary", declared)
-    members = found.random or prod(axis.size for axis in grid)
+    members = sweep.random or prod(axis.size for axis in grid)
     if members > limits.SWEPT:
-        hint = "several sweeps, of a part each, or random members"
+        hint = "split it into several sweeps, or draw random members"
         _fail(over, f"{members} members, the limit is {limits.SWEPT}", declared, hint, limit=True)
-    if run is not None and found.frames > run.steps:
-        message = f"frames: every {found.frames} steps, and the run {run.name} has {run.steps}"
+    if run is not None and sweep.frames > run.steps:
+        message = f"frames: every {sweep.frames} steps, but the run {run.name} has only {run.steps}"
         _fail((*place, "frames"), message, declared)
-    if "crossings" in found.keep and run is not None and run.section is None:
+    if "crossings" in sweep.keep and run is not None and run.section is None:
         hint = "give the run a section: an expression whose zeros are the crossings"
         _fail((*place, "keep"), f"crossings: the run {run.name} has no section", declared, hint)
-    if "energy_error" in found.keep and declared.time:
+    if "energy_error" in sweep.keep and declared.time:
         hint = "keep final, or frames: solver.hamiltonian(x, t) is the energy there"
         _fail((*place, "keep"), "energy_error: H depends on the time, so energy is not conserved", declared, hint)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -28,6 +27,7 @@ from phigen.spec.model import (
     SpecNoise,
 )
 from phigen.spec.names import COMPOSITIONS, LICENSE_REFERENCE, LICENSES, LOGARITHMIC
+from phigen.spec.observables import observables
 from phigen.spec.poisson import brackets_of_sites, poisson_form
 from phigen.spec.problems import Problems, counted, did_you_mean, shown
 from phigen.spec.runs import run, without_repetition
@@ -72,8 +72,17 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
     hamiltonian, coupling = densities(raw.get("hamiltonian"), declared)
     casimirs, kinds = read_casimirs(raw.get("casimirs", {}), declared)
     brackets = brackets_of_sites(poisson, declared)
-    runs = {n: run(n, r, declared) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
-    lattice = declared.lattice and with_kinds(declared.lattice, casimirs, kinds, bonds=coupling, brackets=brackets)
+    observed, reductions = observables(raw.get("observables", {}), declared, casimirs)
+    lattice = declared.lattice and with_kinds(
+        declared.lattice, casimirs, kinds, bonds=coupling, brackets=brackets, reductions=reductions
+    )
+    numbers = [name for name in observed if lattice is None or name in reductions]
+    columns = dict.fromkeys([*casimirs, *observed, *declared.coordinates], "has a value at every site")
+    if lattice is None:
+        columns |= dict.fromkeys(declared.coordinates, "is recorded with the state")
+    summed = [name for name in casimirs if lattice is None or lattice.kinds[name] != "sites"]
+    columns |= dict.fromkeys(["state", "energy", *summed, *numbers], "")
+    runs = {n: run(n, r, declared, columns) for n, (_, r) in raw.get("runs", {}).items() if r is not None}
     return {
         "name": _name(raw.get("name"), declared),
         "coordinates": declared.coordinates,
@@ -83,9 +92,10 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "forces": _forces(raw, declared),
         "noise": _noise(raw.get("noise") or {}, declared),
         "parameters": tuple(declared.parameters.values()),
+        "inputs": _inputs(raw.get("inputs", ()), declared),
         "casimirs": casimirs,
         "invariants": _formulas(raw.get("invariants", {}), declared, declared.dated_scope()),
-        "observables": _observables(raw.get("observables", {}), declared, casimirs),
+        "observables": observed,
         "birealisation": _birealisation(raw.get("birealisation", "auto"), declared),
         "order": raw.get("order", None if "terms" in raw else NOISY_ORDER if "noise" in raw else DEFAULT_ORDER),
         "terms": raw.get("terms"),
@@ -107,7 +117,7 @@ def _parts(raw: Mapping[str, Any], declared: Declarations) -> dict[str, Any]:
         "reconstruct": raw.get("reconstruct", ""),
         "runs": runs,
         "sweeps": {
-            n: sweep(n, s, runs, declared, raw.get("observables") or {}, monitored="monitor" in raw)
+            n: sweep(n, s, runs, declared, numbers, monitored="monitor" in raw)
             for n, (_, s) in raw.get("sweeps", {}).items()
             if s is not None
         },
@@ -130,7 +140,7 @@ WITHOUT_SERIES = {
 
 #: Keys that lattices do not take yet, and the values that do no harm.
 NOT_OF_LATTICES: Mapping[str, tuple[object, ...]] = {
-    "monitor": (), "reconstruct": (), "terms": (), "observables": (),
+    "monitor": (), "reconstruct": (), "terms": (),
     "gauge": ("auto", "none"), "modified_hamiltonian": (0,),
 }  # fmt: skip
 
@@ -144,11 +154,11 @@ NOT_WITH_NOISE: Mapping[str, tuple[tuple[object, ...], str, str]] = {
     ),
     "composition": (
         ("auto", "none"),
-        "stages that go back would have to undo increments that were drawn",
+        "stages with negative steps would have to undo random increments",
         "composition: none; with scheme: splitting, all noise comes before and after the composition of the flows of H",
     ),
-    "modified_hamiltonian": ((0,), "no two steps are of the same Hamiltonian", ""),
-    "terms": ((), "order says what holds without it", "order: 2"),
+    "modified_hamiltonian": ((0,), "each step has a Hamiltonian of its own", ""),
+    "terms": ((), "with noise the method is chosen by order", "order: 2"),
     "adjoint": ((False,), "it is not offered", ""),
 }
 #: Keys of runs that it excludes, and those that mean nothing without it.
@@ -163,9 +173,9 @@ def _expect_consistent(raw: Mapping[str, Any], problems: Problems, reader: Reade
             problems.add("average: the spec has no observables", reader.locations["runs", name, "average"], hint)
     for key, harmless in NOT_OF_LATTICES.items() if raw.get("lattice") is not None else ():
         if raw.get(key) is not None and raw[key] not in harmless:
-            problems.add(f"{key}: not for lattices in this version", reader.locations[key,])
+            problems.add(f"{key}: not available for lattices", reader.locations[key,])
     if raw.get("real") == "float" and raw.get("profile") == "fast":
-        problems.add("profile: real: float goes with the profile small", reader.locations["profile",], "remove profile")
+        problems.add("profile: real: float needs profile: small", reader.locations["profile",], "remove profile")
     if raw.get("structure") is not None and raw.get("scheme") != "gauss":
         message = "structure belongs to scheme: gauss; other schemes are exact Poisson maps"
         problems.add(message, reader.locations["structure",], "remove structure, or scheme: gauss")
@@ -188,7 +198,7 @@ def _expect_consistent_with_noise(raw: Mapping[str, Any], problems: Problems, re
     for name, (_, run_) in raw.get("runs", {}).items():
         for key in NOT_IN_NOISY_RUNS if noisy else IN_NOISY_RUNS:
             if run_ and key in run_:
-                message = f"{key}: not of systems with noise" if noisy else f"{key}: this system has no noise"
+                message = f"{key}: not available with noise" if noisy else f"{key}: this system has no noise"
                 hint = "" if noisy else "noise: {NAME: {hamiltonian: g, amplitude: sigma}} declares it"
                 problems.add(message, reader.locations["runs", name, key], hint)
 
@@ -209,66 +219,66 @@ def _name(node: Scalar | None, declared: Declarations) -> str:
 
 
 def _formulas(
-    given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, scope: Scope | None = None
+    raw: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, scope: Scope | None = None
 ) -> dict[str, Expression]:
     scope = scope or declared.scope()
-    values = {name: declared.formula(node, scope) for name, (_, node) in given.items()}
+    values = {name: declared.formula(node, scope) for name, (_, node) in raw.items()}
     return {name: value for name, value in values.items() if value is not None}
 
 
-#: Names of what output holds beside the observables.
-RECORDED = ("t", "tau", "x", "energy", "state", "attitude", "position")
-
-
-def _observables(
-    given: Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations, casimirs: Mapping[str, Expression]
-) -> dict[str, Expression]:
-    """Return ``observables``, whose names are those of columns of the output beside coordinates and Casimirs."""
-    taken = dict.fromkeys(declared.coordinates, "a coordinate") | dict.fromkeys(casimirs, "a Casimir")
-    taken |= {name: "a column of every output" for name in (*RECORDED, declared.time) if name}
-    for name, (key, _) in given.items():
-        if name in taken:
-            message = f"observables: {name!r} is the name of {taken[name]}"
-            declared.reader.error(key, message, "choose another name")
-    return _formulas(given, declared, replace(declared.dated_scope(), piecewise=True))
+def _inputs(nodes: Sequence[Scalar | None], declared: Declarations) -> tuple[str, ...]:
+    """Return the names under ``inputs``, each that of a parameter with one value, each once."""
+    names: list[str] = []
+    for node in filter(None, nodes):
+        parameter = declared.parameters.get(node.text)
+        if parameter is None:
+            hint = did_you_mean(node.text, declared.parameters) or "inputs: lists names of parameters"
+            declared.reader.error(node, f"inputs: {node.text!r} is not a parameter", hint)
+        elif parameter.at != "all":
+            declared.reader.error(node, f"inputs: {node.text!r} has a value at each of the {parameter.at}, not one")
+        elif node.text in names:
+            declared.reader.error(node, f"inputs: {node.text!r} is given twice")
+        else:
+            names.append(node.text)
+    return tuple(names)
 
 
 def _forces(raw: Mapping[str, Any], declared: Declarations) -> SpecForces:
     """``forces`` and ``damping``; by coordinates."""
-    given, damping = raw.get("forces") or {}, raw.get("damping")
-    found: dict[str, dict[str, Expression]] = {}
+    entries_of_kinds, damping = raw.get("forces") or {}, raw.get("damping")
+    forces: dict[str, dict[str, Expression]] = {}
     for kind in ("covector", "vector"):
-        entries = given.get(kind) or {}
+        entries = entries_of_kinds.get(kind) or {}
         for name, (key, _) in entries.items():
             if name not in declared.coordinates and not declared.incomplete:
                 hint = did_you_mean(name, declared.coordinates)
                 declared.reader.error(key, f"forces: {name!r} is not a coordinate", hint)
-        found[kind] = _formulas(entries, declared, declared.dated_scope())
-    return SpecForces(found["covector"], found["vector"], declared.formula(damping, declared.dated_scope()))
+        forces[kind] = _formulas(entries, declared, declared.dated_scope())
+    return SpecForces(forces["covector"], forces["vector"], declared.formula(damping, declared.dated_scope()))
 
 
-def _noise(given: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dict[str, SpecNoise]:
+def _noise(raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations) -> dict[str, SpecNoise]:
     """The sources of ``noise``; amplitudes are the same everywhere, for σ∇g to be the gradient of a function."""
-    scope, found = declared.dated_constants("an amplitude"), {}
-    if len(given) > limits.SOURCES:
-        message = f"noise: {len(given)} sources, the limit is {limits.SOURCES}"
+    scope, sources = declared.dated_constants("an amplitude"), {}
+    if len(raw) > limits.SOURCES:
+        message = f"noise: {len(raw)} sources, the limit is {limits.SOURCES}"
         declared.reader.problems.add(message, declared.reader.locations["noise",], limit=True)
-    for name, (_, source) in given.items():
+    for name, (_, source) in raw.items():
         node = (source or {}).get("amplitude")
         hamiltonian = declared.formula((source or {}).get("hamiltonian"), declared.dated_scope())
         amplitude = ONE if node is None else declared.formula(node, scope)
         if hamiltonian is not None and amplitude is not None:
-            found[name] = SpecNoise(hamiltonian, amplitude)
-    return found
+            sources[name] = SpecNoise(hamiltonian, amplitude)
+    return sources
 
 
 def _gauge(
-    given: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
+    raw: str | Mapping[str, tuple[Scalar, Scalar | None]], declared: Declarations
 ) -> str | dict[str, Expression]:
     """auto, none, or the multiples of Casimirs: constants along trajectories, hence free of coordinates."""
-    if isinstance(given, str):
-        return given
-    values = _formulas(given, declared)
+    if isinstance(raw, str):
+        return raw
+    values = _formulas(raw, declared)
     for name, value in values.items():
         moving = [s for s in symbols_of(value) if s in declared.coordinates]
         if moving:
@@ -287,17 +297,17 @@ def _monitor(node: Scalar | None, declared: Declarations) -> str | Expression | 
     return declared.formula(node, declared.scope())
 
 
-def _license(given: str, declared: Declarations) -> str:
-    for part in given.replace(" AND ", " OR ").split(" OR "):
+def _license(expression: str, declared: Declarations) -> str:
+    for part in expression.replace(" AND ", " OR ").split(" OR "):
         if part not in LICENSES and not LICENSE_REFERENCE.fullmatch(part):
             hint = did_you_mean(part, LICENSES) or "any other licence is written LicenseRef-NAME"
             message = f"license: {shown(part)} is not an SPDX identifier that phigen knows"
             declared.reader.problems.add(message, declared.reader.locations["license",], hint)
-    return given
+    return expression
 
 
-def _birealisation(given: str | Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
-    options = {"kind": given} if isinstance(given, str) else given
+def _birealisation(raw: str | Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
+    options = {"kind": raw} if isinstance(raw, str) else raw
     kind = options.get("kind", "")
     for key, owners in OPTIONS.items():
         location = declared.reader.locations.get(("birealisation", key))
@@ -314,20 +324,22 @@ def _birealisation(given: str | Mapping[str, Any], declared: Declarations) -> Bi
 
 
 def _group_map(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
-    given = options.get("tau")
-    if given is None:
+    tau = options.get("tau")
+    if tau is None:
         place, hint = declared.reader.locations["birealisation",], "{kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
         declared.reader.problems.add("birealisation: the kind group-map needs tau", place, hint)
         return BirealisationChoice(kind="group-map")
-    if isinstance(given, Scalar):
+    if isinstance(tau, Scalar):
         scope = declared.constants("tau, a function of the matrix P,", {"P": symbol(MATRIX)})
         if "P" in declared.nodes:
             message = "the name 'P' means the matrix Σ p_i E_i in tau"
-            declared.reader.error(declared.nodes["P"], message, "choose another name, or give tau entry by entry")
-        return BirealisationChoice(kind="group-map", tau=declared.formula(given, scope) or ZERO)
+            declared.reader.error(
+                declared.nodes["P"], message, "choose another name, or write tau as a matrix of entries"
+            )
+        return BirealisationChoice(kind="group-map", tau=declared.formula(tau, scope) or ZERO)
     momenta = _momenta(declared, "tau")
     scope = declared.constants("tau, a function of the momenta p_NAME,", momenta)
-    rows = tuple(tuple(declared.formula(cell, scope) or ZERO for cell in row or ()) for row in given)
+    rows = tuple(tuple(declared.formula(cell, scope) or ZERO for cell in row or ()) for row in tau)
     return BirealisationChoice(kind="group-map", tau=rows)
 
 
@@ -343,24 +355,24 @@ def _custom(options: Mapping[str, Any], declared: Declarations) -> Birealisation
 
 
 def _spray(options: Mapping[str, Any], declared: Declarations) -> BirealisationChoice:
-    given = options.get("spray", "auto")
-    if not isinstance(given, str):
-        given = _on_covectors({"spray": given}, "a spray", declared)["spray"]
-    return BirealisationChoice(kind="spray", spray=given, degree=options.get("degree"))
+    spray = options.get("spray", "auto")
+    if not isinstance(spray, str):
+        spray = _on_covectors({"spray": spray}, "a spray", declared)["spray"]
+    return BirealisationChoice(kind="spray", spray=spray, degree=options.get("degree"))
 
 
 def _on_covectors(
     lists: Mapping[str, Sequence[Scalar | None]], where: str, declared: Declarations
 ) -> dict[str, tuple[Expression, ...]]:
     """Lists of n expressions in the coordinates and ``p_NAME``, by the key of the bi-realisation that holds them."""
-    n, scope, found = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}
+    n, scope, expressions = len(declared.coordinates), declared.scope(_momenta(declared, where)), {}
     for key, nodes in lists.items():
         place = declared.reader.locations.get(("birealisation", key))
         if len(nodes) != n and place is not None and not declared.incomplete:
             message = f"birealisation: {key} has {counted(len(nodes), 'expression')} for {counted(n, 'coordinate')}"
             declared.reader.problems.add(message, place)
-        found[key] = tuple(declared.formula(node, scope) or ZERO for node in nodes)
-    return found
+        expressions[key] = tuple(declared.formula(node, scope) or ZERO for node in nodes)
+    return expressions
 
 
 def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
@@ -372,17 +384,17 @@ def _momenta(declared: Declarations, where: str) -> dict[str, Expression]:
     return momenta
 
 
-def _solver(given: Mapping[str, Any], declared: Declarations) -> SolverOptions:
-    node = given.get("tolerance")
+def _solver(raw: Mapping[str, Any], declared: Declarations) -> SolverOptions:
+    node = raw.get("tolerance")
     tolerance: Fraction | None = None
     if node is not None and node.text != "auto":
         tolerance = declared.number(node, declared.numbers())
         if tolerance is not None and not 0 < tolerance < 1:
             declared.reader.error(node, f"tolerance: {node.text} is not between 0 and 1")
     return SolverOptions(
-        given.get("method", "auto"),
+        raw.get("method", "auto"),
         tolerance,
-        given.get("max_iterations", 20),
-        given.get("lanes", True),
-        given.get("compensated", False),
+        raw.get("max_iterations", 20),
+        raw.get("lanes", True),
+        raw.get("compensated", False),
     )

@@ -29,41 +29,41 @@ RANDOM_KEYS = tuple(_RANDOM)
 _WHOLE_SPHERE = "initial: {random: sphere}"
 
 
-def values(given: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
-    """What stands where an array is wanted, ``None`` after errors; ``whole``: that of all fields together."""
-    if given is None:
+def values(raw: Any, declared: Declarations, *, whole: bool = False) -> Values | None:
+    """Read an array, ``None`` after errors; with ``whole`` it is the array of all fields together."""
+    if raw is None:
         return None
-    if isinstance(given, Scalar):
-        if given.text.endswith(FILES):
-            return Values(file=given.text)
+    if isinstance(raw, Scalar):
+        if raw.text.endswith(FILES):
+            return Values(file=raw.text)
         scope = declared.site_numbers()
-        if given.text in DISTRIBUTIONS and scope.lookup(given.text) is None:
-            return declared.reader.error(given, f"{given.text!r} is no value", f"{{random: {given.text}, seed: 1}}")
-        formula = declared.formula(given, scope)
+        if raw.text in DISTRIBUTIONS and scope.lookup(raw.text) is None:
+            return declared.reader.error(raw, f"{raw.text!r} is not a value", f"{{random: {raw.text}, seed: 1}}")
+        formula = declared.formula(raw, scope)
         return None if formula is None else Values(formula=formula)
-    if isinstance(given, list):
-        numbers = [declared.number(node, declared.numbers()) for node in given]
+    if isinstance(raw, list):
+        numbers = [declared.number(node, declared.numbers()) for node in raw]
         return Values(listed=tuple(n or Fraction(0) for n in numbers))
-    return _random(given, declared, whole)
+    return _random(raw, declared, whole)
 
 
-def _random(given: Mapping[str, Any], declared: Declarations, whole: bool) -> Values | None:
+def _random(entries: Mapping[str, Any], declared: Declarations, whole: bool) -> Values | None:
     """Random values: every key of their mapping is honoured, or reported."""
     reader, before = declared.reader, len(declared.reader.problems.found)
-    for key, (node, _) in given.items():
+    for key, (node, _) in entries.items():
         if key not in RANDOM_KEYS:
             hint = did_you_mean(key, RANDOM_KEYS) or f"keys: {', '.join(RANDOM_KEYS)}"
             reader.error(node, f"random values have no key {shown(key)}", hint)
-    if not given:  # its keys are no names, which was reported
+    if not entries:  # its keys are no names, which was reported
         return None
-    if "random" not in given:
-        first = next(iter(given.values()))[0]
+    if "random" not in entries:
+        first = next(iter(entries.values()))[0]
         return reader.error(first, "values are a number, a formula, a list, or {random: …, seed: …}")
-    kind, seed, scale, mean = (_option(given, key, declared) for key in RANDOM_KEYS)
+    kind, seed, scale, mean = (_option(entries, key, declared) for key in RANDOM_KEYS)
     if kind == "sphere" and not whole:
-        reader.error(given["random"][1], "random: sphere is for all fields of a site together", _WHOLE_SPHERE)
+        reader.error(entries["random"][1], "random: sphere is for all fields of a site together", _WHOLE_SPHERE)
     if mean is not None and kind == "sphere":
-        reader.error(mean, "mean: a sphere is that around 0")
+        reader.error(mean, "mean: not for random: sphere, which is centred at 0")
         mean = None
     factor = Fraction(1) if scale is None else declared.number(scale, declared.numbers())
     around = declared.formula(mean, declared.site_numbers())
@@ -72,9 +72,9 @@ def _random(given: Mapping[str, Any], declared: Declarations, whole: bool) -> Va
     return Values(random=kind, seed=seed or 0, scale=factor, formula=around)
 
 
-def _option(given: Mapping[str, tuple[Scalar, Any]], key: str, declared: Declarations) -> Any:
+def _option(entries: Mapping[str, tuple[Scalar, Any]], key: str, declared: Declarations) -> Any:
     """The value of a key of random values, ``None`` where there is none or where it is wrong, which is reported."""
-    node, value = given.get(key, (None, None))
+    node, value = entries.get(key, (None, None))
     if node is None or value is None:
         return None
     if isinstance(value, Scalar):

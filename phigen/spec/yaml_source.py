@@ -95,7 +95,7 @@ _HARMLESS = "\u200c\u200d\u00ad"
 
 
 def kind_of(node: Node) -> str:
-    """What a node is, for "expected …, found …"."""
+    """Name the kind of a node, for "expected …, found …"."""
     if isinstance(node, Sequence):
         return "a list"
     if isinstance(node, Mapping):
@@ -175,10 +175,12 @@ def read(text: str, problems: Problems) -> Mapping:
         raise problems.stop(f"not valid YAML: {shown(error, 200)}", Location(1, 1, problems.file)) from None
     root = builder.root
     if root is None or (isinstance(root, Scalar) and root.is_null):
-        raise problems.stop("the file is empty", Location(1, 1, problems.file), "phigen new NAME prints a starter spec")
+        raise problems.stop(
+            "the file is empty", Location(1, 1, problems.file), "phigen new NAME writes a spec to start from"
+        )
     if not isinstance(root, Mapping):
         message = f"a spec is a mapping of keys to values, not {kind_of(root)}"
-        raise problems.stop(message, root.location, "phigen new NAME prints a starter spec")
+        raise problems.stop(message, root.location, "phigen new NAME writes a spec to start from")
     return root
 
 
@@ -264,27 +266,27 @@ class _Builder:
         return 1 if raw[:1] in ("'", '"') and raw[1:-1] == event.value else None
 
     def places(self, event: Any) -> tuple[tuple[int, int], ...]:
-        """Of a text over several lines the place of each character but for blanks, and that of its end.
+        """Places of the characters of a text over several lines, without blanks, and of its end.
 
         Folding changes blanks only; where other characters differ, there are escapes, and nothing is known.
         """
         start, end = event.start_mark.index, event.end_mark.index
-        wanted = [c for c in event.value if not c.isspace()]
+        characters = [c for c in event.value if not c.isspace()]
         if event.style in ("|", ">"):  # what stands beside the sign is about the text
             start = self.text.find("\n", start, end)
         elif event.style:
             start += 1
-        found: list[tuple[int, int]] = []
+        places: list[tuple[int, int]] = []
         line, column = event.start_mark.line + 1, start - self.text.rfind("\n", 0, start)
         for k in range(start, end):
             if not self.text[k].isspace():
-                if len(found) == len(wanted) or self.text[k] != wanted[len(found)]:
+                if len(places) == len(characters) or self.text[k] != characters[len(places)]:
                     break
-                found.append((line, column))
+                places.append((line, column))
             line, column = (line + 1, 1) if self.text[k] == "\n" else (line, column + 1)
-        if not found or len(found) < len(wanted):
+        if not places or len(places) < len(characters):
             return ()
-        return (*found, (found[-1][0], found[-1][1] + 1))
+        return (*places, (places[-1][0], places[-1][1] + 1))
 
     def attach(self, node: Node) -> None:
         """Put a node into the innermost open collection."""

@@ -132,7 +132,7 @@ class _Writer:
 
 
 def _size(written: str) -> int:
-    """How many numbers, names and operators a text has, as the grammar counts them."""
+    """Count the numbers, names and operators of a text, like the grammar."""
     return len(re.findall(r"[\w.]+|\*\*|[-+*/]", written))
 
 
@@ -160,7 +160,8 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _parameter(p: Parameter) -> str:
     value = _values(p.values) if p.values else _number(p.value)
-    more = (", positive: true" if p.positive else "") + (f", at: {p.at}" if p.at != "all" else "")
+    more = ", positive: true" * p.positive + ", small: true" * p.small + (f", at: {p.at}" if p.at != "all" else "")
+    more += f", unit: {_quoted(p.unit)}" if p.unit else ""
     return f"{{value: {value}{more}}}" if more else value
 
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from phigen.splitting.ring import Monomial, Ring
 from phigen.symbolic.tower import Poly
 
-#: Longest list of monomials for one coordinate, and the largest degree of one.
-MOST_MONOMIALS, MOST_DEGREE = 16, 8
+#: Longest list of monomials for one coordinate, and the largest degree of one; of coordinates alone, without products.
+MOST_MONOMIALS, MOST_DEGREE, MOST_COORDINATES = 16, 8, 64
 
 Row = dict[Monomial, Poly]
 
@@ -71,7 +71,8 @@ def _closed(
         m = pending.pop()
         if m in rows or m in known:
             continue
-        if len(rows) == MOST_MONOMIALS or sum(m) > MOST_DEGREE:
+        most = MOST_COORDINATES if all(sum(k) <= 1 for k in (*rows, m)) else MOST_MONOMIALS
+        if len(rows) >= most or sum(m) > MOST_DEGREE:
             return None
         rows[m] = _row(ring, rates, m)
         pending += sorted(rows[m])

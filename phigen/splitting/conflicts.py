@@ -8,10 +8,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Collection, Sequence
 from contextlib import nullcontext
+from itertools import product
 
 from phigen import progress
 from phigen.splitting.flow import Term
 from phigen.splitting.ring import Monomial, Ring
+from phigen.symbolic.tower import Poly
 
 #: So many pairs of terms are a stage of their own, for those who watch.
 MANY = 100
@@ -27,6 +29,7 @@ class Conflicts:
         self._partners: dict[int, frozenset[int]] = {}
         self._monomials: dict[int, frozenset[Monomial]] = {}
         self._commute: dict[tuple[int, int], bool] = {}
+        self._fields: dict[int, list[Poly]] = {}
 
     def support(self, term: Term) -> frozenset[int]:
         """The coordinates that a term depends on."""
@@ -70,9 +73,18 @@ class Conflicts:
         open_ = [(a, b) for a, b in pairs if (id(a), id(b)) not in self._commute]
         with progress.stage("pairs of terms", len(open_)) if len(open_) > MANY else nullcontext() as running:
             for k, (a, b) in enumerate(open_):
-                self._commute[id(a), id(b)] = self.ring.commute(a.element, b.element)
+                self._commute[id(a), id(b)] = self._brackets_to_zero(a, b)
                 if running:
                     running.done = k
+
+    def _brackets_to_zero(self, a: Term, b: Term) -> bool:
+        """Whether {a, b} = 0, proved, by the vector field of b, which is computed once."""
+        if all(pair in self.ring.zero_pairs for pair in product(self.support(a), self.support(b))):
+            return True
+        if id(b) not in self._fields:
+            self._know(b)
+            self._fields[id(b)] = self.ring.field(b.element)
+        return bool(self.ring.rate(a.element, self._fields[id(b)]) == 0)
 
 
 def coloured(neighbours: Sequence[set[int]], supports: Sequence[Collection[int]]) -> list[int]:

@@ -25,6 +25,9 @@ from phigen.symbolic.tower import Poly, rational
 
 Matrix = Sequence[Sequence[Poly]]
 
+#: Most powers of a matrix that are tried: with 64 rows all of them take minutes.
+MOST_POWERS = 16
+
 #: The manner of a motion at a constant rate.
 SHIFTED = "shifted"
 
@@ -61,9 +64,9 @@ def solve(ring: Ring, motion: LinearMotion) -> Solution:
 
 
 def _powers(ring: Ring, a: Matrix) -> list[Matrix]:
-    """A, A², …, up to the first power that vanishes, or the size of A, or A⁴ if that is more."""
+    """A, A², …, up to the first power that vanishes, or the size of A if it is small, or A⁴ if that is more."""
     powers = [a]
-    while len(powers) < max(4, len(a)) and not _vanishes(powers[-1]):
+    while len(powers) < max(4, min(len(a), MOST_POWERS)) and not _vanishes(powers[-1]):
         powers.append(_product(ring, powers[-1], a))
     return powers
 
@@ -123,17 +126,12 @@ def _turning(ring: Ring, powers: Sequence[Matrix], images: Sequence[Sequence[Pol
 def _without_quotients(
     ring: Ring, matrix: Matrix, images: Sequence[Sequence[Poly]], c: Poly, a: int
 ) -> Solution | None:
-    """The same by functions of s = ct²: sin and 1 − cos of the angle √s by those of its half.
-
-    With a = 2 only where c is static, since the derivative of arcroot is not available at 0.
-    """
+    """The same by functions of s = ct²: sin and 1 − cos of the angle √s by those of its half."""
     t, s = symbol(TIME), ring.expression(c * ring.tower.variable(TIME) ** 2)
     if a == 1:
         return _turned(ring, matrix, images, s)
     first, second, third = ([ring.expression(v) for v in image] for image in images[:3])
     speed = t * call("sinroot", s / 4)
-    if ring.support(c):
-        return None
     versine, rest = _HALF * speed**2, t**3 * call("arcroot", s)
     increments = tuple(t * u + (versine * v + rest * w) for u, v, w in zip(first, second, third, strict=True))
     return Solution(increments, "turned and shifted")

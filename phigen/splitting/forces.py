@@ -28,10 +28,25 @@ _DAMPING_HINT = (
 
 
 def force_flows(system: System) -> tuple[Flow, ...]:
-    """The flows of the forces; none without any. `SpecError` that names the piece that has none in closed form."""
+    """The flows of the forces; none without any. `SpecError` that names the piece that has none."""
     if system.forces is None:
         return ()
     forces = system.forces
+    tangent = hamiltonian_vector_field(system.poisson, forces.covector)
+    pushed = tuple(a + b for a, b in zip(tangent, forces.vector, strict=True))
+    try:
+        closed = _closed_flows(system, forces)
+    except SpecError:
+        whole = _flow(system, pushed, numeric=True)
+        if isinstance(whole, Flow):
+            return (whole,)
+        raise
+    whole = closed[0] if len(closed) == 1 else _flow(system, pushed, numeric=True)
+    return (whole,) if isinstance(whole, Flow) else closed
+
+
+def _closed_flows(system: System, forces: Forces) -> tuple[Flow, ...]:
+    """The flows of the forces in closed form, in as few pieces as there are."""
     tangent = hamiltonian_vector_field(system.poisson, forces.covector)
     whole = _flow(system, tuple(a + b for a, b in zip(tangent, forces.vector, strict=True)))
     if isinstance(whole, Flow):
@@ -137,8 +152,10 @@ def _pieces(
         yield found
 
 
-def _flow(system: System, field: Field) -> Flow | str:
-    """The flow of a vector field, or why there is none."""
+def _flow(system: System, field: Field, *, numeric: bool = False) -> Flow | str:
+    """The flow of a vector field, or why there is none; ``numeric`` admits matrix exponentials."""
     ring = ring_of(system, field)
-    found = solved(ring, ring.tower.convert_all(field))
-    return found if isinstance(found, str) else Flow(ZERO, tuple(found.increments), found.manner, force=field)
+    found = solved(ring, ring.tower.convert_all(field), numeric=numeric)
+    if isinstance(found, str):
+        return found
+    return Flow(ZERO, tuple(found.increments), found.manner, force=field, exponentials=found.exponentials)

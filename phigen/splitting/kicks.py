@@ -102,6 +102,6 @@ def _modified(ring: Ring, plain: Flow, v: Poly, gradient: Poly) -> Flow | None:
     multiple = gradient * ring.tower.variable(KICK)
     terms = [Term(plain.hamiltonian, v), Term(symbol(KICK) * ring.expression(gradient), multiple)]
     try:
-        return flow_of(ring, terms)
+        return flow_of(ring, terms, numeric=False)
     except NoFlowError:
         return None

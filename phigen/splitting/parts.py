@@ -11,10 +11,11 @@ from phigen.errors import Diagnostic, SpecError
 from phigen.geometry.system import System
 from phigen.splitting.conflicts import Conflicts
 from phigen.splitting.flow import Flow, NoFlowError, Term, flow_of, joint_flow
+from phigen.splitting.grouping import groupings
+from phigen.splitting.near_integrable import size_of, small_part, with_motions
 from phigen.splitting.regrouping import by_blocks, with_companions
 from phigen.splitting.ring import Ring, ring_of
 from phigen.splitting.terms import hamiltonian_terms, terms_of
-from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.readable import shortened
 from phigen.symbolic.tower import Poly
 
@@ -27,15 +28,19 @@ class Splitting:
     """The flows of the parts of H, in the order of a step.
 
     ``kick`` is the index of the part V if the method rests on {V, {V, {V, T}}} = 0 (`phigen.splitting.kicks`); then a
-    multiple of {V, {V, T}} may be in the Hamiltonian of its flow.
+    multiple of {V, {V, T}} may be in the Hamiltonian of its flow. ``small`` is the index of the part εB of a
+    near-integrable H = A + εB.
     """
 
     flows: tuple[Flow, ...]
     kick: int | None = None
+    small: int | None = None
 
 
-def split(system: System) -> Splitting:
+def split(system: System, *, motions: bool = True) -> Splitting:
     """H as a sum of parts with elementary flows: as few as possible; of as many those that keep more invariants.
+
+    Kepler motions are taken together if ``motions``. A near-integrable H is split in its two parts.
 
     Raises `SpecError`, located at the Hamiltonian, that names the term that stands in the way.
     """
@@ -45,23 +50,26 @@ def split(system: System) -> Splitting:
     terms = terms_of(ring, listed) or [Term(system.hamiltonian, ring.tower.convert(system.hamiltonian))]
     invariants = _invariants(system, ring)
     refused: NoFlowError | None = None
-    best: list[Flow] | None = None
-    least: tuple[float, float] = (inf, inf)
+    best: Splitting | None = None
+    least: tuple[float, ...] = (inf, inf, inf)
     conflicts = Conflicts(ring)
-    for candidate in _candidates(system, conflicts, terms):
+    for candidate in _candidates(system, conflicts, terms, motions=motions):
         parts = conflicts.grouped(candidate)
-        if len(parts) > least[0]:
+        small = small_part(system, ring, parts)
+        if (small is None, len(parts)) > least[:2]:
             continue
-        rank = (len(parts), _lost(ring, parts, invariants))
+        rank = (small is None, len(parts), _lost(ring, parts, invariants))
         if rank >= least:
             continue
         try:
-            best, least = [flow_of(ring, part) for part in parts], rank
+            best, least = Splitting(tuple(flow_of(ring, part) for part in parts), small=small), rank
         except NoFlowError as error:
             refused = refused or error
+        if best and best.small is not None:
+            break  # two parts, one of them small: no other grouping is better
     if best is None:
         raise _refusal(system, refused)
-    return Splitting(tuple(_merged(ring, best)))
+    return best if best.small is not None else Splitting(tuple(_whole(ring, _merged(ring, list(best.flows)))))
 
 
 def _invariants(system: System, ring: Ring) -> list[Poly]:
@@ -81,13 +89,25 @@ def _lost(ring: Ring, parts: Sequence[Sequence[Term]], invariants: Sequence[Poly
     return sum(not all(ring.commute(invariant, g) for g in sums) for invariant in invariants)
 
 
-def _candidates(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
-    """The terms as they are, with companions taken out, and by blocks of π."""
+def _candidates(system: System, conflicts: Conflicts, terms: list[Term], *, motions: bool) -> Iterator[list[Term]]:
+    """The terms as they are, with Kepler motions, by blocks of π, with companions taken out, and in simpler groups."""
     yield terms
     ring = conflicts.ring
+    keplerian = with_motions(ring, terms) if motions else None
+    if keplerian:
+        yield keplerian
     blocked = by_blocks(system, ring, terms)
     if blocked:
         yield blocked
+    yield from _without_companions(system, conflicts, terms)
+    for grouped in groupings(ring, terms):
+        yield grouped
+        yield from _without_companions(system, conflicts, grouped)
+
+
+def _without_companions(system: System, conflicts: Conflicts, terms: list[Term]) -> Iterator[list[Term]]:
+    """The terms with companions taken out that make the parts fewer."""
+    ring = conflicts.ring
     for _ in range(ROUNDS):
         fewest = len(conflicts.grouped(terms))
         if fewest == 1:
@@ -99,34 +119,31 @@ def _candidates(system: System, conflicts: Conflicts, terms: list[Term]) -> Iter
                     found.append(c)
         if not found:
             return
-        found.sort(key=lambda c: (len(conflicts.grouped(c)), _size(system, ring, c)))
+        found.sort(key=lambda c: (len(conflicts.grouped(c)), size_of(system, ring, c)))
         yield from found
         terms = found[0]
-
-
-def _size(system: System, ring: Ring, terms: Sequence[Term]) -> float:
-    """The sum of the magnitudes of the coefficients of terms that move something, parameters at their defaults."""
-    values = {p.name: float(p.value) for p in system.parameters}
-    sizes = []
-    for term in terms:
-        if all(e == 0 for e in ring.field(term.element)):
-            continue
-        sizes += [ring.expression(c) for c in ring.terms(term.element, ring.state).values()]
-    try:
-        return sum(abs(v) for v in evaluate(sizes, values))
-    except (DomainError, KeyError):
-        return float("inf")
 
 
 def _merged(ring: Ring, flows: list[Flow]) -> list[Flow]:
     """Parts whose sum has linear equations with a closed form, taken together though they do not commute."""
     for i, first in enumerate(flows):
         for second in flows[i + 1 :]:
+            if first.has_motion or second.has_motion:
+                continue
             terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in (first, second)]
             found = joint_flow(ring, terms, linear=True)
             if isinstance(found, Flow):
                 return _merged(ring, [found, *(f for f in flows if f not in (first, second))])
     return flows
+
+
+def _whole(ring: Ring, flows: list[Flow]) -> list[Flow]:
+    """All parts as one if the equations of their sum are linear: the exact flow, by a matrix exponential."""
+    if len(flows) == 1:
+        return flows
+    terms = [Term(f.hamiltonian, ring.tower.convert(f.hamiltonian)) for f in flows]
+    found = joint_flow(ring, terms, linear=True, numeric=True)
+    return [found] if isinstance(found, Flow) else flows
 
 
 def _refusal(system: System, error: NoFlowError | None) -> SpecError:

@@ -38,12 +38,20 @@ class Ring:
     coordinates: tuple[str, ...]
     poisson: tuple[tuple[Poly, ...], ...]
     brackets: Matrix
+    #: Symbols that stand still along all flows, but change from step to step: the time; of lattices, neighbours.
+    still: tuple[str, ...] = ()
 
     @cached_property
     def state(self) -> tuple[int, ...]:
         """The variables that depend on coordinates, as indices."""
         tower = self.tower
         return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, self.coordinates))
+
+    @cached_property
+    def changing(self) -> tuple[int, ...]:
+        """The variables that are not known before the steps, as indices."""
+        tower, names = self.tower, [*self.coordinates, *self.still]
+        return tuple(i for i, g in enumerate(tower.gens[: len(tower.names)]) if tower.depends_on(g, names))
 
     @cached_property
     def values(self) -> list[Expression]:
@@ -149,4 +157,4 @@ def ring_of(system: System, more: Iterable[Expression] = (), symbols: Sequence[s
     images = tower.convert_all(roots)
     n, start = system.dimension, 1 + len(listed)
     poisson = tuple(tuple(images[start + i * n : start + (i + 1) * n]) for i in range(n))
-    return Ring(tower, system.coordinates, poisson, system.poisson)
+    return Ring(tower, system.coordinates, poisson, system.poisson, system.times)

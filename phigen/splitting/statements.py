@@ -6,14 +6,17 @@ order of the composition, whatever the parts are.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from phigen.geometry.system import System, hamiltonian_vector_field
-from phigen.splitting.flow import Flow
+from phigen.splitting.enclosures import enclosed
+from phigen.splitting.flow import Flow, composed
+from phigen.splitting.kepler import KeplerMotion, identities
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.expression import (
+    ONE,
     ZERO,
     Expression,
     call,
@@ -21,6 +24,7 @@ from phigen.symbolic.expression import (
     fold,
     gradient,
     rebuild,
+    sparse_derivatives,
     substitute,
     symbol,
     total,
@@ -43,6 +47,7 @@ def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]
         yield _force_statement(system, numbered)
     for k, flow in enumerate(flows, 1):
         yield _flow_statement(system, flow, k)
+    yield from _exponential_statements(system, splitting)
     for source, flow in noise:
         yield replace(_flow_statement(system, flow, 0), name=f"the flow of g of the noise {source}")
     if splitting.kick is not None:
@@ -51,6 +56,15 @@ def check(system: System, splitting: Splitting, noise: Sequence[tuple[str, Flow]
             v, name = plain[splitting.kick], f"H_{1 + splitting.kick}"
             rate = bracket(system, v, gradient(v, [time])[0])
             yield decide_zero(f"{{{name}, ∂{name}/∂{time}}} = 0", [("", rate)], system.positive)
+
+
+def _exponential_statements(system: System, splitting: Splitting) -> Iterator[Statement]:
+    """The numbers of matrix exponentials, beside enclosures of exact ones."""
+    values = {p.name: float(p.value) for p in system.parameters}
+    for k, flow in enumerate(splitting.flows, 1):
+        for exponential in flow.exponentials:
+            name = f"exp(tA) of {flow.letter}_{k} to round-off, A with {exponential.size} rows"
+            yield enclosed(name, exponential, values)
 
 
 def _force_statement(system: System, numbered: Sequence[tuple[str, Flow]]) -> Statement:
@@ -87,30 +101,98 @@ def bracket(system: System, f: Expression, g: Expression) -> Expression:
 
 
 def angles_added(e: Expression) -> Expression:
-    """sin, cos and exp of sums and differences by the addition theorems, which the ring does not know."""
+    """sin, cos, 1 − cos and exp of sums and differences by the addition theorems, which the ring does not know."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
-        if node.op not in ("sin", "cos", "exp") or args[0].op not in ("add", "sub"):
-            return rebuild(node, args)
-        a, b = args[0].args[0], args[0].args[1] if args[0].op == "add" else -args[0].args[1]
-        if node.op == "exp":
-            return call("exp", a) * call("exp", b)
-        (sin_a, cos_a), (sin_b, cos_b) = ((call("sin", v), call("cos", v)) for v in (a, b))
-        return sin_a * cos_b + cos_a * sin_b if node.op == "sin" else cos_a * cos_b - sin_a * sin_b
+        if args and args[0].op in ("add", "sub"):
+            if node.op == "exp":
+                return _exponential_of_sum(args[0])
+            if node.op in ("sin", "cos", "versin"):
+                sine, cosine = _sine_and_cosine_of_sum(args[0])
+                return {"sin": sine, "cos": cosine, "versin": ONE - cosine}[node.op]
+        return rebuild(node, args)
 
     return fold([e], visit)[0]
 
 
+def _exponential_of_sum(e: Expression) -> Expression:
+    if e.op not in ("add", "sub"):
+        return call("exp", e)
+    a, b = e.args[0], e.args[1] if e.op == "add" else -e.args[1]
+    return _exponential_of_sum(a) * _exponential_of_sum(b)
+
+
+def _sine_and_cosine_of_sum(e: Expression) -> tuple[Expression, Expression]:
+    if e.op not in ("add", "sub"):
+        return call("sin", e), call("cos", e)
+    (sin_a, cos_a), (sin_b, cos_b) = map(_sine_and_cosine_of_sum, e.args)
+    sin_b = sin_b if e.op == "add" else -sin_b
+    return sin_a * cos_b + cos_a * sin_b, cos_a * cos_b - sin_a * sin_b
+
+
 def _flow_statement(system: System, flow: Flow, k: int) -> Statement:
     """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t; or with a force for π∇H_k."""
+    part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
+    name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t" + ", for exp(tA)" * bool(flow.exponentials)
+    return decide_zero(name, list(_residuals(system, flow)), system.positive, flow.manner)
+
+
+def _residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
+    """What must vanish for a flow to be that of its vector field, by labels."""
+    if any(piece.motion for piece in flow.pieces):
+        yield from _composition_residuals(system, flow)
+    elif flow.motion:
+        yield from _motion_residuals(system, flow, flow.motion)
+    else:
+        yield from _equation_residuals(system, flow)
+
+
+def _composition_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
+    """The pieces are flows, sum to the whole, commute, and are composed."""
+    pieces = flow.pieces
+    for piece in pieces:
+        yield from _residuals(system, piece)
+    yield "sum of the pieces", flow.hamiltonian - total(piece.hamiltonian for piece in pieces)
+    for i, piece in enumerate(pieces):
+        for other in pieces[:i]:
+            yield "bracket of two pieces", bracket(system, piece.hamiltonian, other.hamiltonian)
+    increment = composed(system.coordinates, pieces).increment
+    for c, a, b in zip(system.coordinates, flow.increment, increment, strict=True):
+        yield f"composition for {c}", a - b
+
+
+def _motion_residuals(system: System, flow: Flow, motion: KeplerMotion) -> Iterator[tuple[str, Expression]]:
+    """π∇H is the field of a Kepler motion, and the increments are those of `phigen.splitting.kepler`, proved there."""
     names = system.coordinates
-    start = substitute(flow.increment, {TIME: ZERO})
-    rates = derivatives(flow.increment, TIME)
+    field = flow.vector_field(system)
+    for c, a, b in zip(names, field, motion.field(names), strict=True):
+        yield f"rate of {c}", a - b
+    for c, a, b in zip(names, flow.increment, motion.increments(names), strict=True):
+        yield f"increment of {c}", a - b
+    yield from identities()
+
+
+def _equation_residuals(system: System, flow: Flow) -> Iterator[tuple[str, Expression]]:
+    """Φ_0 = 1 and dΦ_t/dt = (π∇H_k)∘Φ_t."""
+    names = system.coordinates
+    slopes = {name: slope for e in flow.exponentials for name, slope in e.slopes().items()}
+    start = substitute(flow.increment, {TIME: ZERO, **dict.fromkeys(slopes, ZERO)})
+    rates = _rates(flow.increment, slopes)
     field = flow.vector_field(system)
     point = {c: symbol(c) + e for c, e in zip(names, flow.increment, strict=True) if not e.is_zero}
     required = substitute(field, point)
-    residuals = [(f"{c} at t = 0", e) for c, e in zip(names, start, strict=True)]
-    residuals += [(f"rate of {c}", a - angles_added(b)) for c, a, b in zip(names, rates, required, strict=True)]
-    part, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
-    name = f"the flow Φ of {part}: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t"
-    return decide_zero(name, residuals, system.positive, flow.manner)
+    yield from ((f"{c} at t = 0", e) for c, e in zip(names, start, strict=True))
+    for c, a, b in zip(names, rates, required, strict=True):
+        yield f"rate of {c}", angles_added(a) - angles_added(b)
+
+
+def _rates(increments: Sequence[Expression], slopes: Mapping[str, Expression]) -> list[Expression]:
+    """The derivatives along the time, with those of the entries of matrix exponentials."""
+    rates = derivatives(increments, TIME)
+    if not slopes:
+        return rates
+    listed = sparse_derivatives(increments, slopes)
+    return [
+        total([rate, *(d * slopes[name] for name, d in found.items())])
+        for rate, found in zip(rates, listed, strict=True)
+    ]

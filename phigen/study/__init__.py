@@ -1,1 +1,1 @@
-"""What runs show: errors, orders, invariants, exponents, classical methods to compare with."""
+"""Studies of runs: errors, orders, invariants, exponents, classical methods to compare with."""

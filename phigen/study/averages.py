@@ -38,14 +38,17 @@ class Average:
 
 
 class Averages:
-    """Running averages of ``width`` observables; ``state`` is all there is, as arrays.
+    """Running averages of ``width`` observables; ``state`` has all of it, as arrays.
 
     Rows before the time ``after``, in the direction of the run, are left out. At least ``blocks`` blocks, and fewer
     than twice as many, give the standard errors once there are so many rows.
     """
 
-    def __init__(self, width: int, *, after: float = -math.inf, backwards: bool = False, blocks: int = BLOCKS) -> None:
-        self._after, self._sign, self._blocks = after, -1.0 if backwards else 1.0, blocks
+    def __init__(
+        self, width: int, *, after: float | None = None, backwards: bool = False, blocks: int | None = None
+    ) -> None:
+        self._after = -math.inf if after is None else after
+        self._sign, self._blocks = -1.0 if backwards else 1.0, blocks or BLOCKS
         self.state: dict[str, Any] = {
             "count": np.zeros((), dtype=np.int64),
             "mean": np.zeros(width),
@@ -132,5 +135,5 @@ class Averages:
 def averages_of(run: Run, width: int) -> Averages:
     """Return empty averages of ``width`` observables over the rows that the run says."""
     choice = run.average
-    after = -math.inf if choice.after is None else float(choice.after)
-    return Averages(width, after=after, backwards=run.step < 0, blocks=choice.blocks or BLOCKS)
+    after = None if choice.after is None else float(choice.after)
+    return Averages(width, after=after, backwards=run.step < 0, blocks=choice.blocks)

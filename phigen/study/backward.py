@@ -52,20 +52,20 @@ class Modified:
         values = {**self.values, **{c: rows[:, i] for i, c in enumerate(self.coordinates)}}
         terms = [np.broadcast_to(t, len(rows)) for t in evaluate(list(self.terms), values)]
         sums: Floats = np.array([sum(h**j * t for j, t in enumerate(terms[:power])) for power in self.powers])
-        found: Floats = np.abs(sums - sums[:, :1]) / self.unit(rows[0]).size
-        return found
+        errors: Floats = np.abs(sums - sums[:, :1]) / self.unit(rows[0]).size
+        return errors
 
     def unit(self, x: Floats) -> Unit:
         """The unit of the energy along trajectories from a state (DIM,)."""
-        (found,) = units([self.hamiltonian], self.coordinates, self.values, x)
-        return found
+        (unit,) = units([self.hamiltonian], self.coordinates, self.values, x)
+        return unit
 
     def changes(self, method: Method, x: Floats, h: float, steps: int) -> Floats:
-        """The largest of these errors in so many steps from x, (corrections + 1,). Raises `StepError`."""
-        found: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
-        if not np.isfinite(found).all():
+        """The largest of these errors within ``steps`` steps from x, (corrections + 1,). Raises `StepError`."""
+        changes: Floats = self.errors(method.rows(x, h, steps, 1), h).max(axis=1)
+        if not np.isfinite(changes).all():
             raise StepError("H̃ left the finite numbers", step=0, status="NOT_FINITE")
-        return found
+        return changes
 
 
 def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> Modified:
@@ -89,7 +89,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for known in (exact, {}):
         try:
-            found = corrections(system, compilation.chart, order, CORRECTIONS, compilation.gauge, known)
+            series = corrections(system, compilation.chart, order, CORRECTIONS, compilation.gauge, known)
             break
         except (LimitError, ArithmeticError):
             continue
@@ -99,7 +99,7 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     if gauge is not None and compilation.gauge is not None:
         values |= dict(zip(compilation.gauge.symbols, np.ravel(gauge).tolist(), strict=True))
     return Modified(
-        tuple(map(found.tower.expression, found.terms)),
+        tuple(map(series.tower.expression, series.terms)),
         tuple(powers(order, CORRECTIONS + 1, symmetric=compilation.symmetric)),
         system.hamiltonian,
         system.coordinates,
@@ -107,17 +107,17 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     )
 
 
-def observed_powers(found: Modified, method: Method, x: Floats, h: float) -> list[float]:
+def observed_powers(hamiltonian: Modified, method: Method, x: Floats, h: float) -> list[float]:
     """The powers of the step that the changes of H̃ with 0, 1, … corrections shrink like; infinity at rounding.
 
     Steps are doubled from the run's step ``h`` until the changes stand out from rounding.
     """
-    observed, rounding = [math.inf] * len(found.powers), ROUNDING * found.unit(x).terms
+    observed, rounding = [math.inf] * len(hamiltonian.powers), ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
         step = h * 2**doubling
         try:
-            coarse = found.changes(method, x, step, STEPS)
-            fine = found.changes(method, x, step / 2, 2 * STEPS)
+            coarse = hamiltonian.changes(method, x, step, STEPS)
+            fine = hamiltonian.changes(method, x, step / 2, 2 * STEPS)
         except StepError:
             break
         if doubling > 1 and coarse[0] > ASYMPTOTIC:
@@ -132,7 +132,7 @@ def observed_powers(found: Modified, method: Method, x: Floats, h: float) -> lis
 
 @dataclass(frozen=True, eq=False)
 class Constancy:
-    """How constant H̃ is with 0, 1, … corrections: ``powers[m]`` is the power of the step that it should show.
+    """Changes of H̃ with 0, 1, … corrections: ``powers[m]`` is the power of the step expected of them.
 
     ``errors`` (corrections + 1, rows) are those at ``times`` (rows,), up to ``end``, of steps of size ``step``;
     ``changes`` (sizes, corrections + 1) are the largest ones at the step sizes ``sizes``, the largest first.
@@ -148,15 +148,15 @@ class Constancy:
     changes: Floats
 
 
-def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy:
-    """Measure it at the largest steps that tell an order, which may be larger than the run's.
+def constancy(hamiltonian: Modified, method: Method, x: Floats, h: float) -> Constancy:
+    """Measure the changes of H̃ at the largest steps that show an order, which may be larger than the run's.
 
     Raises `StepError`, and `NotOfferedError` if H itself changes by rounding only.
     """
-    largest, most, rounding = h, 0.0, ROUNDING * found.unit(x).terms
+    largest, most, rounding = h, 0.0, ROUNDING * hamiltonian.unit(x).terms
     for doubling in range(1, DOUBLINGS + 1):
         try:
-            change = float(found.changes(method, x, h * 2**doubling, STEPS)[0])
+            change = float(hamiltonian.changes(method, x, h * 2**doubling, STEPS)[0])
         except StepError:
             break
         if change > ASYMPTOTIC:
@@ -165,14 +165,16 @@ def constancy(found: Modified, method: Method, x: Floats, h: float) -> Constancy
     if most <= rounding:
         raise NotOfferedError("H itself changes by no more than rounding")
     sizes: Floats = largest / 2.0 ** np.arange(HALVINGS + 1, dtype=np.float64)
-    changes = np.array([found.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
+    changes = np.array([hamiltonian.changes(method, x, size, STEPS * 2**k) for k, size in enumerate(sizes.tolist())])
     # The finest step at which even the last correction leaves more than rounding.
     telling = np.flatnonzero(changes[:, -1] > rounding)
     shown = float(sizes[telling[-1] if len(telling) else 0])
     rows = method.rows(x, shown, round(STEPS * largest / shown), 1)
     times: Floats = shown * np.arange(len(rows), dtype=np.float64)
-    observed = tuple(observed_powers(found, method, x, h))
-    return Constancy(found.powers, observed, shown, times, found.errors(rows, shown), STEPS * largest, sizes, changes)
+    observed = tuple(observed_powers(hamiltonian, method, x, h))
+    return Constancy(
+        hamiltonian.powers, observed, shown, times, hamiltonian.errors(rows, shown), STEPS * largest, sizes, changes
+    )
 
 
 def truncation(m: int) -> str:

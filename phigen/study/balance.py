@@ -22,17 +22,17 @@ def powers(system: System) -> list[Expression]:
     """P and its derivatives along the motion; empty where H is an invariant, or noise works on it too."""
     if not system.driven or system.noise:
         return []
-    found, field = [], [*system.vector_field(), *(ONE for _ in system.times)]
+    time_derivatives, field = [], [*system.vector_field(), *(ONE for _ in system.times)]
     power = total([*gradient(system.hamiltonian, system.times), system.forced_rate(system.hamiltonian)])
     for _ in FINE:
-        found.append(power)
+        time_derivatives.append(power)
         slopes = gradient(power, [*system.coordinates, *system.times])
         power = total(s * f for s, f in zip(slopes, field, strict=True))
-    return found
+    return time_derivatives
 
 
 def works(t: Floats, f: Floats) -> tuple[Floats, Floats]:
-    """∫ f dt over each interval between times (rows,), from f and derivatives (4, rows); and how far it may be off."""
+    """∫ f dt over each interval between times (rows,), from f and derivatives (4, rows); and its possible error."""
     h = np.diff(t)
 
     def by(weights: tuple[float, ...]) -> Floats:

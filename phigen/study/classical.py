@@ -1,4 +1,4 @@
-"""Classical one-step methods of fixed step size, to compare with: they know the vector field and nothing else."""
+"""Classical one-step methods of fixed step size, to compare with: they use the vector field only."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Floats = NDArray[np.float64]
 Field = Callable[[Floats], Floats]
 Step = Callable[[Field, Floats, float], Floats]
 
-#: Iterations after which the implicit midpoint rule gives up; each gains a factor of order h.
+#: The largest number of iterations of the implicit midpoint rule; each gains a factor of order h.
 _ITERATIONS = 100
 _TOLERANCE = 4e-16
 #: Steps between two pieces of a long run.
@@ -83,8 +83,8 @@ def integrate(method: str, field: Field, x0: Floats, h: float, steps: int, strid
     rows = row_steps(steps, stride)
     pieces = [x for _, x in pieces_of(method, field, x0, h, rows.tolist())]
     states = np.full((len(rows), len(x0)), np.nan)
-    found = np.concatenate(pieces)
-    states[: len(found)] = found
+    computed = np.concatenate(pieces)
+    states[: len(computed)] = computed
     return states
 
 

@@ -32,13 +32,13 @@ ENERGY = "energy"
 
 
 def rounding(steps: int) -> float:
-    """What round-off may make of a quantity in so many steps, in parts of its terms: a random walk of last places."""
+    """Bound of the round-off error of a quantity after ``steps`` steps, relative to its terms: a random walk."""
     return 1e-15 * (20 + math.sqrt(steps))
 
 
 @dataclass(frozen=True)
 class Unit:
-    """What errors of a quantity are divided by: ``size``, of the ``kind`` `RELATIVE`, `TERMS`, `SITES` or `ABSOLUTE`.
+    """Unit of the errors of a quantity: its ``size``, of the ``kind`` `RELATIVE`, `TERMS`, `SITES` or `ABSOLUTE`.
 
     ``terms`` are those of the quantity at the start, which rounding is in proportion to, in this unit. ``moves`` tells
     that the quantity is no invariant, since time, forces or noise change it: what it differs by is no error.
@@ -57,8 +57,8 @@ class Unit:
     def errors(self, values: Floats, start: float) -> Floats:
         """The errors (rows,) of values (rows,)."""
         with np.errstate(invalid="ignore"):  # of energies that are not finite
-            found: Floats = np.abs(values - start) / self.size
-        return found
+            errors: Floats = np.abs(values - start) / self.size
+        return errors
 
 
 def units(
@@ -66,8 +66,8 @@ def units(
 ) -> list[Unit]:
     """The unit of each quantity on a trajectory from the state ``start`` (DIM,)."""
     at = {**parameters, **dict(zip(coordinates, np.asarray(start).tolist(), strict=True))}
-    found = (value_and_terms(q, coordinates, at) for q in quantities)
-    return [unit_of(float(value), float(terms)) for value, terms in found]
+    values = (value_and_terms(q, coordinates, at) for q in quantities)
+    return [unit_of(float(value), float(terms)) for value, terms in values]
 
 
 def units_of(system: System, parameters: Mapping[str, float], start: Floats) -> dict[str, Unit]:
@@ -98,22 +98,22 @@ def value_and_terms(
 
 
 def largest_terms(quantity: Expression, coordinates: Sequence[str], values: Mapping[str, Any]) -> float:
-    """The largest value or sum of terms along a trajectory: what rounding is in proportion to."""
+    """The largest value or sum of terms along a trajectory, to which rounding errors are proportional."""
     value, terms = value_and_terms(quantity, coordinates, values)
     return float(np.max(np.maximum(np.abs(value), terms))) or 1.0
 
 
-def stated(found: Mapping[str, Unit]) -> str:
-    """The sentence that says what errors are relative to; ``found`` are units by the names of quantities."""
-    errors = "Errors and changes" if any(unit.moves for unit in found.values()) else "Errors"
-    relative = any(unit.kind == RELATIVE for unit in found.values())
+def stated(units_by_name: Mapping[str, Unit]) -> str:
+    """The sentence that names the units of errors; ``units_by_name`` are units by the names of quantities."""
+    errors = "Errors and changes" if any(unit.moves for unit in units_by_name.values()) else "Errors"
+    relative = any(unit.kind == RELATIVE for unit in units_by_name.values())
     said = [f"{errors} are relative to the value at the start"] if relative else []
     for kind, how in (
         (TERMS, "relative to Σ |xᵢ ∂ᵢ{0}| at the start, since {0} is nearly 0 there"),
         (SITES, "relative to Σ |{0} of a site| at the start, since {0} is nearly 0 there"),
         (ABSOLUTE, "absolute, since {0} is 0 at the start"),
     ):
-        for name in (name for name, unit in found.items() if unit.kind == kind):
+        for name in (name for name, unit in units_by_name.items() if unit.kind == kind):
             said.append(f"{'those' if said else errors} of {name} are {how.format(_letter(name))}")
     return f"{'; '.join(said)}."
 

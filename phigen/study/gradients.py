@@ -1,4 +1,4 @@
-"""Gradients of runs as verification measures them: against tangent maps, and against differences of the runs."""
+"""Verification of gradients of runs: against tangent maps, and against differences of the runs."""
 
 from __future__ import annotations
 
@@ -62,16 +62,16 @@ def of_solver(
     begin = t0 if solver.interface.time else None
 
     def carried(vectors: Floats) -> Floats:
-        found, product = [], vectors.T
+        products, product = [], vectors.T
         for step, (_, tangent) in enumerate(solver.tangents(x, h, STEPS, t0=begin, parameters=parameters), 1):
             product = tangent @ product
             if step % STRIDE == 0 or step == STEPS:
-                found.append(product.T)
-        return np.array(found)
+                products.append(product.T)
+        return np.array(products)
 
     def pullback(bars: Floats) -> tuple[Floats, Mapping[str, Any]]:
-        found = solver.pullback(x, h, STEPS, bars, STRIDE, t0=begin, parameters=parameters)
-        return found.x0_bar, found.parameters_bar
+        gradients = solver.pullback(x, h, STEPS, bars, STRIDE, t0=begin, parameters=parameters)
+        return gradients.x0_bar, gradients.parameters_bar
 
     def rows(start: Floats, values: Mapping[str, Any]) -> Floats:
         return solver.integrate(start, h, STEPS, STRIDE, t0=begin, parameters=values).x
@@ -92,12 +92,12 @@ def of_lattice(
 
     def pullback(bars: Floats) -> tuple[Floats, Mapping[str, Any]]:
         shaped = bars.reshape(-1, *x.shape)
-        found = solver.pullback(x, h, STEPS, shaped, STRIDE, parameters=parameters, **about)
-        return found.x0_bar.reshape(-1), found.parameters_bar
+        gradients = solver.pullback(x, h, STEPS, shaped, STRIDE, parameters=parameters, **about)
+        return gradients.x0_bar.reshape(-1), gradients.parameters_bar
 
     def rows(start: Floats, values: Mapping[str, Any]) -> Floats:
-        made = solver.integrate(start.reshape(x.shape), h, STEPS, STRIDE, parameters=values, **about)
-        return np.asarray(made.x).reshape(len(made.x), -1)
+        trajectory = solver.integrate(start.reshape(x.shape), h, STEPS, STRIDE, parameters=values, **about)
+        return np.asarray(trajectory.x).reshape(len(trajectory.x), -1)
 
     return GradedRun(x.reshape(-1), units, parameters, rows, pullback, carried)
 
@@ -116,14 +116,14 @@ def measured(held: Sequence[GradedRun], free: Sequence[GradedRun], where: str = 
 
 def _largest(runs: Sequence[GradedRun], error: Callable[[GradedRun], float]) -> float:
     """Return the largest error of all runs; infinite where one fails, or is not finite."""
-    found = 0.0
+    largest = 0.0
     for run in runs:
         try:
             value = error(run)
         except StepError:
             return math.inf
-        found = max(found, value if math.isfinite(value) else math.inf)
-    return found
+        largest = max(largest, value if math.isfinite(value) else math.inf)
+    return largest
 
 
 def transposition_error(run: GradedRun) -> float:
@@ -156,7 +156,7 @@ def difference_error(run: GradedRun) -> float:
     return worst
 
 
-#: The start and the parameters, moved by so much.
+#: The start and the parameters after a displacement.
 _Moved = Callable[[float], tuple[Floats, Mapping[str, Any]]]
 
 

@@ -1,4 +1,4 @@
-"""What noise makes of steps of lattices: strong orders along common paths, with the sites as many paths at once."""
+"""Strong orders of steps of lattices with noise, along common paths; each site follows a path of its own."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def strong_order(
 
 
 def failures(compilation: Compilation, x0: Floats, parameters: Mapping[str, Any], t0: float | None, h: float) -> int:
-    """How many steps from a state fail of those whose increments are all as large as they can be."""
+    """The number of steps from a state that fail with the largest possible increments."""
     solver, noise = lattice_solver_of(compilation, "numpy"), compilation.program.noise
     assert noise is not None
     random, failed = np.random.default_rng(SEED), 0
@@ -120,8 +120,8 @@ def _slope(
     def slope(at: Floats, t: float) -> Floats:
         session.place(at)
         session._sites.t = t
-        found: Floats = session.vector_field()
-        return found
+        field: Floats = session.vector_field()
+        return field
 
     return slope
 

@@ -1,4 +1,4 @@
-"""Verification of lattices: what their solvers must show, measured on a run and on small lattices.
+"""Verification of lattices: properties of their solvers, measured on a run and on small lattices.
 
 The Poisson identity is that of a lattice of a few sites: the statement about any size is proved, and this would show a
 sweep that is printed wrongly. Its sites start as some of the run.
@@ -49,7 +49,7 @@ WORST_SITE = "Casimirs of sites are those of the site where they changed most."
 
 @dataclass(frozen=True)
 class _Subject:
-    """What is examined."""
+    """The subject of a verification: the compiled lattice, its solvers and its run."""
 
     compilation: Compilation
     solvers: Mapping[str, LatticeSolver]
@@ -63,16 +63,18 @@ class _Subject:
         """The target that is measured where one suffices: C, if it is there."""
         return next(iter(self.solvers.values()))
 
-    def time(self, made: LatticeTrajectory, frame: int) -> float | None:
+    def time(self, trajectory: LatticeTrajectory, frame: int) -> float | None:
         """The time of a frame, None where there is none."""
-        return None if self.t0 is None else float(made.t[frame])
+        return None if self.t0 is None else float(trajectory.t[frame])
 
     def stepped(self, x: Floats, h: float, steps: int = 1, t0: float | None = None) -> Floats:
         """The state after some steps, from the time t0 on, or that of the run."""
         t0 = self.t0 if t0 is None else t0
-        made = self.solver.integrate(x, h, steps, max(1, steps), t0=t0, seed=self.seed, parameters=self.start.arguments)
-        found: Floats = made.x[-1]
-        return found
+        trajectory = self.solver.integrate(
+            x, h, steps, max(1, steps), t0=t0, seed=self.seed, parameters=self.start.arguments
+        )
+        end: Floats = trajectory.x[-1]
+        return end
 
 
 def verify_lattice(
@@ -101,23 +103,23 @@ def verify_lattice(
     steps = min(steps, max(20, (min(most, FEW_UPDATES) if quick else most) // int(np.prod(start.sizes))))
     name = compilation.spec.name
     with progress.stage(f"{name}: {steps} steps"):
-        made = subject.solver.integrate(
+        trajectory = subject.solver.integrate(
             start.state, h, steps, max(1, steps // FRAMES), t0=t0, seed=seed, parameters=start.arguments
         )
     checks = [_order(subject if seed is None else _without_noise(subject), quiet=seed is not None)]
-    checks += _conserved(compilation.cell, made)
+    checks += _conserved(compilation.cell, trajectory)
     with progress.stage(f"{name}: single steps"):
-        checks += [_reversal(subject, made), *_agreement(subject, made)]
-        checks += _identity(compilation.cell, subject, made)
+        checks += [_reversal(subject, trajectory), *_agreement(subject, trajectory)]
+        checks += _identity(compilation.cell, subject, trajectory)
     if compilation.program.extras.adjoint:
         with progress.stage(f"{name}: gradients"):
-            checks += _gradients(compilation.cell, subject, made)
+            checks += _gradients(compilation.cell, subject, trajectory)
     if seed is not None:
         with progress.stage(f"{name}: paths of the noise"):
             checks += _noise(compilation.cell, subject, quick=quick)
-    checks += _single(compilation.cell, subject, single, made) if single else []
+    checks += _single(compilation.cell, subject, single, trajectory) if single else []
     label = compilation.told(compilation.method)
-    said = f"{stated(units_of(compilation.cell, made))} {WORST_SITE}"
+    said = f"{stated(units_of(compilation.cell, trajectory))} {WORST_SITE}"
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said)
 
 
@@ -133,50 +135,50 @@ def _without_noise(subject: _Subject) -> _Subject:
 
 
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
-    """How errors fall with the step, from the pair of steps where it shows best: the least errors above rounding."""
+    """The observed order, from the pair of steps with the smallest errors above rounding."""
     name = "observed order, without the noise" if quiet else "observed order"
     step = subject.compilation.program.step
     if isinstance(step, Sweeps) and len(step.parts) == 1 and not step.by_colour:
         return Check(name, math.inf)
     order, x, size = subject.compilation.order.order, subject.start.state, _size(subject.start.state)
-    span, found = 4 * abs(subject.h), dict[float, float]()
+    span, slopes = 4 * abs(subject.h), dict[float, float]()
     for _ in range(5):
         try:
             far = subject.stepped(x, span / 256, 256)
             errors = [np.abs(subject.stepped(x, span / n, n) - far).max() / size for n in (4, 8, 16)]
         except StepError:
             break
-        found |= {b: math.log2(a / b) for a, b in pairwise(errors) if 1e-11 < b < a < 0.1}
+        slopes |= {b: math.log2(a / b) for a, b in pairwise(errors) if 1e-11 < b < a < 0.1}
         span *= 2
-    measured = found[min(found)] if found else math.nan
+    measured = slopes[min(slopes)] if slopes else math.nan
     passed = measured >= order - ORDER_SLACK
     return Check(name, measured, f"≥ {order - ORDER_SLACK:g}", passed, f"{measured:.2f} instead of {order}")
 
 
-def _conserved(cell: Cell, made: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
+def _conserved(cell: Cell, trajectory: LatticeTrajectory, coarser: float = 1.0) -> Iterator[Check]:
     """Energy, Casimirs and invariants along the run; numbers have units of the last place so much ``coarser``."""
-    errors = errors_of(cell, made)
-    least = coarser * rounding(made.steps)
-    yield from _energy(cell, made, errors, least)
+    errors = errors_of(cell, trajectory)
+    least = coarser * rounding(trajectory.steps)
+    yield from _energy(cell, trajectory, errors, least)
     for name, (_, kind) in cell.casimirs.items():
-        if name in made.solver.interface.moving:
+        if name in trajectory.solver.interface.moving:
             yield Check(f"Casimir {name}: largest change", float(errors[name].max()))
             continue
-        value = float(np.max(np.abs(made.casimirs[name][0])))
+        value = float(np.max(np.abs(trajectory.casimirs[name][0])))
         # the worst of many sites; a sum of their logarithms
-        limit = {"sites": 8.0, "sum": 1.0, "product": max(1.0, math.sqrt(made.x[0][0].size))}[kind] * least
+        limit = {"sites": 8.0, "sum": 1.0, "product": max(1.0, math.sqrt(trajectory.x[0][0].size))}[kind] * least
         error = float(errors[name].max()) / (value if kind == "product" and value else max(1.0, value))
         yield Check(
             f"Casimir {name}: largest error", error, f"≤ {limit:.0e}", error <= limit, f"changes by {error:.1e}"
         )
         if kind == "sites":
-            spread = float(np.std(made.casimirs[name][-1] - made.casimirs[name][0]))
+            spread = float(np.std(trajectory.casimirs[name][-1] - trajectory.casimirs[name][0]))
             yield Check(f"Casimir {name}: spread over the sites", spread)
     for name in cell.invariants:
         yield Check(f"invariant {name}: largest error", float(errors[name].max()))
 
 
-def _energy(cell: Cell, made: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
+def _energy(cell: Cell, trajectory: LatticeTrajectory, errors: Mapping[str, Floats], least: float) -> Iterator[Check]:
     """Energy without drift, or its balance."""
     what = next(name for name in (ENERGY, BALANCE, CHANGE) if name in errors)
     energy = errors[what]
@@ -184,7 +186,7 @@ def _energy(cell: Cell, made: LatticeTrajectory, errors: Mapping[str, Floats], l
         yield Check("energy: largest change", float(energy.max()))
         return
     yield Check(f"{what}: largest error", float(energy.max()))
-    least = max(least, works(cell, made)[1] / made.energy_scale) if what == BALANCE else least
+    least = max(least, works(cell, trajectory)[1] / trajectory.energy_scale) if what == BALANCE else least
     quarter = max(1, 3 * len(energy) // 4)
     before, after = float(energy[:quarter].max()), float(energy[quarter:].max())
     grown = after / before if before > 10 * least else math.nan
@@ -194,39 +196,41 @@ def _energy(cell: Cell, made: LatticeTrajectory, errors: Mapping[str, Floats], l
     yield Check(f"{what}: last quarter/before", grown, limit, passed, f"grows by a factor of {grown:.1f}")
 
 
-def _reversal(subject: _Subject, made: LatticeTrajectory) -> Check:
+def _reversal(subject: _Subject, trajectory: LatticeTrajectory) -> Check:
     worst = 0.0
     for k in (0, -1):
-        x, t0 = made.x[k], subject.time(made, k)
+        x, t0 = trajectory.x[k], subject.time(trajectory, k)
         after = None if t0 is None else t0 + subject.h
         back = subject.stepped(subject.stepped(x, subject.h, 1, t0), -subject.h, 1, after)
         worst = max(worst, float(np.abs(back - x).max()) / _size(x))
     return Check("reversibility", worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
 
-def _agreement(subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
-    """How far one step of the other targets is from that of the first."""
+def _agreement(subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
+    """The difference between one step of the other targets and that of the first."""
     first, *others = subject.solvers.items()
     for target, solver in others:
         worst = 0.0
         for k in (0, -1):
-            x, t0 = made.x[k], subject.time(made, k)
-            given: dict[str, Any] = {"t0": t0, "seed": subject.seed, "parameters": subject.start.arguments}
-            a, b = (s.step(x, subject.h, **given) for s in (first[1], solver))
+            x, t0 = trajectory.x[k], subject.time(trajectory, k)
+            options: dict[str, Any] = {"t0": t0, "seed": subject.seed, "parameters": subject.start.arguments}
+            a, b = (s.step(x, subject.h, **options) for s in (first[1], solver))
             worst = max(worst, float(np.abs(a - b).max()) / _size(x))
         name = f"agreement of {target} with {first[0]}"
         yield Check(name, worst, f"≤ {ONE_STEP:.0e}", worst <= ONE_STEP, f"differs by {worst:.1e}")
 
 
-def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, made: LatticeTrajectory) -> Iterator[Check]:
-    """What single precision makes of a step, and of the Casimirs along a run."""
+def _single(cell: Cell, subject: _Subject, solver: LatticeSolver, trajectory: LatticeTrajectory) -> Iterator[Check]:
+    """Errors of single precision: of a step, and of the Casimirs along a run."""
     single = replace(subject, solvers={"c": solver})
-    worst = single_precision.farthest(single.stepped, subject.stepped, [made.x[0], made.x[-1]], subject.h)
+    worst = single_precision.farthest(single.stepped, subject.stepped, [trajectory.x[0], trajectory.x[-1]], subject.h)
     limit = single_precision.ONE_STEP
-    name, reason = "single precision: a step, beside double", f"{worst:.1e} is no rounding"
+    name, reason = "single precision: a step, beside double", f"{worst:.1e} is more than rounding"
     yield Check(name, worst, f"≤ {limit:.0e}", worst <= limit, reason)
-    stride, arguments = max(1, made.steps // FRAMES), subject.start.arguments
-    run = solver.integrate(subject.start.state, subject.h, made.steps, stride, t0=subject.t0, parameters=arguments)
+    stride, arguments = max(1, trajectory.steps // FRAMES), subject.start.arguments
+    run = solver.integrate(
+        subject.start.state, subject.h, trajectory.steps, stride, t0=subject.t0, parameters=arguments
+    )
     for check in _conserved(cell, run, single_precision.COARSER):
         if check.limit and check.name.startswith("Casimir"):
             yield replace(check, name=f"single precision: {check.name}")
@@ -246,27 +250,29 @@ def _noise(cell: Cell, subject: _Subject, *, quick: bool) -> Iterator[Check]:
     x, parameters = _on_few(cell, start, sizes, bonds)
     commuting = any(s.holds and s.name == COMMUTING for s in noise_statements(cell))
     stated = 1.0 if commuting else 0.5
-    given = subject.compilation, x, parameters, subject.t0, subject.h
+    subject_arguments = subject.compilation, x, parameters, subject.t0, subject.h
     paths = -(-(FEW_PATHS if quick else MANY_PATHS) // x[0].size)
-    found = lattice_noise.strong_order(*given, paths)
-    limit, reason = f"≥ {stated - STRONG_SLACK:g}", f"{found:.2f} instead of {stated:g}"
-    yield Check("strong order, along common paths", found, limit, found >= stated - STRONG_SLACK, reason)
-    failed = lattice_noise.failures(*given)
+    observed_order = lattice_noise.strong_order(*subject_arguments, paths)
+    limit, reason = f"≥ {stated - STRONG_SLACK:g}", f"{observed_order:.2f} instead of {stated:g}"
+    yield Check(
+        "strong order, along common paths", observed_order, limit, observed_order >= stated - STRONG_SLACK, reason
+    )
+    failed = lattice_noise.failures(*subject_arguments)
     name, reason = "steps that fail, of increments as large as can be", f"{failed} fail; a smaller step helps"
     yield Check(name, failed, "none", failed == 0, reason)
 
 
-def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
+def _identity(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
     """The Poisson identity, with the exact tangent maps of all targets; and that these are derivatives of steps.
 
     The largest entry of DΦ π DΦᵀ − π∘Φ is relative to that of |DΦ| |π| |DΦ|ᵀ, in what is usual of each field.
     """
     about, sizes = subject.solver.interface, _few_sizes(subject)
-    whole, wanted = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
+    whole, site_count = expand(cell, sizes, ring(sizes[0]) if about.graph else ()), int(np.prod(sizes))
     x, parameters = _on_few(cell, subject.start, sizes, whole.bonds)
     few = _Few(whole, subject, parameters, x)
-    usual = np.abs(made.x).max(axis=0).reshape(len(x), -1)
-    fields = _units(usual.max(axis=1).repeat(wanted))
+    usual = np.abs(trajectory.x).max(axis=0).reshape(len(x), -1)
+    fields = _units(usual.max(axis=1).repeat(site_count))
     where = f"on {'×'.join(map(str, sizes))} sites"
     if not cell.forces:
         defect = max(few.defect(solver, f * subject.h, fields) for solver in subject.solvers.values() for f in (1, -1))
@@ -279,14 +285,14 @@ def _identity(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterato
     tried = [(units, apart) for units in (fields, each) for apart in (3e-3, 3e-4)]
     slip = min(max(few.slip(s, units, apart) for s in subject.solvers.values()) for units, apart in tried)
     name, limit = f"tangent map against differences {where}", f"≤ {DIFFERENCES:.0e}"
-    yield Check(name, slip, limit, slip <= DIFFERENCES, f"is no derivative of the step, {slip:.1e} off")
+    yield Check(name, slip, limit, slip <= DIFFERENCES, f"is not the derivative of the step, {slip:.1e} off")
 
 
-def _gradients(cell: Cell, subject: _Subject, made: LatticeTrajectory) -> Iterator[Check]:
+def _gradients(cell: Cell, subject: _Subject, trajectory: LatticeTrajectory) -> Iterator[Check]:
     """Gradients of all targets on a few sites, along every parameter; of the first on those of the run, if not many."""
     sizes, start, about = _few_sizes(subject), subject.start, (subject.h, subject.t0)
     x, parameters = _on_few(cell, start, sizes, ring(sizes[0]) if subject.solver.interface.graph else ())
-    usual = _units(np.abs(made.x).max(axis=tuple(i for i in range(made.x.ndim) if i != 1)))
+    usual = _units(np.abs(trajectory.x).max(axis=tuple(i for i in range(trajectory.x.ndim) if i != 1)))
     few = [
         gradients.of_lattice(s, x, usual.repeat(x[0].size), about[0], parameters, about[1])
         for s in subject.solvers.values()
@@ -330,7 +336,7 @@ class _Few:
 
     @property
     def given(self) -> dict[str, Any]:
-        """What steps are asked for with."""
+        """Keyword arguments of the steps."""
         return {"t0": self.subject.t0, "seed": self.subject.seed, "parameters": self.parameters}
 
     def tangent(self, solver: LatticeSolver, h: float) -> tuple[Floats, Floats]:
@@ -348,15 +354,15 @@ class _Few:
         return float(np.abs(slopes @ before @ slopes.T - image).max()) / size
 
     def slip(self, solver: LatticeSolver, units: Floats, apart: float) -> float:
-        """How far the derivative is from differences of order 6, relative to its largest entry, in some units."""
+        """The error of the derivative against differences of order 6, relative to its largest entry, in some units."""
 
         def step(y: Floats) -> Floats:
             there = solver.step((y * units).reshape(self.x.shape), self.subject.h, **self.given)
             return np.asarray(there.reshape(-1) / units)
 
         slopes = self.tangent(solver, self.subject.h)[1] * units / units[:, None]
-        found = _slopes(step, self.x.reshape(-1) / units, apart)
-        return float(np.abs(slopes - found).max() / np.abs(slopes).max())
+        differences = _slopes(step, self.x.reshape(-1) / units, apart)
+        return float(np.abs(slopes - differences).max() / np.abs(slopes).max())
 
 
 def _units(sizes: Floats) -> Floats:
@@ -375,25 +381,25 @@ def _slopes(function: Callable[[Floats], Floats], y: Floats, apart: float) -> Fl
 
 def _picked(start: Start, sizes: Sequence[int]) -> Any:
     """Numbers of sites of a run, in the places of a small lattice."""
-    sites, wanted = int(np.prod(start.sizes)), int(np.prod(sizes))
-    return np.random.default_rng(1).choice(sites, wanted, replace=sites < wanted).reshape(sizes)
+    sites, count = int(np.prod(start.sizes)), int(np.prod(sizes))
+    return np.random.default_rng(1).choice(sites, count, replace=sites < count).reshape(sizes)
 
 
 def _on_few(
     cell: Cell, start: Start, sizes: Sequence[int], bonds: Sequence[tuple[int, int]]
 ) -> tuple[Floats, dict[str, Any]]:
     """A state of a small lattice, and its parameters: those of sites that are picked."""
-    picked, found = _picked(start, sizes), dict[str, Any]()
+    picked, arguments = _picked(start, sizes), dict[str, Any]()
     for p in cell.parameters:
         value = np.asarray(start.parameters[p.name])
         if p.at == "sites":
-            found[p.name] = value.reshape(-1)[picked]
+            arguments[p.name] = value.reshape(-1)[picked]
         elif p.at == "bonds":
-            found[p.name] = np.resize(value, len(bonds))
+            arguments[p.name] = np.resize(value, len(bonds))
         else:
-            found[p.name] = float(value)
-    found |= {"bonds": np.array(bonds)} if start.graph else {}
-    return start.state.reshape(len(cell.fields), -1)[:, picked], found
+            arguments[p.name] = float(value)
+    arguments |= {"bonds": np.array(bonds)} if start.graph else {}
+    return start.state.reshape(len(cell.fields), -1)[:, picked], arguments
 
 
 def _poisson(whole: Expansion, x: Floats, parameters: Mapping[str, Any]) -> Floats:

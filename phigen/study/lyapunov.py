@@ -60,13 +60,13 @@ class Spectrum:
 
     @property
     def uncertainty(self) -> float:
-        """How much an exponent changed in the second half of the time, at most; they converge like 1/t at best."""
+        """The largest change of an exponent in the second half of the time; exponents converge like 1/t at best."""
         late = self.history[self.times >= self.t / 2]
         return float(np.max(np.ptp(late, axis=0)))
 
 
 class FrameGrowth:
-    """The growth of a frame of tangent vectors, step by step; ``state`` is all there is, as arrays.
+    """The growth of a frame of tangent vectors, step by step; ``state`` has all of it, as arrays.
 
     It begins as all unit vectors, or as the columns of ``frame``.
     """
@@ -85,8 +85,8 @@ class FrameGrowth:
     @property
     def frame(self) -> Floats:
         """The vectors, as orthonormal columns."""
-        found: Floats = self.state["frame"]
-        return found
+        frame: Floats = self.state["frame"]
+        return frame
 
     def see(self, tangent: Floats) -> None:
         """Carry the frame through one step of that derivative."""
@@ -161,14 +161,14 @@ def lattice_spectrum(
     expect_room(f"the arrays of {count} tangent vectors", 3 * 8 * count * x.size)  # drawn, in qr, and orthonormal
     frame = np.linalg.qr(np.random.default_rng(0).normal(size=(x.size, count)))[0]
     growth = FrameGrowth(x.size, h, frame)
-    given: Any = {"t0": t0, "parameters": parameters, **draws}
-    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), every, **given)
+    options: Any = {"t0": t0, "parameters": parameters, **draws}
+    carry = solver.tangents(x, h, steps, frame.T.reshape(count, *x.shape), every, **options)
     following, done = None, 0
     while done < steps:
         _, carried = carry.send(following)
-        made = min(every, steps - done)
-        growth.take(carried.reshape(count, -1).T, made)
-        following, done = growth.frame.T.reshape(carried.shape), done + made
+        advanced = min(every, steps - done)
+        growth.take(carried.reshape(count, -1).T, advanced)
+        following, done = growth.frame.T.reshape(carried.shape), done + advanced
         if progress:
             progress(done)
     return growth.spectrum()

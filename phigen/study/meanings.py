@@ -1,4 +1,4 @@
-"""What each row of a verification measures, and what it means if the row fails: for people who read a table."""
+"""Rows of a verification: the quantity that each measures, and the cause if it fails; for readers of the table."""
 
 from __future__ import annotations
 
@@ -7,139 +7,149 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Meaning:
-    """``row`` begins the names of the checks that are meant; ``failure`` is empty for rows that are not judged."""
+    """Description of the checks whose names begin with ``row``; ``failure`` is empty for rows that are not judged."""
 
     row: str
     measures: str
     failure: str = ""
 
 
+#: The failure of every row that judges the drift of the energy.
+_DRIFT = "the solver does not follow the flow of a Hamiltonian near H, or the step is too large for one to exist"
+
 MEANINGS = (
     Meaning(
         "observed order",
-        "how the error at one time shrinks with the step: like h^order. The solution is that of DOP853 at small steps. "
-        "∞ means that all errors are those of rounding",
-        "S_1 … S_k or the composition are not those of the stated order",
+        "the power p of h^p with which the error at a fixed time shrinks. The reference is DOP853 with small "
+        "steps. ∞: all errors are rounding",
+        "the terms S_1 … S_k, or the composition, do not have the stated order",
     ),
     Meaning(
         "strong order",
-        "how the error along one path of the noise shrinks with the step, as a mean over 48 paths. The increments of "
-        "a coarse step are sums of those of finer ones; the solution is that of the fields along the path joined by "
-        "lines",
-        "the noise is not that of the spec, or not in the sense of Stratonovich, or sources are taken twice",
+        "the power of h with which the error along one path of the noise shrinks, as a mean over 48 paths. The "
+        "increments of a coarse step are sums of those of finer steps. The reference is the solution along the "
+        "path with straight lines between its points",
+        "the noise is not that of the spec, or not in the sense of Stratonovich, or a source is counted twice",
     ),
     Meaning(
         "steps that fail",
-        "steps from four states with increments of the noise that are all as large as they can be",
-        "the run may fail some day, where a rare increment makes a step impossible: make the step smaller",
+        "the number of failed steps from four states, with the largest increments of the noise",
+        "a rare increment can make a step of the run fail: use a smaller step",
     ),
     Meaning(
         "energy: largest change",
-        "how far H went from its value at the start where there is noise; it is no error",
+        "the largest distance of H from its value at the start, for systems with noise. This is not an error",
     ),
     Meaning(
         "Casimir: largest error",
-        "how far a Casimir went from its value at the start, relative to that, over all steps",
-        "the step leaves the symplectic leaf, or rounding adds up to a drift; the bound is a random walk of rounding "
-        "errors, 10⁻¹⁵ (20 + √steps) of the largest terms of the Casimir",
+        "the largest error of a Casimir over all steps, relative to its value at the start",
+        "the step leaves the symplectic leaf, or rounding errors add up. The bound is a random walk of rounding "
+        "errors, 10⁻¹⁵ (20 + √steps) times the largest term of the Casimir",
     ),
     Meaning(
         "Casimir: last/first window",
-        "the largest error in the last tenth of the run over that in the first; nothing where errors are of rounding, "
-        "or where the first tenth has not seen every coordinate turn back and forth",
+        "the largest error in the last tenth of the run, divided by that in the first tenth. Left out if errors "
+        "are rounding, or if some coordinate does not turn back and forth within the first tenth",
     ),
     Meaning(
         "Casimir: spread over the sites",
-        "of the changes of a Casimir that every site has, from the first frame to the last: their standard deviation",
+        "the standard deviation over the sites of the change of a Casimir, from the first frame to the last",
     ),
     Meaning(
-        "Casimir: largest change", "how far a Casimir of a lattice went that a vector force changes; it is no error"
+        "Casimir: largest change",
+        "the largest change of a Casimir of a lattice on which a vector force acts. This is not an error",
     ),
-    Meaning("invariant: largest error", "how far a sum over the sites went, relative to the magnitudes of its terms"),
+    Meaning(
+        "invariant: largest error",
+        "the largest error of a sum over the sites, relative to the magnitudes of its terms",
+    ),
     Meaning(
         "energy: largest error",
-        "how far H went from its value at the start, relative to that; it depends on the step",
+        "the largest error of H, relative to its value at the start. It depends on the step",
     ),
     Meaning(
         "energy balance: largest error",
-        "the same of H less the work that was done, where H depends on the time or forces act",
+        "the largest error of H minus the work done, for systems with a time or forces",
     ),
     Meaning(
         "energy: last/first window",
-        "the same quotient for the energy: about 1 if it oscillates, 10 if it drifts. It is judged if the orbit stays "
-        "where it was in the first half",
-        "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+        "the largest energy error in the last tenth of the run, divided by that in the first tenth: about 1 if the "
+        "error oscillates, 10 if it drifts. Judged if the orbit stays in the region of its first half",
+        _DRIFT,
     ),
     Meaning(
         "energy: last quarter/before",
-        "the largest error of the energy in the last quarter of a run of a lattice over that before: about 1 without "
-        "drift; nothing where errors are of rounding",
-        "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+        "the largest energy error in the last quarter of a lattice run, divided by that before: about 1 without "
+        "drift. Left out if errors are rounding",
+        _DRIFT,
     ),
     Meaning(
         "energy balance: last quarter/before",
-        "the same of H less the work that was done on a lattice that is driven",
+        "the same quotient for H minus the work done on a driven lattice",
     ),
     Meaning(
         "Poisson identity",
-        "the largest entry of DΦ π DΦᵀ − π∘Φ over that of π, on a lattice of a few sites that are as some of the "
-        "run; DΦ by differences of order six",
+        "the largest entry of DΦ π DΦᵀ − π∘Φ, divided by that of π, on a lattice of a few sites like those of the "
+        "run. DΦ is computed by differences of order six",
         "the step is not a Poisson map",
     ),
     Meaning(
         "energy balance: last/first window",
-        "the same quotient for the balance of energy",
-        "the solver does not follow the flow of any Hamiltonian near H, or the step is so large that H̃ says nothing",
+        "the same quotient for H minus the work done",
+        _DRIFT,
     ),
     Meaning(
         "Poisson defect",
-        "the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms; DΦ is the derivative of a step Φ that the code "
-        "states itself. Steps are taken at four states, of sizes h, h/2 and −h",
-        "the step is not a Poisson map. Of an approximate bi-realisation the defect must shrink with the stated power "
-        "of h",
+        "the largest entry of DΦ π DΦᵀ − π∘Φ, relative to its terms. DΦ is the derivative of a step Φ as the code "
+        "computes it. Steps start from four states, with sizes h, h/2 and −h",
+        "the step is not a Poisson map. For an approximate bi-realisation the defect must shrink with the stated "
+        "power of h",
     ),
     Meaning(
         "tangent map",
-        "the stated derivative of a step against differences of order six of the step itself, good to 10⁻¹²",
-        "the derivative is that of another map, so the rows and exponents that rest on it mean nothing",
+        "the difference between the derivative of a step as the code computes it and differences of order six of "
+        "the step, which are accurate to 10⁻¹²",
+        "the computed derivative is wrong, and so are the Poisson defect and Lyapunov exponents, which use it",
     ),
     Meaning(
         "gradient against tangent maps",
-        "⟨bar, DΦ v⟩ against ⟨DΦᵀ bar, v⟩ over eleven steps with cotangents at every fourth, relative to its terms, "
-        "where the code has gradients",
-        "the reverse pass is not the transpose of the steps that are made",
+        "the difference between ⟨bar, DΦ v⟩ and ⟨DΦᵀ bar, v⟩ over eleven steps with cotangents at every fourth, "
+        "relative to its terms, for code with gradients",
+        "the reverse pass is not the transpose of the steps",
     ),
     Meaning(
         "gradient against differences",
-        "derivatives of such a run along the start and each parameter, against differences of order six",
-        "gradients are those of another run, so fits and optimisations that rest on them go astray",
+        "the difference between derivatives of such a run by its start and each parameter, and differences of "
+        "order six",
+        "the gradients are wrong, and so are fits and optimisations that use them",
     ),
     Meaning(
         "gradients of members",
-        "gradients of runs that are made side by side against those of the same runs one by one",
-        "ensembles have other gradients than their members",
+        "the difference between gradients of an ensemble and those of its members one by one",
+        "gradients of ensembles are wrong",
     ),
     Meaning(
         "reversibility",
-        "how far a step of h and one of −h lead from the start. Judged for symmetric methods",
-        "the method is not symmetric, or the equation of a step was not solved to the last bit",
+        "the distance from the start after a step of h and one of −h. Judged for symmetric methods",
+        "the method is not symmetric, or the equation of a step was not solved to rounding",
     ),
     Meaning(
         "agreement",
-        "single steps of C and NumPy from the same states",
-        "one of the targets computes something else: an error of its emitter or of the compiler's flags",
+        "the difference between single steps of C and NumPy from the same states",
+        "one of the targets is wrong: an error of phigen, or of the compiler's flags",
     ),
     Meaning(
         "largest step",
-        "how many times larger than the run's a step may be before the equation of a step has no solution, at most 256",
-        "the step of the run itself fails: make it smaller",
+        "the largest step for which the equation of a step has a solution, as a multiple of the step of the run; "
+        "at most 256",
+        "the step of the run itself fails: use a smaller one",
     ),
     Meaning(
         "modified H",
-        "the power of h that changes of the modified Hamiltonian with one and two corrections shrink like. Steps are "
-        "doubled from the run's until the changes stand out from rounding; ∞ means that they never do. For series up "
-        "to order 6 without composition",
-        "the step is the flow of another Hamiltonian than the one stated: S_{k+1}, … or a sign is wrong",
+        "the power of h with which changes of the modified Hamiltonian shrink, with one and two corrections. Steps "
+        "are doubled from that of the run until the changes exceed rounding; ∞: they never do. For series up to "
+        "order 6 without composition",
+        "the step is not the flow of the stated Hamiltonian: a sign, or a term from S_{k+1} on, is wrong",
     ),
 )
 

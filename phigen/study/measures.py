@@ -1,4 +1,4 @@
-"""What verification measures of a one-step method: numbers only, judged elsewhere."""
+"""Measurements of one-step methods for verification: numbers only, judged elsewhere."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from phigen.symbolic.arrays import Floats, evaluate
 #: Below this error, relative to the size of a quantity, differences say nothing about the method.
 ROUNDING = 4e-16
 
-#: By how much distances of differences are shorter than usual.
+#: The factor by which distances of differences are shorter than usual.
 DISTANCES = (1.0, 256.0)
 
-#: How much of itself a coordinate is moved by to see what π feels of it.
+#: The relative displacement of a coordinate that shows the effect of its rounding on π.
 _SHARE = 1e-6
 
 #: Refinements of the step, as factors: pairs two apart halve the step.
@@ -83,7 +83,7 @@ def poisson_defect(system: System, parameters: Mapping[str, float], method: Meth
 
 
 def tangent_error(method: Method, x: Floats, h: float) -> float:
-    """How far the stated derivative is from differences of the step itself, relative to its largest entry.
+    """The difference between the stated derivative and differences of the step, relative to its largest entry.
 
     These are taken at two distances, and the better counts: near a singularity the larger leads past it.
     """

@@ -85,22 +85,22 @@ def of_classical(
     solver: Solver,
     parameters: Mapping[str, float],
     t0: float = 0.0,
-    given: Callable[[Floats], Floats] | None = None,
+    vector_field: Callable[[Floats], Floats] | None = None,
 ) -> Method:
-    """A classical method on the vector field of a solver, or on the one that is ``given`` in its place."""
-    field = given or field_of(solver, parameters)
+    """A classical method on the vector field of a solver, or on ``vector_field`` instead."""
+    field = vector_field or field_of(solver, parameters)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
-        found = classical.integrate(name, field, extended(solver, x, t0), h, steps, stride)[:, : len(x)]
-        if not np.isfinite(found).all():
+        states = classical.integrate(name, field, extended(solver, x, t0), h, steps, stride)[:, : len(x)]
+        if not np.isfinite(states).all():
             raise StepError(f"{name} left the finite numbers", step=0, status="NOT_FINITE")
-        return found
+        return states
 
     def step(x: Floats, h: float) -> Floats:
         image: Floats = rows(x, h, 1, 1)[-1]
         return image
 
-    later = (lambda h: of_classical(name, solver, parameters, t0 + h, given)) if solver.interface.time else None
+    later = (lambda h: of_classical(name, solver, parameters, t0 + h, vector_field)) if solver.interface.time else None
     return Method(name, step, rows, later=later)
 
 

@@ -1,4 +1,4 @@
-"""The motion of a monitored system in τ: what its steps are measured against."""
+"""The motion of a monitored system in τ: the reference for its steps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def with_time(solver: Solver, parameters: Mapping[str, float], gauge: Floats) ->
     fixed = Solver(solver.backend.with_gauge(gauge), solver.interface)
 
     def rows(x: Floats, h: float, steps: int, stride: int) -> Floats:
-        found = fixed.integrate(x[:-1], h, steps, stride, parameters=parameters)
-        return np.column_stack([found.x, found.t])
+        trajectory = fixed.integrate(x[:-1], h, steps, stride, parameters=parameters)
+        return np.column_stack([trajectory.x, trajectory.t])
 
     return Method(solver.target, lambda x, h: rows(x, h, 1, 1)[-1], rows)

@@ -53,7 +53,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Study:
-    """What was measured from 0 to ``time`` of the ``clock``, t or τ.
+    """Measurements from 0 to ``time`` of the ``clock``, t or τ.
 
     Errors below ``floor`` are those of the ``reference``. ``set_up`` are the seconds that the solver takes once per
     trajectory; those of the points do not contain it. ``language`` is that of all methods, ``rounds`` the number of
@@ -94,19 +94,19 @@ def study(
     for span in sorted({min(steps, s) for s in SPANS}, reverse=True):
         target, floor = (solution(h * span), 4 * ROUNDING) if solution else _by_dop853(race, h * span, span)
         states = {label: _states(run, h * span, span, target, floor) for label, run in race.runners.items()}
-        errors = {label: {n: error_of(x, target) for n, x in found.items()} for label, found in states.items()}
-        slopes = {label: slope(found, floor) for label, found in errors.items()}
+        errors = {label: {n: error_of(x, target) for n, x in of_steps.items()} for label, of_steps in states.items()}
+        slopes = {label: slope(of_steps, floor) for label, of_steps in errors.items()}
         if math.isfinite(slopes[OWN]):
             break
     if not math.isfinite(floor):
         raise ArithmeticError("DOP853 cannot follow the solution")
-    seconds = _times(race, {label: list(found) for label, found in errors.items()}, h * span, rounds)
+    seconds = _times(race, {label: list(of_steps) for label, of_steps in errors.items()}, h * span, rounds)
     orders = {OWN: order, **{m: o for m, (_, o) in classical.METHODS.items()}}
     curves = []
-    for label, found in states.items():
+    for label, of_steps in states.items():
         points = tuple(
             Point(h * span / n, n, errors[label][n], casimirs(x) if casimirs else math.nan, seconds[label, n])
-            for n, x in found.items()
+            for n, x in of_steps.items()
         )
         curves.append(Curve(label, orders[label], points, slopes[label]))
     reference = "the closed form" if solution else "DOP853 at small steps"
@@ -130,7 +130,7 @@ def slope(errors: Mapping[int, float], floor: float) -> float:
 
 def _states(run: Runner, end: float, span: int, target: Floats, floor: float) -> dict[int, Floats]:
     """The state at the end for each number of steps that can be made in time, until rounding is all of its error."""
-    found: dict[int, Floats] = {}
+    states: dict[int, Floats] = {}
     least, done = math.inf, 0
     for n in sorted({round(span * f * 2.0**k) for k in range(-COARSER, FINER + 1) for f in (1.0, 1.5)} - {0}):
         start = time.perf_counter()
@@ -138,12 +138,12 @@ def _states(run: Runner, end: float, span: int, target: Floats, floor: float) ->
         # NaN, of a solution that could not be had, is no error below 1.
         if state is None or not (error := error_of(state, target)) < 1:
             continue
-        found[n] = state
+        states[n] = state
         done += error <= 2 * floor or 2 * error > least < SMALL
         least = min(least, error)
         if done > 1 or time.perf_counter() - start > MOST_SECONDS:
             break
-    return found
+    return states
 
 
 def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: int) -> dict[tuple[str, int], float]:
@@ -155,20 +155,20 @@ def _times(race: Race, counts: Mapping[str, Sequence[int]], end: float, rounds: 
     for label, run in race.runners.items():
         for n in counts[label]:
             works[label, n] = lambda repeats, run=run, n=n: run(end / n, n, repeats)  # type: ignore[misc]
-    found = dict.fromkeys(works, math.inf)
+    fastest = dict.fromkeys(works, math.inf)
     repeats = dict.fromkeys(works, 1)
     for _ in range(rounds):
         for key, work in works.items():
             start = time.perf_counter()
             work(repeats[key])
-            taken = (time.perf_counter() - start) / repeats[key]
-            found[key] = min(taken, found[key])
-            repeats[key] = max(1, math.ceil(LEAST_SECONDS / max(taken, 1e-8)))
-    return found
+            seconds = (time.perf_counter() - start) / repeats[key]
+            fastest[key] = min(seconds, fastest[key])
+            repeats[key] = max(1, math.ceil(LEAST_SECONDS / max(seconds, 1e-8)))
+    return fastest
 
 
 def _by_dop853(race: Race, end: float, span: int) -> tuple[Floats, float]:
-    """The solution at the end, and how far two results with steps h and h/2 agree at best; infinity if none do."""
+    """The solution at the end, and the least difference of results with steps h and h/2; infinity if all fail."""
     best, last = (np.full(1, np.nan), math.inf), None
     for k in range(-2, FINER):
         n = max(1, math.ceil(span * 2.0**k))

@@ -1,4 +1,4 @@
-"""The solver and classical methods side by side, in compiled C: what a fair comparison of times needs.
+"""The solver and classical methods in one compiled C file, for a fair comparison of times.
 
 In Python a classical method would spend its time in the interpreter. Here all methods are one C file, compiled with
 the same flags, in which the vector field can be inlined.
@@ -33,13 +33,13 @@ TABLEAUX: Mapping[str, tuple[Sequence[Mapping[int, float]], Mapping[int, float]]
     "dop853": (dop853.A[1:], dop853.B),
 }
 
-#: Makes steps of size h from the start, so many times over; the last state, None if a step cannot be made.
+#: Repeats a number of steps of size h from the start; returns the last state, None if a step fails.
 Runner = Callable[[float, int, int], Floats | None]
 
 
 @dataclass(frozen=True)
 class Race:
-    """The runners by their labels, and ``set_up``: what the solver does once per trajectory, so many times over.
+    """The runners by their labels, and ``set_up``, which repeats the work that the solver does once per trajectory.
 
     ``language`` is what all of them are written in: ``C`` or ``Python``. The ``clock`` is what steps are equal in.
     """
@@ -77,19 +77,21 @@ def compiled(
     def set_up(repeats: int) -> int:
         return int(begin(packed.ctypes.data, start.ctypes.data, repeats, begun.ctypes.data))
 
-    def runner(method: str, given: Floats) -> Runner:
+    def runner(method: str, packed_start: Floats) -> Runner:
         function = getattr(library, f"{name}_race_{method}")
         function.restype, function.argtypes = ctypes.c_int, (pointer, pointer, ctypes.c_double, size, size, pointer)
 
         def run(h: float, steps: int, repeats: int) -> Floats | None:
             x = np.empty_like(start)
-            failed = function(given.ctypes.data, start.ctypes.data, h, steps, repeats, x.ctypes.data)
+            failed = function(packed_start.ctypes.data, start.ctypes.data, h, steps, repeats, x.ctypes.data)
             return None if failed else x
 
         return run
 
-    own = runner(OWN, begun) if set_up(1) == 0 else lambda h, steps, repeats: None
-    return Race({OWN: own, **{m: runner(m, packed) for m in explicit}}, set_up, "C", "τ" if monitored else "t")
+    solver_runner = runner(OWN, begun) if set_up(1) == 0 else lambda h, steps, repeats: None
+    return Race(
+        {OWN: solver_runner, **{m: runner(m, packed) for m in explicit}}, set_up, "C", "τ" if monitored else "t"
+    )
 
 
 def interpreted(
@@ -102,10 +104,10 @@ def interpreted(
     def own(h: float, steps: int, repeats: int) -> Floats | None:
         try:
             for _ in range(repeats):
-                found: Floats = solver.integrate(start, h, steps, steps, t0=begin, parameters=parameters).x[-1]
+                end: Floats = solver.integrate(start, h, steps, steps, t0=begin, parameters=parameters).x[-1]
         except StepError:
             return None
-        return found
+        return end
 
     field = field_in_tau(solver, parameters) if solver.interface.monitored else field_of(solver, parameters)
     first = extended(solver, start, t0)
@@ -113,8 +115,8 @@ def interpreted(
     def runner(method: str) -> Runner:
         def run(h: float, steps: int, repeats: int) -> Floats | None:
             for _ in range(repeats):
-                found: Floats = classical.integrate(method, field, first, h, steps, steps)[-1, : len(start)]
-            return found if np.isfinite(found).all() else None
+                end: Floats = classical.integrate(method, field, first, h, steps, steps)[-1, : len(start)]
+            return end if np.isfinite(end).all() else None
 
         return run
 

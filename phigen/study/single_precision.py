@@ -1,4 +1,4 @@
-"""What single precision makes of a method that is examined in double precision."""
+"""Errors of single precision for a method that is examined in double precision."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from phigen.symbolic.arrays import Floats
 
 #: A unit of the last place, of 24 binary digits, in those of double precision, of 53.
 COARSER = 2.0**29
-#: What a step in single precision may differ by from that in double precision, in sizes of the state.
+#: The largest difference between steps in single and in double precision, relative to the state.
 ONE_STEP = 2.0**-19
 
 #: Name, value, and the largest value allowed.
@@ -34,13 +34,13 @@ def measured(
     parameters: Mapping[str, float],
     t0: float,
 ) -> Iterator[Measured]:
-    """How far single steps are from those in double precision, and how Casimirs change along a run."""
+    """Differences between steps in single and in double precision, and changes of Casimirs along a run."""
     apart = farthest(single.step, double.step, states, h)
     yield "single precision: a step, beside double", apart, ONE_STEP
     rows, times = single.rows(start, h, steps, 1), t0 + h * np.arange(steps + 1.0)
     columns = dict(zip(system.coordinates, rows.T, strict=True))
-    found = summarise(single.name, system, None, parameters, times, rows)
-    for name, drift in found.casimirs.items():
+    summary = summarise(single.name, system, None, parameters, times, rows)
+    for name, drift in summary.casimirs.items():
         casimir = system.casimirs[name]
         if system.forced_rate_of_casimir(casimir).is_zero:
             terms = largest_terms(casimir, list(columns), {**parameters, **columns})
@@ -51,7 +51,7 @@ def farthest(single: Step, double: Step, states: Sequence[Floats], h: float) -> 
     """The largest difference of single steps from the same states, which single precision has, in sizes of these."""
     worst = 0.0
     for x in states:
-        kept = x.astype(np.float32).astype(np.float64)
-        image = double(kept, h)
-        worst = max(worst, float(np.max(np.abs(single(kept, h) - image)) / np.max(np.abs(image))))
+        rounded = x.astype(np.float32).astype(np.float64)
+        image = double(rounded, h)
+        worst = max(worst, float(np.max(np.abs(single(rounded, h) - image)) / np.max(np.abs(image))))
     return worst

@@ -20,9 +20,9 @@ POINTS = 20_000
 
 
 class Thinned:
-    """Of rows that come one after the other, at most so many: every first, second, fourth, … of them.
+    """At most a given number of successive rows: every one, every second, every fourth, … of them.
 
-    Which rows are kept depends on their number alone. ``state`` is all there is, as arrays.
+    Which rows are kept depends on their number alone. ``state`` has all of it, as arrays.
     """
 
     def __init__(self, width: int, most: int) -> None:
@@ -35,26 +35,26 @@ class Thinned:
 
     @property
     def rows(self) -> Floats:
-        """What is kept, (rows, width)."""
-        kept: Floats = self.state["rows"]
-        return kept
+        """The stored rows (rows, width)."""
+        rows: Floats = self.state["rows"]
+        return rows
 
     @property
     def seen(self) -> int:
-        """How many rows there were."""
+        """The number of rows received."""
         return int(self.state["seen"])
 
     def see(self, rows: Floats) -> None:
         """Take in the next rows (rows, width)."""
         every, seen = int(self.state["every"]), self.seen
-        kept = np.concatenate([self.rows, rows[-seen % every :: every]])
-        while len(kept) > self._most:
-            every, kept = 2 * every, kept[::2]
-        self.state |= {"rows": kept, "every": np.asarray(every), "seen": np.asarray(seen + len(rows))}
+        thinned = np.concatenate([self.rows, rows[-seen % every :: every]])
+        while len(thinned) > self._most:
+            every, thinned = 2 * every, thinned[::2]
+        self.state |= {"rows": thinned, "every": np.asarray(every), "seen": np.asarray(seen + len(rows))}
 
 
 class Sketch:
-    """Enough of a run to draw it: every so-manieth row, and those with the largest errors of each of `WINDOWS` windows.
+    """Rows of a run for its figures: rows at equal distances, and those with the largest errors of `WINDOWS` windows.
 
     Rows are t, x, energy and Casimirs side by side, with their number before them. ``rows`` is how many there will be.
     """
@@ -73,7 +73,7 @@ class Sketch:
 
     @property
     def state(self) -> dict[str, Any]:
-        """All there is, as arrays."""
+        """The complete state, as arrays."""
         return {**self._thinned.state, **self._peaks}
 
     @state.setter
@@ -113,11 +113,11 @@ class Sketch:
     ) -> Trajectory:
         """The rows that were kept, in their order; if the run is ``broken`` off, a row of NaN comes after them."""
         peaks = self._peaks["peaks"].reshape(-1, self._peaks["peaks"].shape[-1])
-        kept = np.concatenate(
+        stored = np.concatenate(
             [self._thinned.rows, peaks[self._peaks["errors"].ravel() >= 0], self._peaks["last"][None]]
         )
-        _, places = np.unique(kept[:, 0], return_index=True)
-        rows = kept[places][:, 1:]
+        _, places = np.unique(stored[:, 0], return_index=True)
+        rows = stored[places][:, 1:]
         if broken:
             rows = np.vstack([rows, np.full(rows.shape[1], np.nan)])
             rows[-1, 0] = rows[-2, 0] + h

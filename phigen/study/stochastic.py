@@ -1,4 +1,4 @@
-"""What noise makes of steps: strong orders along common paths, and steps with the largest increments."""
+"""Steps with noise: strong orders along common paths, and steps with the largest increments."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def _along_lines(
 
 
 def failures(solver: Solver, states: Sequence[Floats], parameters: Mapping[str, float], t0: float, h: float) -> int:
-    """How many steps from these states fail of those whose increments are all as large as they can be."""
+    """The number of steps from these states that fail with the largest possible increments."""
     draws, begin = solver.interface.draws, t0 if solver.interface.time else None
     random, failed = np.random.default_rng(SEED), 0
     for x in states:

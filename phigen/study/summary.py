@@ -1,4 +1,4 @@
-"""What a run conserved: numbers for one method, from the states it stored."""
+"""Conservation in a run: errors of one method, from its states."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _TURNS = 2
 
 @dataclass(frozen=True)
 class Drift:
-    """How far a conserved quantity went: the largest error, in a unit of its own.
+    """Error of a conserved quantity: the largest one, in a unit of its own.
 
     ``growth`` is the largest error in the last tenth of the run over that in the first; 1 without drift. It is NaN if
     that says nothing: where the error is one of rounding, and where the first tenth has not seen the motion.
@@ -41,7 +41,7 @@ class Drift:
 
 @dataclass(frozen=True)
 class Summary:
-    """What one method conserved; ``exact`` is the largest error against the closed form, None if there is none.
+    """Errors of one method; ``exact`` is the largest error against the closed form, None if there is none.
 
     ``good`` rows of the states are finite; the numbers are about these. Where H is no invariant, ``energy`` is
     about H − ``work``, an integral that may be ``off`` by so much in the same unit.
@@ -60,12 +60,12 @@ class Summary:
 
     @property
     def is_balance(self) -> bool:
-        """Whether ``energy`` is about the balance of energy."""
+        """Whether ``energy`` has the errors of the energy balance."""
         return math.isfinite(self.off)
 
     @property
     def units(self) -> dict[str, Unit]:
-        """What the errors are counted in, by the names of the quantities."""
+        """The units of the errors, by the names of the quantities."""
         return {ENERGY: self.energy.unit, **{n: d.unit for n, d in {**self.casimirs, **self.invariants}.items()}}
 
 
@@ -122,7 +122,7 @@ class Watch:
 
     @property
     def good(self) -> int:
-        """How many rows have been seen, all finite."""
+        """The number of rows received, all finite."""
         return int(self.state["good"])
 
     def see(self, t: Floats, x: Floats) -> Floats:
@@ -160,12 +160,12 @@ class Watch:
         state["final"] = x[-1].copy()
         return done
 
-    def _work(self, t: Floats, found: Sequence[Floats]) -> Floats:
+    def _work(self, t: Floats, slopes: Sequence[Floats]) -> Floats:
         """∫ ∂_tH dt up to each of the times, which follow those seen before, from the powers there."""
         state = self.state
         if not self.begun:
-            state["instant"] = np.array([t[0], *(f[0] for f in found)])
-        rows = np.concatenate([state["instant"][:, np.newaxis], np.array([t, *found])], axis=1)
+            state["instant"] = np.array([t[0], *(f[0] for f in slopes)])
+        rows = np.concatenate([state["instant"][:, np.newaxis], np.array([t, *slopes])], axis=1)
         parts, off = works(rows[0], rows[1:])
         sums: Floats = state["work"][0] + np.cumsum(parts)
         state["work"] = np.array([sums[-1], state["work"][1] + np.sum(off)])
@@ -173,13 +173,13 @@ class Watch:
         return sums
 
     def summary(self) -> Summary:
-        """The summary of what was seen."""
+        """The summary of the rows so far."""
         (method, rows), state = self._about, self.state
         steps = self._run.steps if self._run else rows
         telling = rows >= 2 * WINDOWS and _is_telling(state["turns"])
         drifts = [_drift(m, unit, steps, telling) for m, unit in zip(state["maxima"], self._units(), strict=True)]
-        found = iter(drifts)
-        named = {kind: {name: next(found) for name in group} for kind, group in self._groups.items()}
+        drift_of = iter(drifts)
+        named = {kind: {name: next(drift_of) for name in group} for kind, group in self._groups.items()}
         return Summary(
             method=method,
             energy=named[ENERGY]["H"],
@@ -196,9 +196,9 @@ class Watch:
     def _units(self) -> Sequence[Unit]:
         if not self._found and self.begun:
             known = {**self._parameters, **{t: float(self.state["since"]) for t in self._system.times}}
-            found = units(self._formulas, self._system.coordinates, known, self.state["first"])
+            unit_list = units(self._formulas, self._system.coordinates, known, self.state["first"])
             names, moved = [ENERGY, *self._groups["casimirs"], *self._groups["invariants"]], moving(self._system)
-            self._found = [replace(unit, moves=name in moved) for name, unit in zip(names, found, strict=True)]
+            self._found = [replace(unit, moves=name in moved) for name, unit in zip(names, unit_list, strict=True)]
         return self._found or [Unit()] * len(self._formulas)
 
     def _see_turns(self, x: Floats, windows: NDArray[np.int64]) -> None:

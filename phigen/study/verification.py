@@ -1,4 +1,4 @@
-"""Verification: what a generated solver must show, measured on a run and judged against limits that are stated.
+"""Verification: properties of a generated solver, measured on a run and judged against stated limits.
 
 The limits are those of round-off where a property is exact: Casimirs, the Poisson identity, reversibility, agreement
 of the targets. The order must be the stated one, and energy must not drift. Solvers from approximate bi-realisations
@@ -82,7 +82,7 @@ class Verification:
 
     @property
     def made(self) -> str:
-        """What was made, in words."""
+        """The run that was made, in words."""
         return f"{self.steps} steps of {self.step:.9g}" + " in τ" * (self.clock == "τ")
 
     @property
@@ -93,7 +93,7 @@ class Verification:
 
 @dataclass(frozen=True)
 class Subject:
-    """What is examined: the methods of all targets, those to compare with, and the numbers of the run."""
+    """The subject of a verification: the methods of all targets, those to compare with, and the numbers of the run."""
 
     compilation: Compilation
     solvers: Mapping[str, Solver]
@@ -145,25 +145,25 @@ def verify(
     """
     x = np.array(start, dtype=np.float64)
     gauge = gauge_at(compilation, x, parameters)
-    own = {target: of_solver(solver, parameters, gauge, t0) for target, solver in solvers.items()}
+    methods = {target: of_solver(solver, parameters, gauge, t0) for target, solver in solvers.items()}
     solver = next(iter(solvers.values()))
     field = field_in_tau(solver, parameters) if compilation.program.monitor else field_of(solver, parameters)
     noisy = bool(compilation.system.noise)
     others = {name: of_classical(name, solver, parameters, t0, field) for name in (() if noisy else compare)}
-    made = min(steps, FEW_STEPS if quick else MOST_STEPS)
-    subject = Subject(compilation, solvers, own, others, parameters, x, h, made, t0, field)
-    rows = subject.main.rows(x, h, made, 1)
+    step_count = min(steps, FEW_STEPS if quick else MOST_STEPS)
+    subject = Subject(compilation, solvers, methods, others, parameters, x, h, step_count, t0, field)
+    rows = subject.main.rows(x, h, step_count, 1)
     # With noise, trajectories may well start where single steps have no scale: at rest, at the origin.
-    first = made // STATES if noisy else 0
-    states = [rows[i] for i in np.linspace(first, made, STATES, dtype=int)] if made >= STATES else [x]
+    first = step_count // STATES if noisy else 0
+    states = [rows[i] for i in np.linspace(first, step_count, STATES, dtype=int)] if step_count >= STATES else [x]
     symmetry = "symmetric" if compilation.symmetric else "not symmetric"
     return Verification(
         compilation.spec.name,
         run,
         f"{compilation.method}, {symmetry}",
         h,
-        made,
-        tuple(own),
+        step_count,
+        tuple(methods),
         tuple(others),
         _measured(
             compilation.spec.name,
@@ -187,13 +187,13 @@ def verify(
 
 def _measured(name: str, groups: Mapping[str, Callable[[], Iterable[Check]]]) -> tuple[Check, ...]:
     """The checks of all groups, each group a stage for those who watch."""
-    found: list[Check] = []
+    results: list[Check] = []
     with progress.stage(f"{name}: measurements", len(groups)) as running:
         for title, checks in groups.items():
             with progress.stage(title):
-                found += checks()
+                results += checks()
             running.done += 1
-    return tuple(found)
+    return tuple(results)
 
 
 def gauge_at(compilation: Compilation, x: Floats, parameters: Mapping[str, float]) -> Floats | None:
@@ -222,9 +222,14 @@ def noise_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Check]:
         return
     stated = 1.0 if commuting(system) else 0.5
     about = subject.solver, subject.start, subject.parameters, subject.t0
-    found = strong_order(*about, subject.h, min(subject.steps, 8))
-    reason, limit = f"{found:.2f} instead of {stated:g}", f"at least {stated - STRONG_SLACK:.1f}, stated {stated:g}"
-    yield Check("strong order, along common paths", found, limit, found >= stated - STRONG_SLACK, reason)
+    observed_order = strong_order(*about, subject.h, min(subject.steps, 8))
+    reason, limit = (
+        f"{observed_order:.2f} instead of {stated:g}",
+        f"at least {stated - STRONG_SLACK:.1f}, stated {stated:g}",
+    )
+    yield Check(
+        "strong order, along common paths", observed_order, limit, observed_order >= stated - STRONG_SLACK, reason
+    )
     failed = failures(subject.solver, states, subject.parameters, subject.t0, subject.h)
     name, reason = "steps that fail, of increments as large as can be", f"{failed} fail; a smaller step helps"
     yield Check(name, failed, "none", failed == 0, reason)
@@ -244,31 +249,31 @@ def _order_check(title: str, subject: Subject, *, quick: bool) -> Check:
     span = min(subject.steps, 32 if quick else 64)
     reference = _reference(subject)
     for length in (span, max(1, span // 8)):
-        found = measures.observed_order(solver, reference, subject.start, length * subject.h)
-        if found.exact or found.order >= stated - ORDER_SLACK:
+        observation = measures.observed_order(solver, reference, subject.start, length * subject.h)
+        if observation.exact or observation.order >= stated - ORDER_SLACK:
             break
     limit = f"at least {stated - ORDER_SLACK:.1f}, stated {stated}"
     others = {
         name: measures.observed_order(m, reference, subject.start, length * subject.h).order
         for name, m in subject.others.items()
     }
-    if found.exact:
+    if observation.exact:
         return Check(f"{title} (errors at round-off)", math.inf, limit, True, "", others)
-    if math.isnan(found.order):
+    if math.isnan(observation.order):
         reason = "no two steps have errors between round-off and 2 %"
-        worst = max((e for _, e in found.pairs), default=math.inf)
+        worst = max((e for _, e in observation.pairs), default=math.inf)
         return Check(title, math.nan, limit, worst < 1e-6, reason, others)
-    passed = found.order >= stated - ORDER_SLACK
-    return Check(title, found.order, limit, passed, f"{found.order:.2f} instead of {stated}", others)
+    passed = observation.order >= stated - ORDER_SLACK
+    return Check(title, observation.order, limit, passed, f"{observation.order:.2f} instead of {stated}", others)
 
 
 def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
     """The solution at a time, by DOP853 with halved steps until two results agree; and how far they agree."""
     solver = of_classical("dop853", subject.solver, subject.parameters, subject.t0, subject.field)
-    found: dict[float, tuple[Floats, float]] = {}
+    known: dict[float, tuple[Floats, float]] = {}
 
     def reference(t: float) -> tuple[Floats, float]:
-        if t not in found:
+        if t not in known:
             best: tuple[Floats, float] | None = None
             last: Floats | None = None
             for n in (128, 256, 512, 1024, 2048):
@@ -284,8 +289,8 @@ def _reference(subject: Subject) -> Callable[[float], tuple[Floats, float]]:
                     if error <= 4 * measures.ROUNDING:
                         break
                 last = state
-            found[t] = best or (np.full_like(subject.start, np.nan), math.inf)
-        return found[t]
+            known[t] = best or (np.full_like(subject.start, np.nan), math.inf)
+        return known[t]
 
     return reference
 
@@ -296,11 +301,11 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
     compared = subject.others
     times: Floats = subject.t0 + subject.h * np.arange(len(rows), dtype=np.float64)
     if system.forces and subject.compilation.monitor:  # work is done in the time that passes, which others do not tell
-        made = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
-        times, compared = made.t, {}
-    own = _summary(subject, subject.main.name, rows, times)
+        trajectory = subject.solver.integrate(subject.start, subject.h, len(rows) - 1, 1, parameters=subject.parameters)
+        times, compared = trajectory.t, {}
+    summary = _summary(subject, subject.main.name, rows, times)
     others = {name: _summary_of(subject, m, times) for name, m in compared.items()}
-    for name, drift in own.casimirs.items():
+    for name, drift in summary.casimirs.items():
         bound = rounding(steps) * _terms(subject, system.casimirs[name], rows) / drift.unit.size
         judged = subject.exact and system.forced_rate_of_casimir(system.casimirs[name]).is_zero
         limit = f"at most {bound:.1e}" if judged else ""
@@ -309,7 +314,7 @@ def conservation_checks(subject: Subject, rows: Floats) -> Iterator[Check]:
         drifts = {m: s.casimirs[name] if s else None for m, s in others.items()}
         yield Check(f"Casimir {name}: largest error", drift.error, limit, passed, reason, _errors(drifts))
         yield Check(f"Casimir {name}: last/first window", drift.growth, others=_growths(drifts))
-    energy, drifts = own.energy, {m: s.energy if s else None for m, s in others.items()}
+    energy, drifts = summary.energy, {m: s.energy if s else None for m, s in others.items()}
     if system.noise:
         yield Check("energy: largest change", energy.error)
         return
@@ -340,7 +345,7 @@ def _summary(subject: Subject, name: str, rows: Floats, times: Floats) -> Summar
 
 
 def _summary_of(subject: Subject, method: Method, times: Floats) -> Summary | None:
-    """What another method conserves; None where a step of it cannot be made."""
+    """The errors of another method; None if one of its steps fails."""
     try:
         return _summary(subject, method.name, method.rows(subject.start, subject.h, subject.steps, 1), times)
     except StepError:
@@ -366,15 +371,15 @@ def one_step_checks(subject: Subject, states: Sequence[Floats]) -> Iterator[Chec
     def defect(method: Method, x: Floats, h: float) -> float:
         return measures.poisson_defect(system, parameters, method, x, h)
 
-    found = max(worst(defect, m) for m in subject.own.values())
+    largest = max(worst(defect, m) for m in subject.own.values())
     compared = {name: worst(defect, m) for name, m in subject.others.items()}
     if system.forces:
         limit, passed, reason = "", True, ""
     elif subject.exact:
-        limit, passed, reason = f"at most {ONE_STEP:g}", found <= ONE_STEP, f"{found:.1e} is not round-off"
+        limit, passed, reason = f"at most {ONE_STEP:g}", largest <= ONE_STEP, f"{largest:.1e} is not round-off"
     else:
-        limit, passed, reason = _approximate(subject, states, defect, found)
-    yield Check("Poisson defect, exact tangent", found, limit, passed, reason, compared)
+        limit, passed, reason = _approximate(subject, states, defect, largest)
+    yield Check("Poisson defect, exact tangent", largest, limit, passed, reason, compared)
     slip = max(worst(measures.tangent_error, m) for m in subject.own.values())
     reason = f"the tangent map is not the derivative of the step, {slip:.1e} off"
     yield Check("tangent map against differences", slip, f"at most {DIFFERENCES:g}", slip <= DIFFERENCES, reason)
@@ -416,7 +421,7 @@ def gradient_checks(subject: Subject, gauge: Floats | None, states: Sequence[Flo
 
 
 def _approximate(
-    subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], found: float
+    subject: Subject, states: Sequence[Floats], defect: Callable[[Method, Floats, float], float], largest: float
 ) -> tuple[str, bool, str]:
     """The limit for a truncation of degree d: a defect of O(h^(d+1))."""
     degree = subject.compilation.degree
@@ -425,16 +430,16 @@ def _approximate(
     fine = max(_or_infinite(defect, subject.main, x, subject.h / 2) for x in states)
     coarse = max(_or_infinite(defect, subject.main, x, subject.h) for x in states)
     power = math.log2(coarse / fine) if fine > 0 else math.inf
-    passed = found <= ONE_STEP or fine <= ONE_STEP or power >= degree + 1 - 2 * ORDER_SLACK
+    passed = largest <= ONE_STEP or fine <= ONE_STEP or power >= degree + 1 - 2 * ORDER_SLACK
     return f"O(h^{degree + 1}): approximate", passed, f"shrinks like h^{power:.1f} instead of h^{degree + 1}"
 
 
 def _or_infinite(measure: Callable[[Method, Floats, float], float], method: Method, x: Floats, h: float) -> float:
     try:
-        found = measure(method, x, h)
+        value = measure(method, x, h)
     except StepError:
         return math.inf
-    return found if math.isfinite(found) else math.inf
+    return value if math.isfinite(value) else math.inf
 
 
 def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
@@ -453,7 +458,7 @@ def agreement_check(subject: Subject, states: Sequence[Floats]) -> Check:
 def single_checks(
     subject: Subject, solver: Solver | None, gauge: Floats | None, states: Sequence[Floats]
 ) -> Iterator[Check]:
-    """What is left of all this in single precision, where that is asked for."""
+    """Checks of single precision, where the spec asks for it."""
     if solver is None:
         return
     method = of_solver(solver, subject.parameters, gauge, subject.t0)
@@ -461,19 +466,19 @@ def single_checks(
     for name, value, most in single_precision.measured(
         subject.compilation.system, method, subject.main, states, *numbers
     ):
-        yield Check(name, value, f"at most {most:.1e}", value <= most, f"{value:.1e} is no rounding")
+        yield Check(name, value, f"at most {most:.1e}", value <= most, f"{value:.1e} is more than rounding")
 
 
 def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
     """The modified Hamiltonian with m corrections is constant to order p + m, or p + 2m of a symmetric method."""
     try:
-        found = backward.modified(subject.compilation, subject.parameters, gauge)
+        series = backward.modified(subject.compilation, subject.parameters, gauge)
     except backward.NotOfferedError:
         return
-    observed = backward.observed_powers(found, subject.main, subject.start, subject.h)
-    for m, (power, shown) in enumerate(zip(found.powers[1:], observed[1:], strict=True), 1):
+    observed = backward.observed_powers(series, subject.main, subject.start, subject.h)
+    for m, (power, shown) in enumerate(zip(series.powers[1:], observed[1:], strict=True), 1):
         # A wrong correction shows the power of the one before.
-        limit = power - MODIFIED_SLACK * (power - found.powers[m - 1])
+        limit = power - MODIFIED_SLACK * (power - series.powers[m - 1])
         reason = f"shrinks like h^{shown:.2f} instead of h^{power}"
         name = f"modified H, {m} correction{'s' * (m > 1)}: order"
         yield Check(name, shown, f"at least {limit:.1f}, stated {power}", shown >= limit, reason)
@@ -481,5 +486,7 @@ def modified_checks(subject: Subject, gauge: Floats | None) -> Iterator[Check]:
 
 def step_check(subject: Subject, states: Sequence[Floats]) -> Check:
     """The largest step that can be made, in units of the run's."""
-    found = measures.largest_step(subject.main, states, subject.h)
-    return Check("largest step that converges, of the run's", found, "at least 1", found >= 1, "the run's step fails")
+    largest = measures.largest_step(subject.main, states, subject.h)
+    return Check(
+        "largest step that converges, of the run's", largest, "at least 1", largest >= 1, "the run's step fails"
+    )

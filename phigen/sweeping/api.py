@@ -20,7 +20,7 @@ from phigen.geometry.system import System
 from phigen.runtime import arguments
 from phigen.spec import limits
 from phigen.spec.model import Axis, Run, Spec, Statistic, Sweep
-from phigen.spec.names import KEPT, SWEEP_NAMES
+from phigen.spec.names import KEPT, STATISTICS, SWEEP_NAMES
 from phigen.spec.runs import with_step
 from phigen.spec.sweeps import end_of_its_own
 
@@ -104,37 +104,37 @@ def _run_of(
     run = run or (sweep.run if sweep else next(iter(spec.runs), None))
     if run is not None and run not in spec.runs:
         raise ValueError(f"there is no run {run!r}; the spec has {', '.join(spec.runs) or 'none'}")
-    found = spec.runs[run] if run else None
-    if spec.lattice and (found is None or initial is not None):
-        raise ValueError("of lattices a run of the spec is needed, with its initial values")
-    if found is None and (initial is None or h is None or steps is None):
+    base = spec.runs[run] if run else None
+    if spec.lattice and (base is None or initial is not None):
+        raise ValueError("a lattice needs a run of the spec, for its initial values")
+    if base is None and (initial is None or h is None or steps is None):
         raise TypeError("the spec has no runs: initial, h and steps are needed")
-    found = found or Run("run", (), Fraction(1), 1)
-    given: dict[str, Any] = {} if initial is None else {"initial": tuple(map(Fraction, _numbers(initial, "initial")))}
+    base = base or Run("run", (), Fraction(1), 1)
+    changes: dict[str, Any] = {} if initial is None else {"initial": tuple(map(Fraction, _numbers(initial, "initial")))}
     if steps is not None:
-        given |= {"steps": arguments.count(steps, "steps", 1, limits.STEPS), "duration": None, "until": None}
+        changes |= {"steps": arguments.count(steps, "steps", 1, limits.STEPS), "duration": None, "until": None}
     if parameters:
-        given["parameters"] = {**found.parameters, **_parameters(spec, parameters)}
-    found = replace(found, **given)
-    found = found if h is None else with_step(found, Fraction(arguments.step_size(h)))
-    if len(found.initial) != len(spec.coordinates) and not spec.lattice:
-        raise ValueError(f"initial has {len(found.initial)} values for {len(spec.coordinates)} coordinates")
-    return found
+        changes["parameters"] = {**base.parameters, **_parameters(spec, parameters)}
+    base = replace(base, **changes)
+    base = base if h is None else with_step(base, Fraction(arguments.step_size(h)))
+    if len(base.initial) != len(spec.coordinates) and not spec.lattice:
+        raise ValueError(f"initial has {len(base.initial)} values for {len(spec.coordinates)} coordinates")
+    return base
 
 
-def _parameters(spec: Spec, given: Mapping[str, float]) -> dict[str, Fraction]:
+def _parameters(spec: Spec, parameters: Mapping[str, float]) -> dict[str, Fraction]:
     """Values of parameters that are the same for all members."""
-    arguments.expect_known(given, {p.name: 0.0 for p in spec.parameters})
-    values = {name: arguments.number(value, f"parameter {name!r}") for name, value in given.items()}
+    arguments.expect_known(parameters, {p.name: 0.0 for p in spec.parameters})
+    values = {name: arguments.number(value, f"parameter {name!r}") for name, value in parameters.items()}
     for p in spec.parameters:
         if p.positive and values.get(p.name, 1.0) <= 0:
             raise ValueError(f"parameter {p.name!r} must be positive, not {values[p.name]}")
     return {name: Fraction(value) for name, value in values.items()}
 
 
-def _numbers(given: Any, what: str) -> list[float]:
+def _numbers(sequence: Any, what: str) -> list[float]:
     """A list of finite numbers."""
-    return arguments.array(given, what, (len(given),) if np.ndim(given) else (1,)).tolist()  # type: ignore[no-any-return]
+    return arguments.array(sequence, what, (len(sequence),) if np.ndim(sequence) else (1,)).tolist()  # type: ignore[no-any-return]
 
 
 def _sweep_of(
@@ -147,57 +147,57 @@ def _sweep_of(
 ) -> Sweep:
     if name is not None and name not in spec.sweeps:
         raise ValueError(f"there is no sweep {name!r}; the spec has {', '.join(spec.sweeps) or 'none'}")
-    found = spec.sweeps[name] if name else next(iter(spec.sweeps.values()), None)
-    if found is None and over is None:
+    sweep = spec.sweeps[name] if name else next(iter(spec.sweeps.values()), None)
+    if sweep is None and over is None:
         raise TypeError("the spec has no sweeps: over is needed")
-    found = found or Sweep("sweep", run.name)
-    given: dict[str, Any] = {"run": run.name}
+    sweep = sweep or Sweep("sweep", run.name)
+    changes: dict[str, Any] = {"run": run.name}
     if over is not None:
         words = _words(over, spec)
         axes = tuple(_axis(key, value, spec) for key, value in over.items() if key not in words)
-        given |= {"over": axes, "random": 0, "seed": 0, "file": "", **words}
+        changes |= {"over": axes, "random": 0, "seed": 0, "file": "", **words}
     if isinstance(keep, str):
         raise TypeError(f"keep must be a list of names, [{keep!r}], not {keep!r}")
-    given |= {} if keep is None else {"keep": tuple(dict.fromkeys(keep))}
-    given |= {} if frames is None else {"frames": arguments.count(frames, "frames", 0)}
-    found = replace(found, **given)
-    if end := end_of_its_own(found, run, monitored=spec.monitor is not None):
-        raise ValueError(f"{end}; give it steps in place of that")
-    strange = [what for what in found.keep if what not in KEPT and Statistic.read(what, spec.observables) is None]
+    changes |= {} if keep is None else {"keep": tuple(dict.fromkeys(keep))}
+    changes |= {} if frames is None else {"frames": arguments.count(frames, "frames", 0)}
+    sweep = replace(sweep, **changes)
+    if end := end_of_its_own(sweep, run, monitored=spec.monitor is not None):
+        raise ValueError(f"{end}; give the run steps instead")
+    strange = [what for what in sweep.keep if what not in KEPT and Statistic.read(what, spec.recorded) is None]
     if strange:
-        known = ", ".join([*KEPT, *spec.observables, *(f"mean({n}), std({n})" for n in spec.observables)])
+        known = ", ".join([*KEPT, *spec.recorded, *(f"{of}({n})" for n in spec.recorded for of in STATISTICS)])
         raise ValueError(f"cannot keep {strange[0]!r}; there are {known}")
-    if "crossings" in found.keep and run.section is None:
+    if "crossings" in sweep.keep and run.section is None:
         raise ValueError(f"crossings: the run {run.name} has no section")
-    if "energy_error" in found.keep and spec.time:
+    if "energy_error" in sweep.keep and spec.time:
         raise ValueError("energy_error: H depends on the time, so energy is not conserved")
-    drawn = [axis.name for axis in found.over if not axis.size]
-    if drawn and not found.random and not any(axis.name == "seed" for axis in found.over):
+    drawn = [axis.name for axis in sweep.over if not axis.size]
+    if drawn and not sweep.random and not any(axis.name == "seed" for axis in sweep.over):
         raise ValueError(f"over: {drawn[0]} has no count, and there is neither random nor seed")
-    if found.random and len(drawn) < len(found.over):
+    if sweep.random and len(drawn) < len(sweep.over):
         raise ValueError("over: random members are drawn, so there are no counts and no lists")
-    if found.file and (found.over or found.random):
-        raise ValueError("over: a file has all values; it stands alone")
-    if not (found.over or found.file):
+    if sweep.file and (sweep.over or sweep.random):
+        raise ValueError("over: a file holds all values; remove the other keys")
+    if not (sweep.over or sweep.file):
         raise ValueError("over: there is nothing to vary")
-    members = found.random or prod(axis.size for axis in found.over if axis.size)
+    members = sweep.random or prod(axis.size for axis in sweep.over if axis.size)
     if members > limits.SWEPT:
         raise ValueError(f"over: {members} members, the limit is {limits.SWEPT}")
-    return found
+    return sweep
 
 
 def _words(over: Mapping[str, Any], spec: Spec) -> dict[str, Any]:
-    """What ``over`` says besides ranges; these names may be those of parameters too, of which there are ranges."""
+    """The entries of ``over`` besides ranges; a parameter of the same name has a range instead."""
     if not isinstance(over, Mapping):
         raise TypeError(f"over must map names to ranges or lists, not {over!r}")
     parameters = {p.name for p in spec.parameters}
-    found: dict[str, Any] = {}
+    words: dict[str, Any] = {}
     for key, least, most in (("random", 1, limits.SWEPT), ("seed", 0, limits.SWEEP_SEED)):
         if key in over and key not in parameters and not (key == "seed" and isinstance(over[key], Mapping)):
-            found[key] = arguments.count(over[key], f"over: {key}", least, most)
+            words[key] = arguments.count(over[key], f"over: {key}", least, most)
     if "file" in over and "file" not in parameters:
-        found["file"] = fspath(over["file"])
-    return found
+        words["file"] = fspath(over["file"])
+    return words
 
 
 def _axis(name: str, value: Any, spec: Spec) -> Axis:
@@ -218,7 +218,7 @@ def _axis(name: str, value: Any, spec: Spec) -> Axis:
 def _draws(value: Mapping[str, Any]) -> Axis:
     """The numbers of draws, along a dimension of the sweep."""
     if set(value) != {"count"}:
-        raise ValueError(f"over: seed numbers draws: it has a count, and nothing else, not {dict(value)!r}")
+        raise ValueError(f"over: seed takes a count, and nothing else, not {dict(value)!r}")
     return Axis("seed", count=arguments.count(value["count"], "over: seed: count", 1, limits.SWEPT))
 
 

@@ -36,14 +36,14 @@ def make(store: str, digest: str, number: int) -> tuple[int, int]:
     varied = plan.varied(region, {name: job.root[name][region] for name in plan.listed})
     count = prod(part.stop - part.start for part in region)
     measured: Any = lattices.measured if isinstance(solver, LatticeSolver) else _measured
-    found = measured(job, solver, varied, plan.first(region) + np.arange(count))
-    found |= {axis.name: varied[axis.name] for axis in plan.drawn}
+    results = measured(job, solver, varied, plan.first(region) + np.arange(count))
+    results |= {axis.name: varied[axis.name] for axis in plan.drawn}
     sizes = tuple(part.stop - part.start for part in region)
-    for name, values in found.items():
+    for name, values in results.items():
         if name != "status":
             job.root[name][region] = values.reshape(sizes + values.shape[1:])
-    job.root["status"][region] = found["status"].reshape(sizes)  # the last: what has a status is complete
-    return count, int(np.count_nonzero(found["status"]))
+    job.root["status"][region] = results["status"].reshape(sizes)  # the last: what has a status is complete
+    return count, int(np.count_nonzero(results["status"]))
 
 
 @lru_cache(maxsize=4)
@@ -79,7 +79,7 @@ def _alone(name: str) -> Iterator[None]:
 
 
 def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Floats]:
-    """What is kept of the members of these numbers, and their statuses. Where there is noise, each has its own."""
+    """The results of members by their numbers, and their statuses. With noise, each member has its own path."""
     plan, count = job.plan, len(numbers)
     parameters = {name: varied.get(name, np.full(count, value)) for name, value in plan.parameters.items()}
     x0 = np.stack([varied.get(c, np.full(count, v)) for c, v in zip(plan.coordinates, plan.initial, strict=True)], 1)
@@ -95,36 +95,38 @@ def _measured(job: Job, solver: Solver, varied: Mapping[str, Floats], numbers: A
     for m, what in failures.items():
         status[allowed[m]] = STATUSES.index(what)
         states[-1, m] = np.nan
-    found: dict[str, Any] = {"status": status}
+    results: dict[str, Any] = {"status": status}
     rows = np.concatenate([asked.x0[np.newaxis], states]) if not plan.frames else states
     if "final" in plan.keep:
-        found["final"] = _spread(states[-1], allowed, count)
+        results["final"] = _spread(states[-1], allowed, count)
     if plan.frames:
-        found["frames"] = _spread(np.moveaxis(states[: len(plan.rows)], 0, 1), allowed, count)
+        results["frames"] = _spread(np.moveaxis(states[: len(plan.rows)], 0, 1), allowed, count)
     if "energy_error" in plan.keep:
         energy = job.module.hamiltonian(rows, **asked.parameters)
-        found["energy_error"] = _spread(np.abs(energy - energy[0]).max(axis=0), allowed, count)
+        results["energy_error"] = _spread(np.abs(energy - energy[0]).max(axis=0), allowed, count)
     if "casimir_error" in plan.keep:
         casimirs = job.module.casimirs(rows, **asked.parameters)
-        found["casimir_error"] = _spread(np.abs(casimirs - casimirs[0]).max(axis=(0, -1), initial=0.0), allowed, count)
+        results["casimir_error"] = _spread(
+            np.abs(casimirs - casimirs[0]).max(axis=(0, -1), initial=0.0), allowed, count
+        )
     if "crossings" in plan.keep:
-        found["crossings"] = _spread(_crossings(job, solver, asked), allowed, count)
+        results["crossings"] = _spread(_crossings(job, solver, asked), allowed, count)
     if "lyapunov" in plan.keep:
-        found["lyapunov"] = _spread(_lyapunov(solver, asked, failures), allowed, count)
+        results["lyapunov"] = _spread(_lyapunov(solver, asked, failures), allowed, count)
     if statistics := plan.statistics(solver.interface.observables):
-        kept = statistics_of(job, solver, asked, states, statistics)
-        found |= {word: _spread(values, allowed, count) for word, values in kept.items()}
-    for name, values in found.items():
+        statistics_results = statistics_of(job, solver, asked, states, statistics)
+        results |= {word: _spread(values, allowed, count) for word, values in statistics_results.items()}
+    for name, values in results.items():
         if name not in ("status", "final", "frames"):
             values[status != 0] = np.nan
-    return found
+    return results
 
 
 def _spread(values: Floats, allowed: Any, count: int) -> Floats:
     """Values of the members that are allowed among all; no numbers elsewhere."""
-    found = np.full((count, *values.shape[1:]), np.nan)
-    found[allowed] = values
-    return found
+    spread = np.full((count, *values.shape[1:]), np.nan)
+    spread[allowed] = values
+    return spread
 
 
 def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str]]:
@@ -138,10 +140,10 @@ def _integrated(solver: Solver, members: Members) -> tuple[Floats, dict[int, str
 
 
 def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
-    """How often the section is crossed in the direction of the run, as seen at the steps."""
+    """The number of crossings of the section in the direction of the run, counted at the steps."""
     section, time, signs = job.section()
     room = max(1, MOST_BYTES // (8 * members.x0.shape[1] * (members.steps + 1)))
-    found = np.zeros(len(members))
+    counts = np.zeros(len(members))
     for first in range(0, len(members), room):
         part = slice(first, first + room)
         some = replace(members.part(part), stride=1)
@@ -150,8 +152,8 @@ def _crossings(job: Job, solver: Solver, members: Members) -> Floats:
         values = section(states, {**some.parameters, time: some.t0 + steps * some.h} if time else some.parameters)
         for sign in signs:
             along = sign * np.sign(some.h) * values
-            found[part] += ((along[:-1] < 0) & (along[1:] >= 0)).sum(axis=0)
-    return found
+            counts[part] += ((along[:-1] < 0) & (along[1:] >= 0)).sum(axis=0)
+    return counts
 
 
 def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> Floats:
@@ -159,7 +161,7 @@ def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> 
     from phigen.errors import StepError
     from phigen.study.lyapunov import spectrum
 
-    found = np.full(len(members), np.nan)
+    exponents = np.full(len(members), np.nan)
     for m in range(len(members)):
         if m in failures:
             continue
@@ -167,5 +169,5 @@ def _lyapunov(solver: Solver, members: Members, failures: Mapping[int, str]) -> 
         start = t0 if solver.interface.time else None
         drawn = {"seed": members.draws.seed, "member": int(members.paths[m])} if solver.interface.noise else {}
         with contextlib.suppress(StepError):
-            found[m] = spectrum(solver, members.x0[m], h, members.steps, parameters, start, **drawn).largest
-    return found
+            exponents[m] = spectrum(solver, members.x0[m], h, members.steps, parameters, start, **drawn).largest
+    return exponents

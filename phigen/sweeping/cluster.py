@@ -12,21 +12,21 @@ from phigen.runtime.members import cores
 from phigen.sweeping.chunk import make
 from phigen.sweeping.store import imported
 
-#: How often a chunk is tried whose worker died with it.
+#: The number of attempts at a chunk whose worker died.
 TRIES = 4
 
 #: Chunks that are submitted at a time for each thread of the workers.
 _AHEAD = 4
 
-#: How long a scheduler has to answer.
+#: The time limit for the answer of a scheduler.
 PATIENCE = "10s"
 
-#: Told how many members were made, and how many of these failed.
+#: Receives the number of members computed, and the number of these that failed.
 Tell = Callable[[int, int], None]
 
 
 class SweepError(PhigenError):
-    """A sweep stopped; what was made is in its store, and the same call goes on from there."""
+    """A sweep stopped; finished chunks are in its store, and the same call continues from there."""
 
     exit_code = 2
 
@@ -83,9 +83,11 @@ def make_all(client: Any, slots: int, store: str, digest: str, chunks: Sequence[
                 raise SweepError(f"chunk {number}: {tries[number]} workers died with it; {error}") from None
             again = [submit(number)]
         except (distributed.client.FuturesCancelledError, distributed.CancelledError, distributed.comm.CommClosedError):
-            raise SweepError("the scheduler went away\n  hint: the same command goes on where it stopped") from None
+            raise SweepError(
+                "the scheduler went away\n  hint: repeat the command to continue where it stopped"
+            ) from None
         except OSError as error:
-            hint = "the same command goes on where it stopped"
+            hint = "repeat the command to continue where it stopped"
             raise SweepError(f"chunk {number} cannot be stored: {error}\n  hint: {hint}") from error
         future.release()
         for more in again:

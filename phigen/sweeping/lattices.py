@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import replace
@@ -14,21 +15,22 @@ from phigen.lattice.states import Start, start_of
 from phigen.runtime.interface import STATUSES, BackendError, Draws, Floats, LatticeInterface, row_steps
 from phigen.runtime.lattice import LatticeSession, LatticeSolver, reduced
 from phigen.runtime.memory import filled
-from phigen.spec.model import Run, Spec, Values
+from phigen.spec.model import Run, Spec, Statistic, Values
+from phigen.study.averages import Averages
 from phigen.sweeping.plan import Plan
 from phigen.sweeping.store import Job
 
 #: Seconds of a trial.
 _TRIAL = 0.3
 
-#: Steps after which a vector that is carried along gets the length 1 again.
+#: Steps after which a tangent vector is normalised.
 _CARRIED = 50
 
 _REFUSED = STATUSES.index("BAD_ARGUMENT")
 
 
 def begun(spec: Spec, run: Run, draw: int) -> Start:
-    """What a member with that number of a draw starts from: what the run draws at random has so much larger a seed."""
+    """The start of a member: the seeds of the run's random values are increased by the member's number of a draw."""
     if not draw or run.lattice is None:
         return start_of(spec, run)
 
@@ -57,63 +59,91 @@ def _start(job: Job, draw: int) -> Start:
 
 
 def measured(job: Job, solver: LatticeSolver, varied: Mapping[str, Floats], numbers: Any) -> dict[str, Any]:
-    """What is kept of the members of these numbers, and their statuses. With noise, each has its own."""
+    """The results of members by their numbers, and their statuses. With noise, each member has its own path."""
     plan, count, shape = job.plan, len(numbers), (len(job.plan.coordinates), *job.plan.sizes)
-    found: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
-    found |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
+    results: dict[str, Any] = {"status": np.full(count, _REFUSED, dtype=np.uint8)}
+    results |= {name: np.full(count, np.nan) for name in plan.keep if name != "final"}
     if "final" in plan.keep:
-        found["final"] = filled(f"the states of {count} members", (count, *shape))
+        results["final"] = filled(f"the states of {count} members", (count, *shape))
     if plan.frames:
-        found["frames"] = filled(f"the frames of {count} members", (count, len(plan.rows), *shape))
+        results["frames"] = filled(f"the frames of {count} members", (count, len(plan.rows), *shape))
     for m in range(count):
-        own = {name: float(values[m]) for name, values in varied.items()}
-        member = _Member(job.plan, solver, _start(job, int(own.pop("seed", 0))), own, int(numbers[m]))
-        found["status"][m] = member.status
+        member_values = {name: float(values[m]) for name, values in varied.items()}
+        member = _Member(
+            job.plan, solver, _start(job, int(member_values.pop("seed", 0))), member_values, int(numbers[m])
+        )
+        results["status"][m] = member.status
         for name, value in member.kept.items():
-            found[name][m] = value
-    return found
+            results[name][m] = value
+    return results
 
 
 class _Member:
     """One lattice, made: its status, and what is kept of it if that is 0."""
 
-    def __init__(self, plan: Plan, solver: LatticeSolver, start: Start, own: dict[str, float], number: int) -> None:
+    def __init__(
+        self, plan: Plan, solver: LatticeSolver, start: Start, member_values: dict[str, float], number: int
+    ) -> None:
         self.plan, self.solver, self.kept = plan, solver, dict[str, Any]()
-        h, t0 = own.pop("step", plan.h), own.pop("start", plan.t0)
+        h, t0 = member_values.pop("step", plan.h), member_values.pop("start", plan.t0)
         numbers = {name: value for name, value in plan.parameters.items() if np.ndim(start.parameters[name]) == 0}
-        given = {**start.arguments, **numbers, **own}
+        call_arguments = {**start.arguments, **numbers, **member_values}
         self.status = _REFUSED
         if not (np.isfinite(h) and h != 0 and np.isfinite(t0)):
             return
         try:
-            values = solver.values(given, {}, start.sizes)
+            values = solver.values(call_arguments, {}, start.sizes)
             draws = (Draws(plan.noise, number),) if solver.interface.noise else ()
             self.session = solver.backend.start(start.state, values, t0, *draws)
-            self.status, kept = 0, self._made(start.state, h)
+            self.status, results = 0, self._made(start.state, h, t0)
             if "lyapunov" in plan.keep:
                 again = solver.backend.start(start.state, values, t0, *draws)
-                kept["lyapunov"] = exponent(again, h, plan.steps)
+                results["lyapunov"] = exponent(again, h, plan.steps)
         except BackendError as error:
             self.status = STATUSES.index(error.status)
         except ValueError:  # numbers that are refused
             self.status = _REFUSED
         else:
-            self.kept = kept
+            self.kept = results
 
-    def _made(self, state: Floats, h: float) -> dict[str, Any]:
-        plan, marks = self.plan, row_steps(self.plan.steps, self.plan.frames or max(1, self.plan.steps))
+    def _made(self, state: Floats, h: float, t0: float) -> dict[str, Any]:
+        plan, marks = self.plan, row_steps(self.plan.steps, self.plan.frames or max(1, self.plan.steps)).tolist()
+        statistics = plan.statistics(self.solver.interface.observables)
+        over_run = any(statistic.of for statistic in statistics.values())
+        observed = row_steps(plan.steps, plan.frames or plan.stride).tolist() if over_run else []
+        averages = Averages(
+            len(self.solver.interface.observables), after=plan.after, backwards=h < 0, blocks=plan.blocks
+        )
         frames = filled("the frames of a member", (len(plan.rows), *state.shape))
-        frames[:1] = state
         before, errors = self._seen(), dict.fromkeys(("energy_error", "casimir_error"), 0.0)
-        for row, ahead in enumerate(np.diff(marks), 1):
-            self.session.advance(h, int(ahead))
-            if row < len(frames):
-                frames[row] = self.session.state()
-            for name, changes in self._changes(before).items():
+        rows, rows_of_means = {mark: row for row, mark in enumerate(marks)}, set(observed)
+        for mark in sorted({*marks, *observed}):
+            self.session.advance(h, mark - self.session.steps)
+            if mark in rows_of_means:
+                averages.see(np.array([t0 + mark * h]), self.session.observables()[np.newaxis])
+            if rows.get(mark, len(frames)) < len(frames):
+                frames[rows[mark]] = self.session.state()
+            for name, changes in self._changes(before).items() if mark in rows else ():
                 errors[name] = max(errors[name], changes)
-        found: dict[str, Any] = {name: error for name, error in errors.items() if name in plan.keep}
-        found |= {"final": self.session.state()} if "final" in plan.keep else {}
-        return found | ({"frames": frames} if plan.frames else {})
+        results: dict[str, Any] = {name: error for name, error in errors.items() if name in plan.keep}
+        results |= {"final": self.session.state()} if "final" in plan.keep else {}
+        results |= self._statistics(statistics, averages)
+        return results | ({"frames": frames} if plan.frames else {})
+
+    def _statistics(self, statistics: Mapping[str, Statistic], averages: Averages) -> dict[str, float]:
+        """Return the statistics of observables by their words, at the end of the run."""
+        if not statistics:
+            return {}
+        names = self.solver.interface.observables
+        last, over_run = dict(zip(names, self.session.observables().tolist(), strict=True)), averages.results()
+        results = dict(zip(names, over_run, strict=True))
+        values = {
+            "": last,
+            "mean": {name: a.mean for name, a in results.items()},
+            "std": {name: math.sqrt(a.variance) for name, a in results.items()},
+            "error": {name: a.error for name, a in results.items()},
+        }
+        return {word: values[s.of][s.observable] for word, s in statistics.items()}
 
     def _seen(self) -> tuple[float, list[Floats]]:
         """The energy, and the Casimirs."""
@@ -124,7 +154,7 @@ class _Member:
         return self.session.hamiltonian(), [np.asarray(reduced(kind, densities)) for kind, densities in pairs]
 
     def _changes(self, before: tuple[float, list[Floats]]) -> dict[str, float]:
-        """How far they are from what they were."""
+        """The largest changes of energy and Casimirs from their values at the start."""
         energy, casimirs = self._seen()
         changes = [float(np.abs(a - b).max()) for a, b in zip(casimirs, before[1], strict=True)]
         return {"energy_error": abs(energy - before[0]), "casimir_error": max(changes, default=0.0)}
@@ -146,16 +176,16 @@ def exponent(session: LatticeSession, h: float, steps: int) -> float:
 
 
 def seconds_of_a_member(job: Job) -> float:
-    """By a trial of a part of one."""
+    """Seconds of a member, estimated by a trial of a part of one."""
     plan, solver = job.plan, LatticeSolver(job.backend(), job.interface)  # type: ignore[arg-type]
     start = _start(job, 0)
-    began, made, ahead = time.process_time(), 0, 1
+    began, done, ahead = time.process_time(), 0, 1
     try:
         values = solver.values(start.arguments, {}, start.sizes)
         session = solver.backend.start(start.state, values, plan.t0)
-        while made < plan.steps and time.process_time() - began < _TRIAL:
+        while done < plan.steps and time.process_time() - began < _TRIAL:
             session.advance(plan.h, ahead)
-            made, ahead = made + ahead, 2 * ahead
+            done, ahead = done + ahead, 2 * ahead
     except (BackendError, ValueError):
         return 1.0  # nothing is known
-    return (time.process_time() - began) / max(made, 1) * plan.steps + 1e-4
+    return (time.process_time() - began) / max(done, 1) * plan.steps + 1e-4

@@ -1,4 +1,4 @@
-"""What a sweep consists of: dimensions, chunks, and the numbers of each member, computed where they are needed.
+"""Plan of a sweep: dimensions, chunks, and the numbers of each member, computed where they are needed.
 
 A plan is plain data, stored beside the result as JSON, so that whoever opens it knows what was made, and a worker needs
 nothing else. Members are numbered in the order of the dimensions, the last the fastest. A chunk is a box of members
@@ -48,6 +48,8 @@ class Plan:
     keep: tuple[str, ...] = ("final",)
     frames: int = 0
     after: float | None = None  # the time from which means of observables are taken
+    blocks: int | None = None  # of rows, for the errors of these means
+    stride: int = 1  # of lattices without frames: steps between the rows that means are over
     chunk: tuple[int, ...] = ()
     sizes: tuple[int, ...] = ()
     about: Mapping[str, Any] = field(default_factory=dict)  # target, version: what else decides the result
@@ -74,12 +76,12 @@ class Plan:
 
     @property
     def size(self) -> int:
-        """How many members there are."""
+        """The number of members."""
         return prod(self.shape)
 
     @property
     def boxes(self) -> tuple[int, ...]:
-        """How many chunks there are along each dimension."""
+        """The number of chunks along each dimension."""
         return tuple(ceil(size / of) for size, of in zip(self.shape, self.chunk, strict=True))
 
     @property
@@ -94,7 +96,7 @@ class Plan:
 
     @property
     def bytes_of_member(self) -> int:
-        """What a member takes while it is made, at least: its states of now, and all of its frames."""
+        """The least memory of a member in bytes: its current states, and all of its frames."""
         return 8 * len(self.coordinates) * prod(self.sizes) * (len(self.rows) + 4)
 
     def region(self, number: int) -> tuple[slice, ...]:
@@ -108,18 +110,18 @@ class Plan:
         return int(np.ravel_multi_index([part.start for part in region], self.shape))
 
     def varied(self, region: Sequence[slice], listed: Mapping[str, Floats]) -> dict[str, Floats]:
-        """What the members of a region have of their own, (members,) each; ``listed`` are those of a file."""
+        """The varied numbers of the members of a region, (members,) each; ``listed`` are those of a file."""
         sizes = tuple(part.stop - part.start for part in region)
         first = self.first(region)
-        found: dict[str, Floats] = dict(listed)
+        columns: dict[str, Floats] = dict(listed)
         for k, axis in enumerate(self.grid):
             along = [1] * len(sizes)
             along[k] = sizes[k]
-            found[axis.name] = np.broadcast_to(values_of(axis)[region[k]].reshape(along), sizes).reshape(-1)
+            columns[axis.name] = np.broadcast_to(values_of(axis)[region[k]].reshape(along), sizes).reshape(-1)
         for k, axis in enumerate(self.drawn):
-            found[axis.name] = _spaced(axis, _uniform(self.seed, k, first, prod(sizes)))
+            columns[axis.name] = _spaced(axis, _uniform(self.seed, k, first, prod(sizes)))
         seeded = "seed" in self.parameters or self.sizes
-        return {name: values for name, values in found.items() if name != "seed" or seeded}
+        return {name: values for name, values in columns.items() if name != "seed" or seeded}
 
     def as_json(self) -> dict[str, Any]:
         """Plain data."""
@@ -142,9 +144,9 @@ def values_of(axis: Axis) -> Floats:
     if axis.name == "seed" and axis.ends == (0.0, 0.0):
         return np.arange(float(axis.count))
     share = np.arange(axis.count) / max(axis.count - 1, 1)
-    found = _spaced(axis, share)
-    found[-1] = axis.ends[1] if axis.count > 1 else found[-1]
-    return found
+    spaced = _spaced(axis, share)
+    spaced[-1] = axis.ends[1] if axis.count > 1 else spaced[-1]
+    return spaced
 
 
 def _spaced(axis: Axis, share: Floats) -> Floats:
@@ -165,8 +167,8 @@ def _uniform(seed: int, column: int, first: int, count: int) -> Floats:
 def chunk_of(plan: Plan, members: int) -> tuple[int, ...]:
     """The sizes of a chunk of so many members at most, and of no more than memory has room for."""
     left = max(1, min(members, _MOST_BYTES // plan.bytes_of_member))
-    found: list[int] = []
+    sides: list[int] = []
     for size in reversed(plan.shape):
-        found.append(min(size, left))
+        sides.append(min(size, left))
         left = left // size if size <= left else 1
-    return tuple(reversed(found))
+    return tuple(reversed(sides))

@@ -1,4 +1,4 @@
-"""Observables of the members of a sweep: their values at the end, and means and standard deviations over the run."""
+"""Observables of the members of a sweep: their values at the end, and means, standard deviations and errors."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from phigen.runtime.interface import BackendError, Floats
 from phigen.runtime.members import Members
 from phigen.runtime.solver import Solver
 from phigen.spec.model import Statistic
+from phigen.spec.names import STATISTICS
+from phigen.study.averages import Averages
 from phigen.sweeping.store import Job
 
 #: Bytes of states of members that are held at a time where every step of a run counts.
@@ -23,9 +25,8 @@ def statistics_of(
 ) -> dict[str, Floats]:
     """Return the statistics by their words, (members,) each.
 
-    ``states`` (rows, members, DIM) are the frames of the sweep, or the final states alone. Means and standard
-    deviations are over the frames, of a sweep without frames over the start and all steps; rows before ``plan.after``
-    do not count.
+    ``states`` (rows, members, DIM) are the frames of the sweep, or the final states alone. Statistics are over the
+    frames, of a sweep without frames over the start and all steps; rows before ``plan.after`` do not count.
     """
     names = list(solver.interface.observables)
     values: dict[str, Floats] = {}
@@ -34,10 +35,11 @@ def statistics_of(
         values |= {word: last[:, names.index(s.observable)] for word, s in statistics.items() if not s.of}
     over_run = {word: s for word, s in statistics.items() if s.of}
     if over_run:
-        mean, deviation = np.full((2, len(members), len(names)), np.nan)
+        results = {of: np.full((len(members), len(names)), np.nan) for of in STATISTICS}
         for part, some, rows, numbers in _pieces(job, solver, members, states):
-            mean[part], deviation[part] = _moments(job, solver, some, rows, numbers)
-        results = {"mean": mean, "std": deviation}
+            results["mean"][part], results["std"][part] = _moments(job, solver, some, rows, numbers)
+            if any(s.of == "error" for s in over_run.values()):
+                results["error"][part] = _errors(job, solver, some, rows, numbers)
         values |= {word: results[s.of][:, names.index(s.observable)] for word, s in over_run.items()}
     return values
 
@@ -63,6 +65,18 @@ def _moments(job: Job, solver: Solver, members: Members, rows: Floats, numbers: 
         mean = np.nansum(values, axis=0) / counted
         deviation = np.sqrt(np.nansum((values - mean) ** 2, axis=0) / (counted - 1))
     return mean, deviation
+
+
+def _errors(job: Job, solver: Solver, members: Members, rows: Floats, numbers: Floats) -> Floats:
+    """Return the standard errors of means (members, observables) over rows, from means of blocks."""
+    values = _values(job, solver, members, rows, numbers)
+    errors = np.empty(values.shape[1:])
+    for m in range(len(members)):
+        h, t0 = float(members.h[m]), float(members.t0[m])
+        averages = Averages(values.shape[2], after=job.plan.after, backwards=h < 0, blocks=job.plan.blocks)
+        averages.see(t0 + numbers * h, values[:, m])
+        errors[m] = [average.error for average in averages.results()]
+    return errors
 
 
 def _pieces(

@@ -29,7 +29,7 @@ WAITING = 255
 
 _BESIDE = "made_by"
 
-#: What a store has by these names, beside what is kept and what is varied.
+#: Reserved names of a store, beside results and varied quantities.
 OWN = ("status", "coordinate", "frame", "frames", _BESIDE)
 
 
@@ -93,7 +93,7 @@ def digest_of(plan: Plan, made_by: Mapping[str, Any]) -> str:
 
 
 def made_by(interface: Interface, files: Mapping[str, str], functions: str, spec: str) -> dict[str, Any]:
-    """What is stored beside the plan."""
+    """The attributes stored beside the plan."""
     about = {key: sorted(v) if isinstance(v, frozenset) else v for key, v in asdict(interface).items()}
     return json.loads(json.dumps({"interface": about, "files": dict(files), "functions": functions, "spec": spec}))  # type: ignore[no-any-return]
 
@@ -162,27 +162,29 @@ def open_job(path: str) -> Job:
     zarr = imported("zarr")
     try:
         root = zarr.open_group(path, mode="r+")
-        kept = dict(root[_BESIDE].attrs)
-        plan = Plan.from_json(kept.pop("plan"))
+        attributes = dict(root[_BESIDE].attrs)
+        plan = Plan.from_json(attributes.pop("plan"))
     except (KeyError, ValueError, OSError, TypeError) as error:
-        raise FileError(f"{path} is no sweep of phigen: {error}") from None
-    return Job(root, plan, interface_of(kept.pop("interface")), **kept)
+        raise FileError(f"{path} is not a sweep of phigen: {error}") from None
+    return Job(root, plan, interface_of(attributes.pop("interface")), **attributes)
 
 
 def interface_of(about: Mapping[str, Any]) -> Interface:
     """An interface from plain data."""
-    made = LatticeInterface if "axes" in about else Interface
-    kinds = {f.name: str(f.type) for f in fields(made)}
+    interface_type = LatticeInterface if "axes" in about else Interface
+    kinds = {f.name: str(f.type) for f in fields(interface_type)}
     makers: dict[str, Callable[[Any], Any]] = {"tuple": tuple, "frozenset": frozenset}
-    return made(**{k: makers.get(kinds[k].partition("[")[0], lambda v: v)(value) for k, value in about.items()})
+    return interface_type(
+        **{k: makers.get(kinds[k].partition("[")[0], lambda v: v)(value) for k, value in about.items()}
+    )
 
 
 def waiting(job: Job) -> list[int]:
     """The numbers of the chunks that are still to be made."""
     status, plan = job.root["status"], job.plan
-    found = []
+    numbers = []
     for number in range(int(np.prod(plan.boxes))):
         region = plan.region(number)
         if status[tuple(slice(part.start, part.start + 1) for part in region)].item() == WAITING:
-            found.append(number)
-    return found
+            numbers.append(number)
+    return numbers

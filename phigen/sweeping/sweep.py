@@ -1,4 +1,4 @@
-"""From a spec and a sweep of it to a store that holds the result."""
+"""Computation of a sweep of a spec into a store."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _LEAST, _MOST = 32, 1 << 17
 
 @dataclass(frozen=True)
 class Setting:
-    """How a sweep is made: where, by whom, with which solver."""
+    """Setting of a computation: the store, the workers, the solver."""
 
     output: Path
     scheduler: str | None = None
@@ -114,7 +114,7 @@ def _expect_names(varied: Iterable[str], spec: Spec, sweep: Sweep) -> None:
     for name in varied:
         if name in (*store.OWN, *KEPT, *sweep.keep):
             message = f"{spec.file}: a sweep over {name!r}, under which its store has something else"
-            raise SpecError([Diagnostic(message, hint="another name for it in the spec")])
+            raise SpecError([Diagnostic(message, hint="choose another name for it in the spec")])
 
 
 def _with_ensembles(spec: Spec) -> Spec:
@@ -151,13 +151,15 @@ def _plan(spec: Spec, sweep: Sweep, run: Run, columns: Mapping[str, int], target
         keep=sweep.keep,
         frames=sweep.frames,
         after=None if run.average.after is None else float(run.average.after),
+        blocks=run.average.blocks,
+        stride=run.stride,
         sizes=lattices.begun(spec, run, 0).sizes if spec.lattice else (),
         about={"sweep": sweep.name, "run": run.name, "target": target, "phigen": __version__, **_files(spec, run)},
     )
 
 
 def _files(spec: Spec, run: Run) -> dict[str, str]:
-    """Where the spec lies, if a run of a lattice reads files from beside it."""
+    """The folder of the spec, if a run of a lattice reads files beside it."""
     if run.lattice is None:
         return {}
     values = [*run.lattice.state.values(), *run.lattice.arrays.values(), *(p.values for p in spec.parameters)]
@@ -175,10 +177,10 @@ def _beside(compilation: Compilation, target: str, spec: Spec) -> dict[str, Any]
 def _gone_on_with(output: Path, plan: Plan, beside: Mapping[str, Any]) -> store.Job:
     """The store of an earlier call, if it is one of this sweep. Raises `FileError`."""
     job = store.open_job(str(output))
-    found = store.made_by(job.interface, job.files, job.functions, job.spec)
-    if store.digest_of(job.plan, found) != store.digest_of(plan, beside):
+    stored = store.made_by(job.interface, job.files, job.functions, job.spec)
+    if store.digest_of(job.plan, stored) != store.digest_of(plan, beside):
         message = f"{output} holds another sweep, or one by another version"
-        raise FileError(f"{message}\n  hint: give another name by -o, or remove it")
+        raise FileError(f"{message}\n  hint: choose another name by -o, or remove the store")
     return job
 
 
@@ -198,7 +200,7 @@ def _created(
 
 
 def _seconds_of_a_member(job: store.Job) -> float:
-    """By a trial of a few members and steps; the first call compiles the solver, for all processes of this machine."""
+    """Seconds of a member, by a trial of a few members and steps; the first call compiles the solver for all."""
     if job.plan.sizes:
         return lattices.seconds_of_a_member(job)
     plan, steps = job.plan, min(job.plan.steps, 2000)
@@ -240,7 +242,7 @@ def _listed(sweep: Sweep, spec: Spec) -> dict[str, Floats]:
     if strange:
         raise refused(f"{strange[0]!r} is not a parameter or a coordinate", did_you_mean(strange[0], known))
     if len(set(names)) < len(names):
-        raise refused("two columns have one name")
+        raise refused("two columns have the same name")
     if not rows:
         raise refused("it has no members")
     return {name: np.ascontiguousarray(values[:, k]) for k, name in enumerate(names)}

@@ -1,4 +1,4 @@
-"""The one interpreter of expressions: values of them in any kind of arithmetic."""
+"""The one interpreter of expressions: evaluates them in any kind of arithmetic."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
   hyperbolic motions alike; cosroot² + s·sinroot² = 1
 - ``arcroot``(s) = (√s − sin √s)/√s³
 - ``exprel``(s) = (e^s − 1)/s
-- ``sinroot1`` and ``exprel1`` are the derivatives of sinroot and exprel, which tangent maps need
+- ``sinroot1``, ``arcroot1`` and ``exprel1`` are the derivatives of sinroot, arcroot and exprel, for tangent maps
 
 All are of phigen's own, and not accepted in a spec.
 """
@@ -82,8 +82,16 @@ ENTIRE: dict[str, Entire] = {
         lambda n: (-1) ** n * _factorial(2 * n + 3),
         (lambda f, s, root: (1 - f.sinroot(s)) / s,),
         lambda call, s: (1 - call("sinroot", s)) / s,
-        lambda call, f, s: ((call("sinroot", s / 4) ** 2 / 2 - 3 * f) / (2 * s),),
+        lambda call, f, s: (call("arcroot1", s),),
         1.0,
+    ),
+    "arcroot1": Entire(
+        "the derivative of (sqrt(s) - sin(sqrt(s)))/sqrt(s)**3",
+        lambda n: (-1) ** (n + 1) * (n + 1) * _factorial(2 * n + 5),
+        (lambda f, s, root: (f.sinroot(s / 4) ** 2 / 2 - 3 * f.arcroot(s)) / (2 * s),),
+        lambda call, s: (call("sinroot", s / 4) ** 2 / 2 - 3 * call("arcroot", s)) / (2 * s),
+        None,
+        4.0,
     ),
     "exprel": Entire(
         "(exp(s) - 1)/s",

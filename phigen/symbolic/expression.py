@@ -40,7 +40,7 @@ from phigen.symbolic.functions import FUNCTIONS
 
 _RANK = {"number": 0, "pi": 1, "E": 1, "symbol": 2}
 
-#: So many nodes take a tenth of a second or more to walk over.
+#: Walking over this number of nodes takes a tenth of a second or more.
 MANY = 10_000
 
 Number = int | Fraction
@@ -142,8 +142,8 @@ def _forget(dead: _Reference, nodes: dict[tuple[Any, ...], _Reference] = _NODES)
 def _node(op: str, args: tuple[Expression, ...] = (), value: Any = None) -> Expression:
     # Plain integers: the keys of dying nodes are compared at interpreter exit, when Fraction no longer can be.
     key = (op, (value.numerator, value.denominator) if type(value) is Fraction else value, args)
-    found = _NODES.get(key)
-    node = found() if found else None
+    weak = _NODES.get(key)
+    node = weak() if weak else None
     if node is None:
         node = Expression.__new__(Expression)
         node.op, node.args, node.value, node._digest = op, args, value, b""
@@ -418,7 +418,7 @@ def fold(roots: Sequence[Expression], visit: Callable[[Expression, list[T]], T])
 
 
 def _counted(order: Sequence[Expression]) -> Iterable[Expression]:
-    """The nodes in turn; of very many a stage says how many are done."""
+    """The nodes in turn; a stage reports progress if there are very many."""
     if len(order) < MANY:
         return order
 
@@ -445,7 +445,7 @@ def rebuild(node: Expression, args: Sequence[Expression]) -> Expression:
 
 
 def familiar(roots: Sequence[Expression]) -> list[Expression]:
-    """The roots with functions of phigen's own written by those that readers know, for s > 0 where that matters."""
+    """The roots with phigen's own functions written by well-known ones, for s > 0 where that matters."""
 
     def visit(node: Expression, args: list[Expression]) -> Expression:
         known = FUNCTIONS[node.op].known if node.op in FUNCTIONS else None
@@ -506,19 +506,19 @@ def derivatives(roots: Sequence[Expression], name: str) -> list[Expression]:
 
 def sparse_derivatives(roots: Sequence[Expression], names: Iterable[str]) -> list[dict[str, Expression]]:
     """The derivatives of each root that are not 0, by name: those of `derivatives`, in one sweep for all names."""
-    wanted = frozenset(names)
+    variables = frozenset(names)
     slopes: dict[int, dict[str, Expression]] = {}
     for node in _counted(topological(roots)):
         if node.op == "symbol":
-            slopes[id(node)] = {node.value: ONE} if node.value in wanted else {}
+            slopes[id(node)] = {node.value: ONE} if node.value in variables else {}
             continue
-        found: dict[str, Expression] = {}
+        row: dict[str, Expression] = {}
         if any(slopes[id(a)] for a in node.args):
             for partial, a in zip(partials(node), node.args, strict=True):
                 for name, d in slopes[id(a)].items():
                     term = d if partial is ONE else mul(partial, d)  # as in sums, of which there are most
-                    found[name] = add(found[name], term) if name in found else term
-        slopes[id(node)] = {name: d for name, d in found.items() if not d.is_zero}
+                    row[name] = add(row[name], term) if name in row else term
+        slopes[id(node)] = {name: d for name, d in row.items() if not d.is_zero}
     return [slopes[id(r)] for r in roots]
 
 
@@ -530,10 +530,10 @@ def derivative(e: Expression, name: str) -> Expression:
 def gradient(e: Expression, names: Sequence[str]) -> list[Expression]:
     """Derivatives of one expression with respect to many symbols, by reverse accumulation."""
     order = topological([e])
-    wanted = set(names)
+    variables = set(names)
     active: set[int] = set()
     for node in order:
-        if (node.op == "symbol" and node.value in wanted) or any(id(a) in active for a in node.args):
+        if (node.op == "symbol" and node.value in variables) or any(id(a) in active for a in node.args):
             active.add(id(node))
     contributions: dict[int, list[Expression]] = {id(e): [ONE]}
     adjoint_of: dict[str, Expression] = {}

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import Any
 
-from phigen.symbolic import entire, special
+from phigen.symbolic import entire, special, universal
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.special import SPECIAL
 
@@ -326,14 +326,14 @@ def _phi(order: int) -> Function:
 
 def _entire(name: str) -> Function:
     """A function of `phigen.symbolic.entire`, near 0 a series."""
-    given = ENTIRE[name]
+    series = ENTIRE[name]
     return Function(
         name,
         own=True,
-        slopes=given.slopes,
-        known=given.known,
+        slopes=series.slopes,
+        known=series.known,
         value=lambda library, s: entire.value(library, name, s),
-        at_zero=given.coefficient(0),
+        at_zero=series.coefficient(0),
         cost=18,
         near=True,
     )
@@ -343,12 +343,22 @@ def _entire(name: str) -> Function:
 FUNCTIONS: dict[str, Function] = {f.name: f for f in _LISTED}
 FUNCTIONS |= {name: _phi(order) for order, name in enumerate(SPECIAL)}
 FUNCTIONS |= {name: _entire(name) for name in ENTIRE}
+FUNCTIONS[universal.ANOMALY] = Function(  # of Kepler motions, by an iteration: see `phigen.symbolic.universal`
+    universal.ANOMALY,
+    arity=6,
+    own=True,
+    slopes=universal.slopes,
+    value=universal.value,
+    at_zero=None,
+    cost=120,
+    near=True,
+)
 
 #: Powers with exponents ½ and ⅓: expressions have no such functions, languages do.
 ROOTS = {"sqrt": _library("sqrt"), "cbrt": _library("cbrt")}
 
 
 def written_in(language: str) -> dict[str, str]:
-    """How a language writes functions, roots among them; those that a generated file defines are not there."""
+    """The spelling of functions in a language, roots among them, without those that a generated file defines."""
     listed = {f.name: f.written[language] for f in FUNCTIONS.values() if language in f.written}
     return listed | {name: forms[language] for name, forms in ROOTS.items()}

@@ -46,14 +46,14 @@ def _nested(terms: Mapping[Powers, Expression], variables: Sequence[Expression])
     if counts[best] <= 1:
         ordered = sorted(terms.items(), key=lambda item: _graded(item[0]))
         return total(c * _monomial(m, variables) for m, c in ordered)
-    found = {m: dict(m).get(best, 0) for m in terms}
-    step = min(e for e in found.values() if e)
+    exponents = {m: dict(m).get(best, 0) for m in terms}
+    step = min(e for e in exponents.values() if e)
     inside = {
         tuple((i, e - step if i == best else e) for i, e in m if i != best or e > step): c
         for m, c in terms.items()
-        if found[m]
+        if exponents[m]
     }
-    outside = {m: c for m, c in terms.items() if not found[m]}
+    outside = {m: c for m, c in terms.items() if not exponents[m]}
     nested = power(variables[best], step) * _nested(inside, variables)
     return nested + _nested(outside, variables) if outside else nested
 

@@ -60,13 +60,13 @@ class Neighbours:
             return base, self.origin
         if not self.axes:
             return base, (match["index"],)
-        found = dict.fromkeys(self.axes, 0)
+        offsets = dict.fromkeys(self.axes, 0)
         for part in match["index"].split(","):
             step = _STEP.fullmatch(part)
-            if step is None or step["axis"] not in found:
+            if step is None or step["axis"] not in offsets:
                 raise KeyError(f"{symbol_name!r} is at no offset of the axes {', '.join(self.axes)}")
-            found[step["axis"]] = int(step["step"])
-        return base, tuple(found.values())
+            offsets[step["axis"]] = int(step["step"])
+        return base, tuple(offsets.values())
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
         """All symbols of expressions that have a value at sites, with their places."""

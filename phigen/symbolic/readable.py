@@ -33,6 +33,7 @@ UNFAMILIAR = {
     "cosroot": "cosroot(s) = cos √s",
     "sinroot": "sinroot(s) = sin(√s)/√s",
     "arcroot": "arcroot(s) = (√s − sin √s)/√s³",
+    "anomaly": "anomaly(t, r, η, β, μ, …) = s with r G1 + η G2 + μ G3 = t, Stumpff functions of β and s",
     "exprel": "exprel(s) = (e^s − 1)/s",
     "inv": "inv(s) = 1/s for s > 0",
     "inv0": "inv0(s) = 1/s for s > 0, else 0",
@@ -162,8 +163,8 @@ def infix(e: Expression) -> str:
 
 def with_plain_names(expressions: Sequence[Expression]) -> list[Expression]:
     """The expressions with phigen's own symbols under their `plain` names."""
-    own = [n for n in symbols_of(*expressions) if isinstance(n, Symbol)]
-    return substitute(expressions, {n: symbol(plain(n)) for n in own})
+    internal = [n for n in symbols_of(*expressions) if isinstance(n, Symbol)]
+    return substitute(expressions, {n: symbol(plain(n)) for n in internal})
 
 
 def shortened(expression: Expression) -> str:
@@ -193,13 +194,13 @@ def expanded(
 
 def _factors(variables: Sequence[Expression], exponents: Sequence[int]) -> Monomial:
     """Factors in the order of the variables; a variable that is a power itself contributes its base."""
-    found = []
+    factors = []
     for variable, k in zip(variables, exponents, strict=False):
         if k and variable.op == "pow":
-            found.append((variable.args[0], variable.value * k))
+            factors.append((variable.args[0], variable.value * k))
         elif k:
-            found.append((variable, Fraction(k)))
-    return tuple(found)
+            factors.append((variable, Fraction(k)))
+    return tuple(factors)
 
 
 def _monomial(factors: Monomial) -> str:

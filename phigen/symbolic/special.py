@@ -39,7 +39,7 @@ def _series(n: int) -> Fraction:
 
 
 def order_of(name: str) -> int:
-    """Which derivative of φ a name of `SPECIAL` is."""
+    """Order of the derivative of φ that a name of `SPECIAL` stands for."""
     return SPECIAL.index(name)
 
 
@@ -60,7 +60,7 @@ def lane_coefficients(order: int) -> list[float]:
 
 @cache
 def rest_coefficients(order: int) -> list[float]:
-    """Coefficients, for |s| < `MIDDLE`, of what the pole 2·order!/(4π² − s)^{order+1} leaves."""
+    """Coefficients, for |s| < `MIDDLE`, of the derivative minus its pole 2·order!/(4π² − s)^{order+1}."""
     rest = []
     for n in range(MIDDLE_TERMS):
         factor = math.factorial(n + order) // math.factorial(n)

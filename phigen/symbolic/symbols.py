@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
-#: Kinds that several modules tell apart. A kind without keys has one symbol only, such as the step size.
+#: Kinds that several modules distinguish. A kind without keys has one symbol only, such as the step size.
 MOMENTUM, VARIATION, COTANGENT, INITIAL, GAUGE = "p", "v", "bar", "x0", "gauge"
 COEFFICIENT, RENEWED, SERIES, FIXED = "c", "n", "s", "f"
+#: Entries of exp(tA) − 1, by the matrix and the place: coefficients of their own.
+EXPONENTIAL = "exponential"
 TEMPORARY, WORK, PART = "t", "w", "part"
 #: Of lattices: what bonds or pairs add to a component of the gradient at a site; 1 where a term reaches beyond no open
 #: end, else 0; 1 at sites of the colour that a part of a graph belongs to, else 0; 1 where the site at an offset has a
@@ -30,9 +32,9 @@ class Symbol(str):
     key: tuple[str | int, ...]
 
     def __new__(cls, kind: str, *key: str | int) -> Symbol:
-        made = super().__new__(cls, f"{kind}:{':'.join(map(str, key))}")
-        made.kind, made.key = kind, key
-        return made
+        name = super().__new__(cls, f"{kind}:{':'.join(map(str, key))}")
+        name.kind, name.key = kind, key
+        return name
 
     def __getnewargs__(self) -> tuple[Any, ...]:
         return (self.kind, *self.key)
@@ -69,7 +71,7 @@ def variation(name: str) -> Symbol:
 
 
 def cotangent(name: str) -> Symbol:
-    """The symbol of the derivative of what comes later along a value."""
+    """The symbol of a cotangent: the derivative of the final result by a value."""
     return Symbol(COTANGENT, name)
 
 

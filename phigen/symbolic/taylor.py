@@ -33,7 +33,7 @@ from phigen.symbolic.special import SPECIAL, coefficient, order_of
 
 
 class Ring(Protocol):
-    """What a ring of coefficients offers besides + and −."""
+    """Operations of a ring of coefficients besides + and −."""
 
     @property
     def bytes_per_term(self) -> int:
@@ -99,14 +99,14 @@ class ExpressionRing(Arithmetic[Expression]):
 
 def closure(roots: Sequence[Expression]) -> list[Expression]:
     """Nodes in the order of evaluation: those of the roots, and the derivatives that function nodes need."""
-    wanted = list(roots)
+    closed = list(roots)
     while True:
-        order = topological(wanted)
+        order = topological(closed)
         present = {id(e) for e in order}
         new = [d for e in order if _by_derivative(e) for d in partials(e) if id(d) not in present]
         if not new:
             return order
-        wanted += new
+        closed += new
 
 
 def _by_derivative(e: Expression) -> bool:
@@ -135,17 +135,17 @@ class Taylor:
     def advance(self, inputs: dict[str, Any], running: progress.Stage | None = None) -> None:
         """Compute the next level of all nodes; ``inputs`` gives that of the moving symbols, ``running`` counts them."""
         for done, e in enumerate(self.order, 1):
-            own = self.series[id(e)]
-            own.append(self._coefficient(e, len(own), inputs))
+            coefficients = self.series[id(e)]
+            coefficients.append(self._coefficient(e, len(coefficients), inputs))
             if e.op in ("add", "sub", "neg"):  # sums of sums are kept too, and may be longer than all products
-                self._count(own[-1])
+                self._count(coefficients[-1])
             if running:
                 running.done = done
 
     def _product(self, a: Any, b: Any) -> Any:
-        found = self.ring.product(a, b)
-        self._count(found)
-        return found
+        product = self.ring.product(a, b)
+        self._count(product)
+        return product
 
     def _count(self, element: Any) -> None:
         """Add to the memory that is used; raises `OverflowError` beyond the budget."""
@@ -196,11 +196,11 @@ class Taylor:
         if i == 0:
             return self.ring.power(a[0], exponent)
         # c = a**r satisfies a·c' = r·a'·c.
-        own, zero = self.series[id(e)], self.ring.vanishes
+        powers, zero = self.series[id(e)], self.ring.vanishes
         terms = [
-            self._product(a[j], own[i - j]) * self.ring.constant((exponent * j - (i - j)) / i)
+            self._product(a[j], powers[i - j]) * self.ring.constant((exponent * j - (i - j)) / i)
             for j in range(1, i + 1)
-            if not (zero(a[j]) or zero(own[i - j]))
+            if not (zero(a[j]) or zero(powers[i - j]))
         ]
         return self.ring.combine(terms) * self.ring.power(a[0], -1)
 

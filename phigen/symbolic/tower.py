@@ -34,8 +34,13 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.functions import FUNCTIONS
 from phigen.symbolic.horner import horner
+from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.special import SPECIAL, coefficient, order_of
 from phigen.symbolic.symbols import Symbol
+
+#: From so many generators on an element is first evaluated at a point: its numerator takes minutes for seven roots.
+#: What cancels leaves less than `ROUNDING` of the sum of the magnitudes of its terms.
+MANY_GENERATORS, ROUNDING = 5, 1e-9
 
 #: An element of a tower: ``flint.fmpq_mpoly``. Elements of different towers do not mix.
 Poly = Any
@@ -82,13 +87,14 @@ class Tower(Arithmetic[Poly]):
         self.generators: list[Generator] = []
         self._index = {n: i for i, n in enumerate(self.symbols)}
         self._meanings = [*map(symbol, self.symbols)]
-        wanted = [e for e in topological(list(expressions)) if not _is_arithmetic(e)]
-        self._set_context(spare=len(wanted))
+        self._sampled: list[float] = []
+        functions = [e for e in topological(list(expressions)) if not _is_arithmetic(e)]
+        self._set_context(spare=len(functions))
         self._renamed = True
         with progress.stage("functions") as running:
             while self._renamed:
                 self._renamed, running.done = False, 0
-                for e in wanted:
+                for e in functions:
                     self._absorb(e)
                     running.done += 1
                 self._close(running)
@@ -113,7 +119,7 @@ class Tower(Arithmetic[Poly]):
         self._forget()
 
     def _forget(self) -> None:
-        """Forget what rests on the generators so far."""
+        """Drop cached values that depend on the generators."""
         self._pairs: list[tuple[int, int]] | None = None
         self._below: dict[str, frozenset[str]] = {}
         self._known: dict[int, Poly] = {}  # of functions in what is absorbed, which `_kept` keeps alive
@@ -136,7 +142,7 @@ class Tower(Arithmetic[Poly]):
     # -- growing ----------------------------------------------------------------------------------
 
     def _absorb(self, e: Expression) -> Poly:
-        """The value of an expression, for which the ring grows; what is known of functions inside is not found anew."""
+        """The value of an expression; adds missing generators to the ring, and reuses known values of functions."""
         while True:
             try:
                 for node in topological([e], self._known):
@@ -245,6 +251,10 @@ class Tower(Arithmetic[Poly]):
             inverse, exp = self._reciprocal(s), self.function("exp", [s])
             relative = (exp - 1) * inverse
             return relative if name == "exprel" else (exp - relative) * inverse
+        if name == "arcroot1":
+            sine = self._entire("sinroot", s * self.constant(Fraction(1, 4)))
+            rest = sine**2 * self.constant(Fraction(1, 2)) - 3 * self._entire("arcroot", s)
+            return rest * self._reciprocal(s) * self.constant(Fraction(1, 2))
         if name == "arcroot":  # by half angles, in which flows with it are written
             quarter = s * self.constant(Fraction(1, 4))
             return (1 - self._entire("sinroot", quarter) * self._entire("cosroot", quarter)) * self._reciprocal(s)
@@ -364,13 +374,13 @@ class Tower(Arithmetic[Poly]):
 
     def gradient(self, element: Poly, names: Iterable[str]) -> list[Poly]:
         """The derivatives along some of `variables`. Raises `OverflowError` if together they are larger than memory."""
-        found, size = [], 0
+        slopes, size = [], 0
         for name in names:
-            found.append(self.derivative(element, name))
-            size += len(found[-1]) * self.bytes_per_term
+            slopes.append(self.derivative(element, name))
+            size += len(slopes[-1]) * self.bytes_per_term
             if size > budgets.PRODUCT_BYTES:
                 raise OverflowError("a gradient with too many terms")
-        return found
+        return slopes
 
     def partial(self, element: Poly, name: str) -> Poly:
         """Derivative along a symbol that no generator contains."""
@@ -386,13 +396,13 @@ class Tower(Arithmetic[Poly]):
         """The symbols and generators that occur, directly or inside a generator."""
         if element == 0:  # whose degrees are −1
             return set()
-        found: set[str] = set()
+        names: set[str] = set()
         for i, degree in enumerate(element.degrees()):
             if degree and i < len(self.symbols):
-                found.add(self.symbols[i])
+                names.add(self.symbols[i])
             elif degree:
-                found |= self._names_below(self.generators[i - len(self.symbols)])
-        return found
+                names |= self._names_below(self.generators[i - len(self.symbols)])
+        return names
 
     def _names_below(self, g: Generator) -> frozenset[str]:
         """A generator and what its arguments depend on."""
@@ -404,7 +414,31 @@ class Tower(Arithmetic[Poly]):
 
     def is_zero(self, element: Poly) -> bool:
         """True proves that the element vanishes identically; False only that it did not reduce to 0."""
-        return bool(element == 0 or self.numerator(element) == 0)
+        if element == 0 or self._is_nonzero_at_a_point(element):
+            return bool(element == 0)
+        return bool(self.numerator(element) == 0)
+
+    def _is_nonzero_at_a_point(self, element: Poly) -> bool:
+        """Whether an element of many generators, whose numerator may be very long, has a value that is not 0."""
+        degrees = element.degrees()
+        if sum(degrees[self._index[g.name]] > 0 for g in self.generators) < MANY_GENERATORS:
+            return False
+        values = self._values_at_a_point()
+        terms = [
+            float(rational(c)) * math.prod(v ** int(e) for v, e in zip(values, m, strict=False) if e)
+            for m, c in element.to_dict().items()
+        ]
+        return abs(math.fsum(terms)) > ROUNDING * math.fsum(map(abs, terms))
+
+    def _values_at_a_point(self) -> list[float]:
+        """The values of the ring's variables at one point, in floats; NaN for all where one is not defined."""
+        if len(self._sampled) != len(self._meanings):
+            point = {n: 0.5 + math.modf((k + 1) * (math.sqrt(5) - 1) / 2)[0] for k, n in enumerate(self.symbols)}
+            try:
+                self._sampled = evaluate(self._meanings, point)
+            except DomainError:
+                self._sampled = [math.nan] * len(self._meanings)
+        return self._sampled
 
     def numerator(self, element: Poly) -> Poly:
         """A multiple of the element by a non-vanishing function, with relations between generators used up."""
@@ -420,7 +454,7 @@ class Tower(Arithmetic[Poly]):
         return self._shortened(element, relations=True)
 
     def reduced(self, element: Poly) -> Poly:
-        """The same function, common factors of what is above and below cancelled where fewer terms remain."""
+        """The same function with common factors of numerator and denominator cancelled, if fewer terms remain."""
         return self._shortened(self.cancelled(element), relations=False)
 
     def _shortened(self, element: Poly, *, relations: bool) -> Poly:
@@ -429,13 +463,13 @@ class Tower(Arithmetic[Poly]):
             if degrees[self._index[g.name]] <= 0:
                 continue
             if g.kind == "reciprocal" or (g.kind == "root" and g.inverse):
-                found = self._divided(element, g)
+                shorter = self._divided(element, g)
             elif relations and self._is_related(g):
-                found = self._eliminate(element, g)
+                shorter = self._eliminate(element, g)
             else:
                 continue
-            if len(found) < len(element):
-                element, degrees = found, found.degrees()
+            if len(shorter) < len(element):
+                element, degrees = shorter, shorter.degrees()
         return element
 
     def _is_related(self, g: Generator) -> bool:
@@ -443,12 +477,12 @@ class Tower(Arithmetic[Poly]):
         return g.kind in ("sin", "cosh", "cosroot", "sign") or (g.kind == "root" and not self._partner(g))
 
     def _divided(self, element: Poly, g: Generator) -> Poly:
-        """The element with less powers of r, where multiples of f = 1/r, or of f = r^-n, are multiplied by them."""
-        parts, own, base = self._parts(element, g.name), self.variable(g.name), g.arguments[0]
+        """The element with lower powers of r, where terms are multiples of f = 1/r, or of f = r^-n."""
+        parts, generator, base = self._parts(element, g.name), self.variable(g.name), g.arguments[0]
         for e in range(max(parts, default=0), g.degree - 1, -1):
             quotient, parts[e] = divmod(parts.get(e, self.zero), base)
             parts[e - g.degree] = parts.get(e - g.degree, self.zero) + quotient
-        return self.combine(c * own**e for e, c in parts.items())
+        return self.combine(c * generator**e for e, c in parts.items())
 
     def _partner(self, g: Generator) -> Generator | None:
         """The root 1/w for w, or w for 1/w, if it came before."""
@@ -482,33 +516,33 @@ class Tower(Arithmetic[Poly]):
                     square = (
                         1 - self.variable(other.name) ** 2 if g.kind == "sin" else 1 + self.variable(other.name) ** 2
                     )
-                    own = self.variable(g.name)
-                    return self.combine(c * own ** (e % 2) * square ** (e // 2) for e, c in parts.items())
+                    generator = self.variable(g.name)
+                    return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
         return element
 
     def _eliminate_cosroot(self, parts: dict[int, Poly], g: Generator) -> Poly:
-        """By cosroot² + s·sinroot² = 1."""
-        own, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
+        """The element with powers of cosroot above 1 replaced, by cosroot² + s·sinroot² = 1."""
+        generator, sin = self.variable(g.name), self._generator("sinroot", g.arguments)
         square = 1 - g.arguments[0] * sin**2
-        return self.combine(c * own ** (e % 2) * square ** (e // 2) for e, c in parts.items())
+        return self.combine(c * generator ** (e % 2) * square ** (e // 2) for e, c in parts.items())
 
     def _eliminate_root(self, parts: dict[int, Poly], g: Generator) -> Poly:
-        base, n, own = g.arguments[0], g.degree, self.variable(g.name)
+        base, n, generator = g.arguments[0], g.degree, self.variable(g.name)
         if other := self._partner(g):
             # w·v = 1: multiplied by a power of the partner, g disappears.
             top, w = max(parts), self.variable(other.name)
             return self.combine(c * w ** (top - e) for e, c in parts.items())
         if not g.inverse:
-            return self.combine(c * own ** (e % n) * base ** (e // n) for e, c in parts.items())
+            return self.combine(c * generator ** (e % n) * base ** (e // n) for e, c in parts.items())
         top = max(e // n for e in parts)
-        return self.combine(c * own ** (e % n) * base ** (top - e // n) for e, c in parts.items())
+        return self.combine(c * generator ** (e % n) * base ** (top - e // n) for e, c in parts.items())
 
     def _parts(self, element: Poly, name: str) -> dict[int, Poly]:
-        i = self._index[name]
-        groups: dict[int, dict[tuple[int, ...], Any]] = {}
-        for m, c in element.to_dict().items():
-            groups.setdefault(int(m[i]), {})[(*m[:i], 0, *m[i + 1 :])] = c
-        return {e: self.context.from_dict(d) for e, d in groups.items()}
+        """The coefficients of the powers of a generator that occur; divisions by powers go through terms in C."""
+        i, parts = self._index[name], dict[int, Poly]()
+        while (exponent := int(element.degrees()[i])) > 0:
+            parts[exponent], element = divmod(element, self.gens[i] ** exponent)
+        return {**parts, 0: element} if element != 0 else parts
 
     def combine(self, terms: Iterable[Poly]) -> Poly:
         """The sum of the terms, v · (1/v) cancelled."""
@@ -534,12 +568,12 @@ class Tower(Arithmetic[Poly]):
         if self._pairs is None:
             self._pairs = []
             for g in self.generators:
-                own = self._index[g.name]
+                index = self._index[g.name]
                 if g.kind == "reciprocal":
-                    self._pairs += [(i, own) for i, v in enumerate(self.gens) if v == g.arguments[0]]
+                    self._pairs += [(i, index) for i, v in enumerate(self.gens) if v == g.arguments[0]]
                 if g.kind == "root" and g.inverse:
                     self._pairs += [
-                        (self._index[o.name], own)
+                        (self._index[o.name], index)
                         for o in self.generators
                         if o.kind == "root" and not o.inverse and (o.degree, o.arguments) == (g.degree, g.arguments)
                     ]

@@ -96,13 +96,13 @@ def _at_points(
     """The verdict on residuals that did not reduce to 0, or are too large to be tried: refuted at a point, or not."""
     fewest = POINTS
     for k, (label, expression) in enumerate(pending):
-        found = _refuting_point(expression, positive)
-        if isinstance(found, str):
+        point_or_count = _refuting_point(expression, positive)
+        if isinstance(point_or_count, str):
             where = f"{label}, " if label else ""
             more = f"; {len(pending)} parts do not reduce to 0" if len(pending) > 1 else ""
             failing = tuple((part, cut(shown(i))) for i, (part, _) in enumerate(pending[:MOST_LISTED]) if part)
-            return Statement(name, REFUTED, f"{where}at {found}{more}", cut(shown(k)), failing)
-        fewest = min(fewest, found)
+            return Statement(name, REFUTED, f"{where}at {point_or_count}{more}", cut(shown(k)), failing)
+        fewest = min(fewest, point_or_count)
     parts = ", ".join(label for label, _ in pending if label)
     about = f" for {parts}" if parts and len(parts) <= LONGEST else ""
     if fewest == 0:

@@ -40,6 +40,7 @@ FEATURES = (
     Feature("TIMED", lambda p: p.time),
     Feature("NOISE", lambda p: p.noise),
     Feature("OBSERVED", lambda p: p.observed),
+    Feature("OBSERVED_FIELDS", lambda p: p.observables.fields),
     Feature("RENEWED", lambda p: p.step.refresh),
     Feature("GAUGE", lambda p: p.held),
     Feature("MONITOR", lambda p: p.monitor),

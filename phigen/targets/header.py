@@ -73,6 +73,7 @@ def facts(program: Program, listed: Callable[[Sequence[object]], str], key: Call
         "coordinates": listed(program.coordinates),
         "casimirs": listed(program.casimirs),
         "observed": listed(program.observed) if program.observed else "",
+        "observed_fields": listed(program.observables.fields) if program.observables.fields else "",
         "defaults": [f"{key(p.name)}: {float(p.value)!r}" for p in program.parameters],
         "positive": listed([p.name for p in program.parameters if p.positive]),
         "right_hand_side": right_hand_side(program),

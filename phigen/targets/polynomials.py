@@ -9,11 +9,14 @@ from fractions import Fraction
 _BLOCK = 4
 
 
-def estrin(coefficients: Sequence[Fraction], variable: str) -> tuple[list[str], str]:
-    """Statements, and the value of Σ c_k variable^k: Estrin's scheme in blocks of four, these by Horner's rule."""
+def estrin(coefficients: Sequence[Fraction], variable: str, first: str = "a") -> tuple[list[str], str]:
+    """Statements, and the value of Σ c_k variable^k: Estrin's scheme in blocks of four, these by Horner's rule.
+
+    Blocks are named by letters from ``first`` on.
+    """
     v = variable
     blocks = [coefficients[i : i + _BLOCK] for i in range(0, len(coefficients), _BLOCK)]
-    names = [chr(ord("a") + k) for k in range(len(blocks))]
+    names = [chr(ord(first) + k) for k in range(len(blocks))]
     lines = [f"const double {v}2 = {v} * {v}, {v}4 = {v}2 * {v}2;"]
     lines += [f"const double {n} = {_block(b, v)};" for n, b in zip(names, blocks, strict=True)]
     value = names[-1]

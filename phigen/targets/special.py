@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.lowering import expand_powers
 from phigen.scheme.program import Program
+from phigen.splitting.matrices import PADE, REACH
 from phigen.symbolic.entire import ENTIRE
 from phigen.symbolic.expression import Expression, call, symbol, symbols_of, topological
 from phigen.symbolic.special import MIDDLE, NEAR, POLE, SPECIAL, near_coefficients, order_of, rest_coefficients
+from phigen.symbolic.universal import ANOMALY, MOST_ITERATIONS, RADIAL
 from phigen.targets.names import Scope
 from phigen.targets.printer import Printer
 from phigen.targets.reserved import Reserved
@@ -87,3 +91,40 @@ def entire_used(program: Program) -> list[str]:
     for f in (f for f in ENTIRE if f in ops):
         ops = ops | {e.op for e in topological(_closed_forms(f))}
     return [name for name in ENTIRE if name in ops]
+
+
+def calls_anomaly(program: Program) -> bool:
+    """Whether kernels call the universal anomaly of Kepler motions."""
+    return any(e.op == ANOMALY for e in topological([e for kernel in program.kernels for e in kernel.roots]))
+
+
+def stumpff() -> tuple[list[Fraction], list[Fraction]]:
+    """The coefficients of c2 = (1 - cos x)/x² and c3 = (x - sin x)/x³ as series in x², for x² up to 1."""
+    count = len(ENTIRE["arcroot"].terms())
+    c2 = [Fraction((-1) ** n, math.factorial(2 * n + 2)) for n in range(count)]
+    return c2, [ENTIRE["arcroot"].coefficient(n) for n in range(count)]
+
+
+def anomaly_values(*, single: bool = False) -> dict[str, object]:
+    """The values of the templates of the anomaly that all languages share; ``single`` is for numbers of 32 bits.
+
+    ``unit`` is the unit of rounding, and ``rounding`` a tenth of it: what an iteration may leave of the solution.
+    """
+    if single:
+        return {"most": MOST_ITERATIONS, "radial": "1e-12", "unit": "1.2e-7", "rounding": "1e-8"}
+    return {"most": MOST_ITERATIONS, "radial": repr(RADIAL), "unit": "2.3e-16", "rounding": "2e-17"}
+
+
+def largest_exponential(program: Program) -> int:
+    """The rows of the largest matrix whose exponential ``prepare`` takes; 0 without any."""
+    return max((n for _, n in program.step.prepare.exponentials), default=0)
+
+
+def transposes_exponentials(program: Program) -> bool:
+    """Whether cotangents are pulled back through exponentials of matrices, those that parameters enter."""
+    return program.step.adjoint is not None and program.step.adjoint.prepare.exponents is not None
+
+
+def exponential_constants() -> dict[str, object]:
+    """The constants of the exponential of matrices."""
+    return {"pade": ", ".join(repr(float(c)) for c in PADE), "reach": repr(REACH)}

@@ -1,1 +1,1 @@
-"""Which setting of a spec reaches an accuracy cheapest: candidates built, measured, compared and confirmed."""
+"""Search for the cheapest setting of a spec at an accuracy: candidates are built, measured, compared and confirmed."""

@@ -104,13 +104,13 @@ def compare(
     the step of the run costs with the setting of the spec. Raises `StepError` if that setting cannot make the run.
     """
     start = time.perf_counter()
-    own = own_setting(compilation)
-    made = built(compilation, own, start)
-    candidates = [_of_build(made, problem, own=True)]
-    settings = [s for s in dict.fromkeys(_settings(problem, own, orders)) if s != own]
+    current = own_setting(compilation)
+    current_build = built(compilation, current, start)
+    candidates = [_of_build(current_build, problem, is_current=True)]
+    settings = [s for s in dict.fromkeys(_settings(problem, current, orders)) if s != current]
     note(f"building {len(settings)} more")
     refused: list[Entry] = []
-    fingerprints = {made.fingerprint}
+    fingerprints = {current_build.fingerprint}
     outcomes: dict[Setting, Outcome] = dict(
         build_all(compilation.spec, compilation.system, settings, start + BUILDING * budget)
     )
@@ -126,7 +126,7 @@ def compare(
     state = problem.start.copy()
     race = problem.classical(compilation, list(PEERS), state)
     peers = {name: Classical(race.runners[name], state, problem) for name in PEERS if name in race.runners}
-    solver = candidates[0].step and Solver(made.solver(), made.interface)
+    solver = candidates[0].step and Solver(current_build.solver(), current_build.interface)
     for name, method in peers.items():
         step = of_classical(name, solver, problem.parameters) if solver and problem.clock == "t" else None
         candidates.append(_Candidate(PEERS[name], {"rk4": 4, "dop853": 8}[name], method, step))
@@ -145,17 +145,17 @@ def compare(
     return Comparison((*entries, *refused), problem.horizon, equal, problem.unit.kind, problem.clock)
 
 
-def _settings(problem: Problem, own: Setting, orders: Sequence[int]) -> list[Setting]:
+def _settings(problem: Problem, current: Setting, orders: Sequence[int]) -> list[Setting]:
     """Return the settings to compare: each bi-realisation and the splitting, at each of the orders it has."""
-    families = dict.fromkeys([own.family, *(guess.family for guess in problem.guesses(own))])
+    families = dict.fromkeys([current.family, *(guess.family for guess in problem.guesses(current))])
     return [replace(family, order=order) for family in families for order in orders if order in family.orders]
 
 
-def _of_build(made: Built, problem: Problem, *, own: bool = False) -> _Candidate:
-    backend = made.solver()
-    step = None if problem.sizes else of_solver(Solver(backend, made.interface), problem.parameters)
-    title = made.setting.described(made.kind)
-    return _Candidate(title, made.order, problem.method(backend), step, made.exact, own)
+def _of_build(build: Built, problem: Problem, *, is_current: bool = False) -> _Candidate:
+    backend = build.solver()
+    step = None if problem.sizes else of_solver(Solver(backend, build.interface), problem.parameters)
+    title = build.setting.described(build.kind)
+    return _Candidate(title, build.order, problem.method(backend), step, build.exact, is_current)
 
 
 def _measured(candidate: _Candidate, problem: Problem, h: float, exact: Method | None, seconds: float) -> Entry:

@@ -24,7 +24,7 @@ from phigen.tuning.settings import CHOICES, FORMULAS, OWN, SPLITTING, Setting, d
 
 #: Sites above which a smaller grid of the same kind is measured.
 MOST_SITES = 10_000
-#: Numbers of states that are looked at in one run, at most, and of one that is compared with a reference.
+#: The most numbers in the states of one run, and in those of a run that is compared with a reference.
 MOST_NUMBERS, MOST_COMPARED = 2**24, 2**13
 
 
@@ -102,7 +102,7 @@ class LatticeProblem(Problem):
 
     @property
     def unit(self) -> Unit:
-        """What errors of the energy are counted in."""
+        """The unit of errors of the energy."""
         energy = float(self.seer.energies(self.start[None], self.parameters)[0])
         return unit_of(energy, self.seer.terms(self.start, self.parameters), SITES)
 
@@ -119,36 +119,36 @@ class LatticeProblem(Problem):
     def energies(self, states: Floats) -> Floats:
         """H of states (rows, DIM); those that are not finite have none."""
         finite = np.isfinite(states).all(axis=1)
-        found = np.full(len(states), np.nan)
-        found[finite] = self.seer.energies(states[finite], self.parameters)
-        return found
+        energies = np.full(len(states), np.nan)
+        energies[finite] = self.seer.energies(states[finite], self.parameters)
+        return energies
 
     def method(self, solver: Any) -> Candidate:
         """A solver as a method."""
         flat: Any = FlatLattice(solver, self.seer.shape)
         return Candidate(flat, self)
 
-    def guesses(self, own: Setting) -> list[Setting]:
+    def guesses(self, current: Setting) -> list[Setting]:
         """Splittings, and the series with each bi-realisation that might apply at a site."""
         local = self.cell.is_local
         kinds = [k for k in BIREALISATIONS if k not in (*FORMULAS, *CHOICES, "karasev")] if local else ["auto"]
         split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
-        first = [replace(own, order=order, composition=direct(own)) for order in (2, 4)]
+        first = [replace(current, order=order, composition=direct(current)) for order in (2, 4)]
         others = [*split, *(Setting(kind, 4, OWN, "auto") for kind in kinds)]
-        return [s for s in (*first, *(s for s in others if s.chart != own.chart)) if s != own]
+        return [s for s in (*first, *(s for s in others if s.chart != current.chart)) if s != current]
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
         """Classical methods in NumPy, on the vector field of the solver."""
 
         def slope(x: Floats) -> Floats:
-            found: Floats = self.seer.vector_field(x[None], self.parameters)[0]
-            return found
+            velocity: Floats = self.seer.vector_field(x[None], self.parameters)[0]
+            return velocity
 
         def runner(name: str) -> race.Runner:
             def run(h: float, steps: int, repeats: int) -> Floats | None:
                 for _ in range(repeats):
-                    found: Floats = classical.integrate(name, slope, state, h, steps, steps)[-1]
-                return found if np.isfinite(found).all() else None
+                    end: Floats = classical.integrate(name, slope, state, h, steps, steps)[-1]
+                return end if np.isfinite(end).all() else None
 
             return run
 
@@ -168,25 +168,25 @@ def lattice_problem(
     start = start_of(spec, run)
     about = solver.interface
     few = _fewer(start.sizes, about.least, about.periods) if cell.relation == GRID else start.sizes
-    found = start if few == start.sizes else _begun(spec, run, few) or start
-    flat = FlatLattice(solver.backend, found.state.shape)
-    values = solver.values({**found.arguments, **settings}, {}, found.sizes)
+    begun = start if few == start.sizes else _begun(spec, run, few) or start
+    flat = FlatLattice(solver.backend, begun.state.shape)
+    values = solver.values({**begun.arguments, **settings}, {}, begun.sizes)
     return LatticeProblem(
-        compilation.system, found.state.reshape(-1), values, step, span, direction, found.sizes,
+        compilation.system, begun.state.reshape(-1), values, step, span, direction, begun.sizes,
         cell=cell, whole=start.sizes, seer=flat,
     )  # fmt: skip
 
 
 def _fewer(sizes: Sequence[int], least: Sequence[int], periods: Sequence[int]) -> tuple[int, ...]:
-    """The sizes, the largest halved again and again while there are too many sites."""
-    found = list(sizes)
-    while np.prod(found) > MOST_SITES:
-        axis = int(np.argmax(found))
-        half = -(-found[axis] // 2 // periods[axis]) * periods[axis]
-        if half < max(least[axis], 4) or half >= found[axis]:
+    """The sizes of the run with the largest halved repeatedly, until there are few enough sites."""
+    reduced = list(sizes)
+    while np.prod(reduced) > MOST_SITES:
+        axis = int(np.argmax(reduced))
+        half = -(-reduced[axis] // 2 // periods[axis]) * periods[axis]
+        if half < max(least[axis], 4) or half >= reduced[axis]:
             break
-        found[axis] = half
-    return tuple(found)
+        reduced[axis] = half
+    return tuple(reduced)
 
 
 def _begun(spec: Spec, run: Run, sizes: tuple[int, ...]) -> Start | None:

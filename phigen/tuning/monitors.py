@@ -39,7 +39,7 @@ from phigen.tuning.scales import MOST_TURN, fastest_rate, motion
 from phigen.tuning.settings import SPLITTING, Setting
 from phigen.tuning.trials import ROUNDING
 
-#: Monitors are of use where the greatest speed is so many times the median one.
+#: Monitors are tried where the largest speed is at least this multiple of the median.
 UNEVEN = 3.0
 #: Distances that are looked at, at most; the quarters of powers of their squares that are tried, the likeliest first;
 #: and of 1 + the square of the speed.
@@ -56,7 +56,7 @@ HALVINGS, MOST = 30, 64
 
 @dataclass(frozen=True)
 class Trial:
-    """So many steps of a size in τ (in t, without a monitor) have the ``error`` over the time; inf if none has."""
+    """The number of steps of a size in τ (in t, without a monitor) with the ``error``; infinite if there is none."""
 
     setting: Setting
     label: str
@@ -69,7 +69,7 @@ class Trial:
 
 @dataclass(frozen=True)
 class Monitors:
-    """What monitors gain over a ``span`` of time: steps equal in t, and all that were tried, the best first."""
+    """Gains of monitors over a ``span`` of time: steps equal in t, and all monitors that were tried, the best first."""
 
     span: float
     plain: Trial
@@ -77,7 +77,7 @@ class Monitors:
     refused: Mapping[str, str] = field(default_factory=dict)
 
     def gain(self, trial: Trial) -> float:
-        """How many times fewer steps."""
+        """The ratio of the numbers of steps without and with the monitor."""
         return self.plain.steps / trial.steps
 
 
@@ -109,8 +109,8 @@ def _candidates(system: System, parameters: Mapping[str, float], states: Floats)
     yield power(ONE + size, number(Fraction(-1, 2)))
     rates = hamiltonian_vector_field(system.poisson, gradient(system.hamiltonian, system.coordinates))
     speed = total(f * f for f in rates)
-    (found,) = evaluate([speed], columns)
-    scale = float(np.median(np.broadcast_to(found, len(states))))
+    (speeds,) = evaluate([speed], columns)
+    scale = float(np.median(np.broadcast_to(speeds, len(states))))
     if math.isfinite(scale) and scale > 0:
         near = number(Fraction(f"{scale:.1e}"))
         yield from (power(ONE + speed / near, number(Fraction(-k, 4))) for k in OF_SPEED)
@@ -132,35 +132,37 @@ def _least_share(b: Expression, columns: Mapping[str, Floats | float]) -> float:
 
 
 def _bases(system: System) -> list[Expression]:
-    """What stands in denominators, under roots and in logarithms of H, and moves."""
-    found: dict[str, Expression] = {}
+    """The coordinate-dependent expressions in denominators, under roots and in logarithms of H."""
+    by_text: dict[str, Expression] = {}
     for node in topological([system.hamiltonian]):
         rooted = node.op == "pow" and (node.value < 0 or node.value != int(node.value))
         if (rooted or node.op == "log") and any(s in system.coordinates for s in symbols_of(node.args[0])):
             base = node.args[0]
             while base.op == "pow" and base.value > 0:
                 base = base.args[0]
-            found.setdefault(str(base), base)
-    return list(found.values())
+            by_text.setdefault(str(base), base)
+    return list(by_text.values())
 
 
 def _is_square(b: Expression) -> bool:
-    """Whether it is the square of a distance rather than one: a sum."""
+    """Whether the expression is a sum: the square of a distance, not a distance."""
     return b.op in ("add", "sub")
 
 
 def _is_positive(b: Expression, columns: Mapping[str, Floats | float]) -> bool:
     try:
-        (found,) = evaluate([b], columns)
+        (values,) = evaluate([b], columns)
     except DomainError:
         return False
-    return bool(np.all(np.isfinite(found)) and np.all(np.asarray(found) > 0))
+    return bool(np.all(np.isfinite(values)) and np.all(np.asarray(values) > 0))
 
 
-def settings(own: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
+def settings(current: Setting, order: int, monitors: Sequence[Expression]) -> list[Setting]:
     """The settings to be built: steps equal in t, and each monitor, at the same order."""
     order = min(order + order % 2, HIGHEST)
-    series = Setting("auto", order, "none") if own.scheme != "series" else replace(own, order=order, gauge="none")
+    series = (
+        Setting("auto", order, "none") if current.scheme != "series" else replace(current, order=order, gauge="none")
+    )
     series = replace(series, composition="auto")
     explicit = Setting(SPLITTING, order, "none", "auto", monitor=LOGARITHMIC)
     return [series, explicit, *(replace(series, monitor=str(g)) for g in dict.fromkeys(monitors))]
@@ -169,7 +171,7 @@ def settings(own: Setting, order: int, monitors: Sequence[Expression]) -> list[S
 def compare(
     spec: Spec,
     system: System,
-    wanted: Sequence[Setting],
+    requested: Sequence[Setting],
     problem: Problem,
     states: Floats,
     span: float,
@@ -181,12 +183,12 @@ def compare(
     ``states`` (rows, DIM) are some along the motion.
     """
     building = deadline - MEASURING * max(deadline - time.perf_counter(), 0.0)
-    outcomes = dict(build_all(spec, system, wanted, building))
-    plain, *others = wanted
-    made = outcomes.get(plain)
-    if not isinstance(made, Built):
+    outcomes = dict(build_all(spec, system, requested, building))
+    plain, *others = requested
+    plain_build = outcomes.get(plain)
+    if not isinstance(plain_build, Built):
         return None
-    first = _trial(made, problem, states, span, accuracy, span / problem.step, deadline)
+    first = _trial(plain_build, problem, states, span, accuracy, span / problem.step, deadline)
     trials, refused = [], {}
     for setting in others:
         outcome = outcomes.get(setting)
@@ -205,17 +207,17 @@ def _trial(
     solver = Solver(built.solver(), built.interface)
     h, before = _largest(solver, problem, states), (math.nan, math.inf)
     for _ in range(HALVINGS):
-        made = _run(solver, problem, span, h, MOST * max(most, FEWEST))
-        if made.error <= accuracy and math.isfinite(before[1]):
-            gained = math.log(before[1] / accuracy) / math.log(before[1] / max(made.error, ROUNDING))
+        run = _run(solver, problem, span, h, MOST * max(most, FEWEST))
+        if run.error <= accuracy and math.isfinite(before[1]):
+            gained = math.log(before[1] / accuracy) / math.log(before[1] / max(run.error, ROUNDING))
             finer = before[0] * math.pow(h / before[0], min(1.02 * gained, 1.0))
             between = _run(solver, problem, span, finer, math.inf)
-            made = between if between.error <= accuracy else made
-        if made.error <= accuracy:
-            return Trial(built.setting, built.kind, built.order, made.h, made.steps, made.error, made.seconds)
-        if made.seconds >= SECONDS or time.perf_counter() > deadline:
+            run = between if between.error <= accuracy else run
+        if run.error <= accuracy:
+            return Trial(built.setting, built.kind, built.order, run.h, run.steps, run.error, run.seconds)
+        if run.seconds >= SECONDS or time.perf_counter() > deadline:
             break
-        before, h = (h, made.error), h / 2
+        before, h = (h, run.error), h / 2
     return Trial(built.setting, built.kind, built.order, math.nan, math.inf, math.inf, 0.0)
 
 
@@ -236,7 +238,7 @@ class _Run:
 
 
 def _run(solver: Solver, problem: Problem, span: float, h: float, most: float) -> _Run:
-    """So many steps as reach the end of the span; none where they are more than ``most``, or take too long."""
+    """A run to the end of the span; none if it needs more than ``most`` steps, or takes too long."""
     begun, states = time.thread_time(), [problem.start]
     session, done, passed = solver.backend.start(problem.start, problem.parameters), 0, 0.0
     try:

@@ -1,4 +1,4 @@
-"""What is solved, and the methods that solve it: compiled, and started from its initial state."""
+"""The problem of a tuning, and the methods that solve it: compiled, and started from its initial state."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ROWS = 8_000
 
 @dataclass(frozen=True)
 class Problem:
-    """What is solved: the numbers of a run, and for how long. ``step`` is that of the run, a first guess.
+    """The problem: the numbers of a run and its time. ``step`` is that of the run, a first guess.
 
     Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice. All
     times are those of the ``clock``: of τ where there is a monitor, which all methods have then.
@@ -42,9 +42,9 @@ class Problem:
 
     @property
     def unit(self) -> Unit:
-        """What errors of the energy are counted in."""
-        (found,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
-        return found
+        """The unit of errors of the energy."""
+        (unit,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
+        return unit
 
     @property
     def most_rows(self) -> int:
@@ -60,9 +60,9 @@ class Problem:
         """A solver as a method."""
         return Candidate(solver, self)
 
-    def guesses(self, own: Setting) -> list[Setting]:
+    def guesses(self, current: Setting) -> list[Setting]:
         """Settings to begin with."""
-        return charts(self.system, own)
+        return charts(self.system, current)
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
         """Classical methods from a ``state`` that may change, in C where there is a compiler."""
@@ -74,8 +74,8 @@ class Problem:
     def energies(self, states: Floats) -> Floats:
         """H of states (rows, DIM)."""
         values = {**self.parameters, **{c: states[:, i] for i, c in enumerate(self.system.coordinates)}}
-        (found,) = evaluate([self.system.hamiltonian], values)
-        return np.broadcast_to(found, (len(states),))
+        (energies,) = evaluate([self.system.hamiltonian], values)
+        return np.broadcast_to(energies, (len(states),))
 
 
 class Method(Protocol):
@@ -101,10 +101,10 @@ class Candidate:
         problem = self.problem
         try:
             session = self.solver.start(problem.start, problem.parameters)
-            found = rows_along(session, problem.direction * h, steps, stride, None)
+            rows = rows_along(session, problem.direction * h, steps, stride, None)
         except BackendError:
             return None
-        return found if np.isfinite(found).all() else None
+        return rows if np.isfinite(rows).all() else None
 
     def reach(self, h: float, steps: int) -> tuple[float, str]:
         """The time of the last step that can be made, and the status of the next, of so many."""
@@ -134,10 +134,10 @@ class Classical:
         states[0] = self.problem.start
         for row in range(1, len(marks)):
             self.state[:] = states[row - 1]
-            found = self.runner(self.problem.direction * h, int(marks[row] - marks[row - 1]), 1)
-            if found is None:
+            state = self.runner(self.problem.direction * h, int(marks[row] - marks[row - 1]), 1)
+            if state is None:
                 return None
-            states[row] = found
+            states[row] = state
         return states
 
     def walk(self, h: float) -> Callable[[int], object]:

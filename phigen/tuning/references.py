@@ -18,7 +18,7 @@ CONVERGED = 0.02
 #: The two may differ by this part of the accuracy.
 AGREED = 0.2
 _HALVINGS = 16
-#: Where an orbit is looked at but no accuracy is asked of it: an error below this says enough.
+#: For orbits without a requested accuracy: an error below this is accurate enough.
 KNOWN = 1e-12
 
 
@@ -39,10 +39,10 @@ class Reference:
         key = (spacing, count)
         if key not in self._known:
             stride = math.ceil(spacing / self.step)
-            found = self.method.rows(spacing / stride, stride * count, stride)
-            if found is None:
+            rows = self.method.rows(spacing / stride, stride * count, stride)
+            if rows is None:
                 raise CheckError(f"the reference solution cannot be followed to {self.clock} = {spacing * count:.6g}")
-            self._known[key] = found
+            self._known[key] = rows
         return self._known[key]
 
 
@@ -55,13 +55,13 @@ def agreed(
     ``seconds``. Raises `CheckError` if the two do not agree well enough to measure that error.
     """
     spacing = span / MARKS
-    found = []
+    orbits = []
     for method in (first, second):
         converged = _converged(method, min(step, spacing), spacing, MARKS, accuracy, time.perf_counter() + seconds)
         if converged is None:
             raise CheckError(f"no reference solution: a method fails before {clock} = {span:.6g}")
-        found.append(converged)
-    (states, h, _), (others, _, _) = found
+        orbits.append(converged)
+    (states, h, _), (others, _, _) = orbits
     difference = distance(states, others)
     if difference > AGREED * accuracy:
         size = float(np.max(np.abs(others))) or 1.0
@@ -76,16 +76,16 @@ def agreed(
 
 
 def orbit_error(states: Floats, spacing: float, other: Method, step: float, seconds: float) -> float | None:
-    """How far states (rows, DIM) at multiples of a spacing are from those of another method at small steps.
+    """The distance of states (rows, DIM) at multiples of a spacing from those of another method at small steps.
 
     Relative to the largest coordinate; None if the other method does not know the orbit that well in so many seconds.
     """
     count, until = len(states) - 1, time.perf_counter() + seconds
-    found = _converged(other, min(step, spacing), spacing, count, KNOWN, until)
-    if found is None:
+    orbit = _converged(other, min(step, spacing), spacing, count, KNOWN, until)
+    if orbit is None:
         return None
-    error = distance(states, found[0])
-    return error if found[2] < max(AGREED * error, KNOWN) else None
+    error = distance(states, orbit[0])
+    return error if orbit[2] < max(AGREED * error, KNOWN) else None
 
 
 def distance(states: Floats, others: Floats) -> float:

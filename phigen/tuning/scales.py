@@ -13,7 +13,7 @@ from phigen.symbolic.arrays import Floats
 from phigen.tuning.problem import Candidate, Problem, steps_in
 from phigen.tuning.timing import nanoseconds_per_step
 
-#: A scan measures over so many steps of the run's size at most, and over so many seconds of CPU time.
+#: Limits of a scan: steps of the run's size, and seconds of CPU time.
 PIECE_STEPS, PIECE_SECONDS = 20_000, 0.02
 #: A step turns the fastest motion by this angle at most: fewer than three steps in a turn show no motion. And there
 #: are at least so many.
@@ -40,8 +40,8 @@ def motion(solver: Backend, parameters: Mapping[str, Any], *, monitored: bool) -
     """The vector field at states (rows, DIM), in what steps are equal in: in τ, or in t."""
 
     def slope(x: Floats) -> Floats:
-        found: Floats = solver.vector_field(x, parameters)
-        return solver.rate(x, parameters)[:, np.newaxis] * found if monitored else found
+        velocity: Floats = solver.vector_field(x, parameters)
+        return solver.rate(x, parameters)[:, np.newaxis] * velocity if monitored else velocity
 
     return slope
 

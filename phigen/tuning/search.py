@@ -25,13 +25,13 @@ AIM = 0.8
 DEARER = 1.25
 #: Bi-realisations this many times as expensive as the best are not followed to other orders.
 KEEP = 3.0
-#: Halving the step twice gains at least this factor, unless rounding is all that is left.
+#: Halving the step twice gains at least this factor, unless errors are rounding.
 GAIN = 1.5
 
 
 @dataclass(frozen=True)
 class Curve:
-    """What was measured of one method: points from coarse to fine. ``setting`` is None for a classical method.
+    """Measurements of one method: points from coarse to fine. ``setting`` is None for a classical method.
 
     ``bounded`` says whether its energy error is: of Poisson maps, not of truncated ones and classical methods.
     """
@@ -49,12 +49,12 @@ class Curve:
 
     @property
     def key(self) -> Setting | str:
-        """What it is known by: its setting, or its label if it is classical."""
+        """The key of the method: its setting, or its label if it is classical."""
         return self.setting or self.label
 
     @property
     def title(self) -> str:
-        """What distinguishes it, in words."""
+        """The title of the method in tables."""
         return self.setting.described(self.label) if self.setting else self.label
 
     @property
@@ -164,10 +164,10 @@ def scan(
     while points and len(points) < MOST_POINTS and patience():
         if _enough(points, accuracy) or _hopeless(points, accuracy, order, worth):
             break
-        found = measure(points[-1].step / FINER)
-        if found is None:
+        point = measure(points[-1].step / FINER)
+        if point is None:
             break
-        points.append(found)
+        points.append(point)
     for _ in range(2):
         points = _refined(points, measure, step_for(points, AIM * accuracy, order), patience)
     cheapest, _ = cheapest_step(points, AIM * accuracy, order)
@@ -194,23 +194,23 @@ def _refined(
         return points
     if any(abs(math.log(p.step / step)) < 0.02 for p in points):
         return points
-    found = measure(step)
-    return sorted([*points, found], key=lambda p: -p.step) if found else points
+    point = measure(step)
+    return sorted([*points, point], key=lambda p: -p.step) if point else points
 
 
 def _coarsest(
     measure: Callable[[float], Point | None], first: float, most: float, patience: Callable[[], bool]
 ) -> list[Point]:
     """The largest step that can be made, to a factor `FINER`, from a first guess; empty if there is none near it."""
-    step, found = first, measure(first)
+    step, point = first, measure(first)
     for _ in range(FAILURES):
-        if found is not None or not patience():
+        if point is not None or not patience():
             break
         step /= FINER
-        found = measure(step)
-    if found is None:
+        point = measure(step)
+    if point is None:
         return []
-    points = [found]
+    points = [point]
     while points[0].step < 0.97 * most and step == first:
         coarser = measure(min(points[0].step * FINER, most))
         if coarser is None:
@@ -243,22 +243,22 @@ def proposals(tried: Mapping[Setting, Curve], refused: Sequence[Setting], accura
         families.setdefault(setting.family, {})[setting.order] = cost
     ranked = sorted(families, key=lambda family: min(families[family].values()))
     least = min(costs.values(), default=math.inf)
-    found: list[Setting] = []
+    proposed: list[Setting] = []
     for family in ranked:
         orders = families[family]
         best = min(orders, key=lambda order: (orders[order], -order))
         if orders[best] > KEEP * least:
             continue
         setting = next(s for s in tried if s.family == family and s.order == best)
-        found += _neighbours(setting, orders, refused)
+        proposed += _neighbours(setting, orders, refused)
         if family == ranked[0] and family.composition == direct(family):
             curve = tried[setting]
             known = {(s.chart, s.composition, s.gauge * (s.composition == "none")) for s in (*tried, *refused)}
-            found += [
+            proposed += [
                 v for v in variants(setting, curve.gauged, curve.symmetric)
                 if (v.chart, v.composition, v.gauge * (v.composition == "none")) not in known
             ]  # fmt: skip
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(proposed))
 
 
 def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Setting]) -> list[Setting]:
@@ -276,5 +276,5 @@ def _neighbours(best: Setting, orders: Mapping[int, float], refused: Sequence[Se
 def rounded_down(step: float, digits: int = 3) -> float:
     """The step with so few digits that it can be read, never larger."""
     exponent = math.floor(math.log10(step)) - digits + 1
-    found = float(f"{math.floor(step / 10.0**exponent + 1e-9)}e{exponent}")
-    return found if found <= step else step
+    rounded = float(f"{math.floor(step / 10.0**exponent + 1e-9)}e{exponent}")
+    return rounded if rounded <= step else step

@@ -1,4 +1,4 @@
-"""What can be chosen for a spec: bi-realisation, order, gauge, composition, scheme; and the lines that say it."""
+"""Settings of a spec: bi-realisation, order, gauge, composition, scheme; and their lines in the spec."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from phigen.spec.model import BirealisationChoice, Spec
 from phigen.spec.names import BIREALISATIONS, LOGARITHMIC
 from phigen.symbolic.expression import Expression, symbol
 
-#: What the spec itself says, where that cannot be said by a name: formulas, or options of a kind.
+#: Stands for the choice of the spec where it has no name: formulas, or options of a kind.
 OWN = "as in the spec"
 
 #: Orders of direct series; canonical-euler is also explicit at order 1, for separable H.
@@ -72,7 +72,7 @@ class Setting:
         return (1, *ORDERS) if self.kind == "canonical-euler" else ORDERS
 
     def described(self, kind: str = "") -> str:
-        """In words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is what it turned out to be."""
+        """The setting in words: ``exponential, order 8, without gauge, kahan-li``; ``kind`` is that of the build."""
         named = self.kind if self.of == "auto" else f"{self.kind} of {self.of}"
         words = [kind or named, f"order {self.order}"]
         words += ["without gauge"] if self.gauge == "none" and self.scheme == "series" else []
@@ -116,18 +116,18 @@ class Setting:
 
 
 def monitor_of(written: str, spec: Spec) -> str | Expression:
-    """What a monitor stands for that is written so: ``log``, or a function of coordinates and parameters."""
+    """The monitor that a text denotes: ``log``, or a function of coordinates and parameters."""
     if written == LOGARITHMIC:
         return LOGARITHMIC
     names = (*spec.coordinates, *(p.name for p in spec.parameters))
-    found = parse(written, Scope({n: symbol(n) for n in names}), lambda *_, **__: None)
-    if found is None:
+    expression = parse(written, Scope({n: symbol(n) for n in names}), lambda *_, **__: None)
+    if expression is None:
         raise ValueError(f"{written!r} is no monitor")
-    return found
+    return expression
 
 
 def own_setting(compilation: Compilation) -> Setting:
-    """What a spec says now, in the words of what it was compiled to."""
+    """The setting of a spec as it is now, with the kinds that ``auto`` chose."""
     spec, realisation, order = compilation.spec, compilation.realisation, compilation.order.order
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
     if isinstance(compilation.sweeps, SeriesPlan):
@@ -143,7 +143,7 @@ def own_setting(compilation: Compilation) -> Setting:
 
 
 def _of_series(spec: Spec, plan: SeriesPlan, order: int) -> Setting:
-    """That of a lattice, whose series has order 2, and is composed for others."""
+    """The setting of a lattice, whose series has order 2 and is composed for higher orders."""
     composition = "auto" if spec.composition == "none" else spec.composition
     if plan.realisation.site is None:
         return Setting("auto", order, OWN, composition)
@@ -152,7 +152,7 @@ def _of_series(spec: Spec, plan: SeriesPlan, order: int) -> Setting:
     return Setting(kind if plain else OWN, order, OWN, composition)
 
 
-def charts(system: System, own: Setting) -> list[Setting]:
+def charts(system: System, current: Setting) -> list[Setting]:
     """Settings to begin with: one of order 4 for each bi-realisation that might apply, the spec's own at more orders.
 
     Left out are those that need formulas of the user, and Karasev's paths where π is linear or constant: there its
@@ -166,9 +166,9 @@ def charts(system: System, own: Setting) -> list[Setting]:
     euler = [Setting("canonical-euler", order) for order in (1, 4)]
     split = [Setting(SPLITTING, order, "none", "auto") for order in (4, 6)]
     split += [Setting(GAUSS, order, "none") for order in (8, 16)]
-    first = [replace(own, order=order, composition=direct(own)) for order in (4, 8)]
-    others = [s for s in (*split, *named, *nested, *euler) if s.chart != own.chart]
-    return [s for s in (*first, *others) if s != own]
+    first = [replace(current, order=order, composition=direct(current)) for order in (4, 8)]
+    others = [s for s in (*split, *named, *nested, *euler) if s.chart != current.chart]
+    return [s for s in (*first, *others) if s != current]
 
 
 def direct(setting: Setting) -> str:
@@ -178,9 +178,9 @@ def direct(setting: Setting) -> str:
 
 def variants(best: Setting, gauged: bool, symmetric: bool) -> list[Setting]:
     """The same bi-realisation at about the same order otherwise: without gauge, or composed."""
-    found = [replace(best, gauge="none")] if gauged else []
+    variations = [replace(best, gauge="none")] if gauged else []
     if symmetric and direct(best) == "none":
         recommended = {c.order: c.name for c in reversed(COMPOSITIONS)}
         order = max((k for k in recommended if k <= best.order), default=min(recommended))
-        found.append(replace(best, composition=recommended[order], order=order))
-    return found
+        variations.append(replace(best, composition=recommended[order], order=order))
+    return variations

@@ -48,7 +48,7 @@ class Finalist:
 
 @dataclass(frozen=True)
 class Tuning:
-    """What was found. ``finalists`` meet the accuracy, the best first; there are none if nothing does.
+    """The result of a tuning. ``finalists`` meet the accuracy, the best first; empty if nothing does.
 
     ``own`` is the spec's own setting at the accuracy, None if it does not reach it; ``present`` that at the run's
     step; ``peers`` are classical methods at the accuracy, those that reach it. Scans were made over ``piece`` of the
@@ -100,31 +100,31 @@ def tune(
     """
     clock = Clock(budget)
     tuner = Tuner(compilation, problem, accuracy, clock, note)
-    own = tuner.start(measure)
-    finished = tuner.search(own)
+    current = tuner.start(measure)
+    finished = tuner.search(current)
     classical = tuner.peers()
-    finalists = final(tuner, own)
-    present = _present(tuner, own)
+    finalists = final(tuner, current)
+    present = _present(tuner, current)
     peers = [Finalist(c, p) for c in classical if (p := confirmed(tuner, c))]
     timed = time_all([*finalists, *peers, *([present] if present else [])], tuner)
     ranked, peers = ranking(timed[: len(finalists)]), timed[len(finalists) :][: len(peers)]
     look = ranked and measure == "energy"
     return Tuning(
         measure, accuracy, problem.horizon, tuner.piece, (*tuner.tried.values(), *classical), tuple(ranked),
-        next((f for f in ranked if f.curve is own), None), timed[-1] if present else None, tuple(peers),
+        next((f for f in ranked if f.curve is current), None), timed[-1] if present else None, tuple(peers),
         {s: why for s, why in tuner.refused.items() if why}, finished,
         tuner.orbit_error(ranked[0].curve, ranked[0].point.step) if look else None, problem.unit,
-        monitored(tuner, own), problem.sizes, problem.clock,
+        monitored(tuner, current), problem.sizes, problem.clock,
     )  # fmt: skip
 
 
-def monitored(tuner: Tuner, own: Curve) -> Monitors | None:
-    """What monitors gain over the time of a scan; None where that is not asked, as the motion is even."""
+def monitored(tuner: Tuner, current: Curve) -> Monitors | None:
+    """Gains of monitors over the time of a scan; None where the speed of the motion varies little."""
     compilation, problem = tuner.compilation, tuner.problem
-    spec, system, setting = compilation.spec, compilation.system, own.setting
+    spec, system, setting = compilation.spec, compilation.system, current.setting
     if spec.monitor is not None or not problem.evens_out or setting is None:
         return None
-    h = min(p.step for p in own.points)
+    h = min(p.step for p in current.points)
     states = tuner.methods[setting].rows(h, steps_in(tuner.piece, h), max(1, steps_in(tuner.piece, h) // ROWS))
     method = tuner.methods[setting]
     if states is None or not isinstance(method, Candidate):
@@ -132,32 +132,32 @@ def monitored(tuner: Tuner, own: Curve) -> Monitors | None:
     if not is_uneven(lambda x: method.solver.vector_field(x, problem.parameters), states):
         return None
     tuner.note("trying monitors")
-    wanted = settings(setting, own.order, list(candidates(system, problem.parameters, states)))
+    requested = settings(setting, current.order, list(candidates(system, problem.parameters, states)))
     deadline = time.perf_counter() + MONITORS * tuner.clock.budget
-    return compare(spec, system, wanted, problem, states, tuner.piece, tuner.accuracy, deadline)
+    return compare(spec, system, requested, problem, states, tuner.piece, tuner.accuracy, deadline)
 
 
 def ranking(finalists: Sequence[Finalist]) -> list[Finalist]:
-    """By cost; of those as cheap as the best, as far as can be told, the lowest order comes first, without gauge."""
+    """Finalists by cost; among those indistinguishable from the best, the lowest order comes first, without gauge."""
     ranked = sorted(finalists, key=lambda f: f.cost)
     equal = [f for f in ranked if f.cost <= EQUAL * ranked[0].cost]
     simple = min(equal, key=lambda f: (f.curve.order * max(f.curve.stages, 1), f.curve.gauged, f.cost), default=None)
     return [simple, *(f for f in ranked if f is not simple)] if simple else []
 
 
-def final(tuner: Tuner, own: Curve) -> list[Finalist]:
+def final(tuner: Tuner, current: Curve) -> list[Finalist]:
     """The best candidates and the spec's own setting, each at a step that was confirmed over a longer run."""
     accuracy = tuner.accuracy
-    found: list[Finalist] = []
+    finalists: list[Finalist] = []
     for curve in sorted(tuner.tried.values(), key=lambda c: c.cost(accuracy)):
-        enough = len(found) >= FINALISTS or tuner.clock.left(1.0) < 0
-        behind = bool(found) and curve.cost(accuracy) > BEHIND * found[0].point.cost
-        if math.isinf(curve.cost(accuracy)) or (found and (enough or behind) and curve is not own):
+        enough = len(finalists) >= FINALISTS or tuner.clock.left(1.0) < 0
+        behind = bool(finalists) and curve.cost(accuracy) > BEHIND * finalists[0].point.cost
+        if math.isinf(curve.cost(accuracy)) or (finalists and (enough or behind) and curve is not current):
             continue
         point = confirmed(tuner, curve)
         if point:
-            found.append(Finalist(curve, point))
-    return found
+            finalists.append(Finalist(curve, point))
+    return finalists
 
 
 def confirmed(tuner: Tuner, curve: Curve) -> Point | None:
@@ -196,12 +196,12 @@ def confirming_span(tuner: Tuner, curve: Curve, h: float) -> float:
     return tuner.piece if tuner.referring else min(tuner.problem.horizon, max(affordable, tuner.piece))
 
 
-def _present(tuner: Tuner, own: Curve) -> Finalist | None:
+def _present(tuner: Tuner, current: Curve) -> Finalist | None:
     """The spec as it is, with the step of the run."""
     h = tuner.problem.step
-    span = confirming_span(tuner, own, h)
-    point = tuner.measures[own.bounded](tuner.methods[own.key], h, span) if span else None
-    return Finalist(own, point) if point else None
+    span = confirming_span(tuner, current, h)
+    point = tuner.measures[current.bounded](tuner.methods[current.key], h, span) if span else None
+    return Finalist(current, point) if point else None
 
 
 def time_all(finalists: Sequence[Finalist], tuner: Tuner) -> list[Finalist]:

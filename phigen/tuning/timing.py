@@ -1,4 +1,4 @@
-"""How long a step takes, in a run of many."""
+"""Time of a step in a run of many."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from collections.abc import Callable
 from phigen.runtime.interface import BackendError
 from phigen.tuning.problem import Method
 
-#: A measurement of time lasts at least so many seconds.
+#: The least duration of a measurement of time, in seconds.
 LEAST_SECONDS = 2e-3
-#: Steps that are timed: first so few, then in parts that double from at most so many, and in all.
+#: Steps that are timed: in the first part, in the largest first part of those that double, and in all.
 FEW_STEPS, PART_STEPS, TIMED_STEPS = 64, 4096, 32_768
 
 
@@ -27,8 +27,8 @@ def nanoseconds_per_step(method: Method, h: float, steps: int) -> float:
             walk = method.walk(h)
             walk(1)
             call = min(call, _seconds(walk, 1))
-            taken, expected = _run_seconds(method.walk(h), steps)
-            fastest, spent = min(fastest, expected), spent + taken
+            seconds, expected = _run_seconds(method.walk(h), steps)
+            fastest, spent = min(fastest, expected), spent + seconds
     except BackendError:
         return math.nan
     return 1e9 * max(fastest - call, 0.1 * fastest) / max(steps - 1, 1)
@@ -40,12 +40,12 @@ def _run_seconds(walk: Callable[[int], object], steps: int) -> tuple[float, floa
     Of a long run only so many are made that the rest should be as fast as the last of them: a solver in C first learns
     the motion, then foresees it, and goes on in blocks of steps, several times as fast.
     """
-    taken, done, part = 0.0, 0, min(FEW_STEPS, steps)
+    seconds, done, part = 0.0, 0, min(FEW_STEPS, steps)
     while True:
         last = _seconds(walk, part)
-        taken, done = taken + last, done + part
+        seconds, done = seconds + last, done + part
         if done >= min(steps, TIMED_STEPS) or last >= LEAST_SECONDS:
-            return taken, taken + last * (steps - done) / part
+            return seconds, seconds + last * (steps - done) / part
         lasting = int(part * LEAST_SECONDS / last)
         part = min(max(done, min(lasting, PART_STEPS)), steps - done)
 

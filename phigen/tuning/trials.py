@@ -76,14 +76,14 @@ def energy_measure(problem: Problem, *, bounded: bool = True) -> Measure:
         if not math.isfinite(largest):
             return None
         # A method that does not drift still shows what rounding does.
-        largest, made = max(largest, ROUNDING), steps * h
+        largest, time = max(largest, ROUNDING), steps * h
         growth = _growth(errors)
-        ratio = max(problem.horizon / made, 1.0)
+        ratio = max(problem.horizon / time, 1.0)
         rounding = ROUNDING * math.sqrt(steps * ratio)
         more = rounding - ROUNDING * math.sqrt(steps)
         error = largest + more if bounded else largest * math.pow(ratio, growth if growth > 0.3 else 0.0) + more
         cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
-        return Point(h, error, largest, made, cost, growth, rounding) if math.isfinite(cost) else None
+        return Point(h, error, largest, time, cost, growth, rounding) if math.isfinite(cost) else None
 
     return measure
 
@@ -104,11 +104,11 @@ def orbit_measure(problem: Problem, reference: Solution, *, bounded: bool = True
         size = float(np.max(np.abs(expected))) or 1.0
         errors = np.max(np.abs(states - expected), axis=1) / size
         largest = max(float(np.max(errors)), ROUNDING)
-        growth, made = _growth(errors), stride * count * h
+        growth, time = _growth(errors), stride * count * h
         power = 1.0 if math.isnan(growth) or (bounded and growth < STEADY) else min(max(growth, 1.0), 2.0)
-        error = largest * math.pow(max(problem.horizon / made, 1.0), power)
+        error = largest * math.pow(max(problem.horizon / time, 1.0), power)
         cost = nanoseconds_per_step(method, h, steps_in(problem.horizon, h))
-        return Point(h, error, largest, made, cost, growth) if math.isfinite(cost) else None
+        return Point(h, error, largest, time, cost, growth) if math.isfinite(cost) else None
 
     return measure
 

@@ -22,7 +22,7 @@ from phigen.tuning.trials import LINEAR, Measure, Point, energy_measure, marks, 
 #: The share of the budget after which nothing more is built, that which one round of building may take, that which a
 #: first guess may be expected to take, and that of one scan and of one reference solution.
 SEARCHING, BUILDING, GUESSING, SCANNING, REFERRING = 0.65, 0.2, 0.1, 0.1, 0.05
-#: What the accuracy may cost a candidate relative to the best so far, and a classical method.
+#: The largest cost of a candidate relative to the best so far, and that of a classical method.
 WORTH, WORTH_KNOWING = 4.0, 100.0
 #: Classical methods beside which the result is shown: their names in tables, and orders.
 PEERS = {"rk4": ("RK4", 4), "dop853": ("DOP853", 8)}
@@ -65,7 +65,9 @@ class Tuner:
         self.tried: dict[Setting, Curve] = {}
         self.refused: dict[Setting, str] = {}
         self.methods: dict[Setting | str, Method] = {}
-        self.measures: Mapping[bool, Measure] = {own: energy_measure(problem, bounded=own) for own in (True, False)}
+        self.measures: Mapping[bool, Measure] = {
+            is_bounded: energy_measure(problem, bounded=is_bounded) for is_bounded in (True, False)
+        }
         self.piece, self.most, self.referring = problem.horizon, math.inf, False
         self._known: dict[str, Setting] = {}
         self._made: dict[Setting, Built] = {}
@@ -80,62 +82,62 @@ class Tuner:
         """
         compilation = self.compilation
         setting = own_setting(compilation)
-        made = built(compilation, setting, time.perf_counter() - sum(compilation.seconds.values()))
-        method = self.problem.method(made.solver())
+        build = built(compilation, setting, time.perf_counter() - sum(compilation.seconds.values()))
+        method = self.problem.method(build.solver())
         self.piece, self.most = scales(self.problem, method)
         if measure == "orbit":
             self._refer(setting, method)
-        curve = self.add(made, method, math.inf)
+        curve = self.add(build, method, math.inf)
         if not curve.points:
             raise _unreachable(method, self.problem)
         return curve
 
-    def search(self, own: Curve) -> bool:
+    def search(self, current: Curve) -> bool:
         """Try candidates until none promises more, True, or the time is up."""
-        assert own.setting is not None
-        guesses = self.problem.guesses(own.setting)
+        assert current.setting is not None
+        guesses = self.problem.guesses(current.setting)
         limit = GUESSING * self.clock.budget
-        wanted = [s for s in guesses if expected_seconds(s, [own]) < limit]
-        while wanted and self.clock.left(SEARCHING) > 0:
-            self.try_all(wanted)
-            wanted = search.proposals(self.tried, list(self.refused), self.accuracy)
-        return not wanted
+        proposed = [s for s in guesses if expected_seconds(s, [current]) < limit]
+        while proposed and self.clock.left(SEARCHING) > 0:
+            self.try_all(proposed)
+            proposed = search.proposals(self.tried, list(self.refused), self.accuracy)
+        return not proposed
 
-    def add(self, made: Built, method: Method, worth: float) -> Curve:
+    def add(self, build: Built, method: Method, worth: float) -> Curve:
         """Scan a candidate."""
-        setting = made.setting
-        self._known[made.fingerprint] = setting
-        points = self._scanned(method, made.order, worth, bounded=made.exact)
+        setting = build.setting
+        self._known[build.fingerprint] = setting
+        points = self._scanned(method, build.order, worth, bounded=build.exact)
         curve = Curve(
-            made.kind, made.order, points, setting,
-            gauged=made.gauged, symmetric=made.symmetric, bounded=made.exact, stages=made.stages,
-            composition=made.composition, seconds=made.seconds,
+            build.kind, build.order, points, setting,
+            gauged=build.gauged, symmetric=build.symmetric, bounded=build.exact, stages=build.stages,
+            composition=build.composition, seconds=build.seconds,
         )  # fmt: skip
         self.tried[setting], self.methods[setting] = curve, method
         return curve
 
     def peers(self) -> list[Curve]:
         """The classical methods, scanned; none if there is no time to compile them."""
-        own = next(iter(self.tried.values()))
-        if self._race is None and own.seconds > self.clock.left(0.85):
+        current = next(iter(self.tried.values()))
+        if self._race is None and current.seconds > self.clock.left(0.85):
             return []
-        found = []
+        curves = []
         for name, (label, order) in PEERS.items():
             method = self._classical(name)
             label = f"{label} in {self._raced.language}"
             self.methods[label] = method
             points = self._scanned(self.methods[label], order, WORTH_KNOWING * self.least, bounded=False)
-            found.append(Curve(label, order, points, bounded=False))
-        return found
+            curves.append(Curve(label, order, points, bounded=False))
+        return curves
 
     def try_all(self, settings: Sequence[Setting]) -> None:
         """Build settings side by side; when all is still, measure them."""
         outcomes: dict[Setting, Outcome] = {s: self._made[s] for s in settings if s in self._made}
         until = min(self.clock.at(SEARCHING), time.perf_counter() + BUILDING * self.clock.budget)
-        wanted = self._affordable([s for s in settings if s not in self._made])
-        if wanted:
-            self.note(f"building {len(wanted)} more")
-        outcomes |= build_all(self.compilation.spec, self.compilation.system, wanted, until)
+        affordable = self._affordable([s for s in settings if s not in self._made])
+        if affordable:
+            self.note(f"building {len(affordable)} more")
+        outcomes |= build_all(self.compilation.spec, self.compilation.system, affordable, until)
         for setting in (s for s in settings if s in outcomes):
             outcome = outcomes[setting]
             if isinstance(outcome, Refusal):
@@ -147,8 +149,8 @@ class Tuner:
             else:
                 curve = self.add(outcome, self.problem.method(outcome.solver()), WORTH * self.least)
                 cost = curve.cost(self.accuracy)
-                told = f"{1e-6 * cost * self.problem.horizon:.3g} ms" if math.isfinite(cost) else "not reached"
-                self.note(f"{curve.title}: {told}")
+                duration = f"{1e-6 * cost * self.problem.horizon:.3g} ms" if math.isfinite(cost) else "not reached"
+                self.note(f"{curve.title}: {duration}")
 
     @property
     def least(self) -> float:
@@ -166,14 +168,14 @@ class Tuner:
 
     def _affordable(self, settings: Sequence[Setting]) -> list[Setting]:
         """Without those that would not be built in time, as orders below let expect."""
-        kept = []
+        affordable = []
         for setting in settings:
             expected = expected_seconds(setting, self.tried.values())
             if expected > self.clock.left(SEARCHING):
                 self.refused[setting] = f"building it would take some {expected:.0f} s"
             else:
-                kept.append(setting)
-        return kept
+                affordable.append(setting)
+        return affordable
 
     def _scanned(self, method: Method, order: int, worth: float, *, bounded: bool) -> tuple[Point, ...]:
         until = time.perf_counter() + min(SCANNING * self.clock.budget, max(self.clock.left(0.9), 0.0))
@@ -207,7 +209,9 @@ class Tuner:
         over = f"{problem.clock} = 0 … {self.piece:.6g}"
         self.note(f"reference: two methods agree to {reference.uncertainty:.1e} over {over}")
         self.referring = True
-        self.measures = {own: orbit_measure(problem, reference, bounded=own) for own in (True, False)}
+        self.measures = {
+            is_bounded: orbit_measure(problem, reference, bounded=is_bounded) for is_bounded in (True, False)
+        }
         if self.piece < 0.99 * problem.horizon:
             _expect_linear(self.measures[True], method, problem, self.piece)
 
@@ -218,12 +222,12 @@ class Tuner:
         for shorter in (1, 4, 16):
             span = self.piece / shorter
             try:
-                found = agreed(method, other, step, span, self.accuracy * span / problem.horizon, seconds, clock)
+                reference = agreed(method, other, step, span, self.accuracy * span / problem.horizon, seconds, clock)
             except CheckError as error:
                 failure = error
                 continue
             self.piece = span
-            return found
+            return reference
         raise failure
 
 
@@ -256,7 +260,7 @@ def _expect_linear(measure: Measure, method: Method, problem: Problem, piece: fl
 
 
 def expected_seconds(setting: Setting, tried: Iterable[Curve]) -> float:
-    """How long building may take, from lower orders of the same family: it grows like a power of the order; else 0.
+    """Estimated seconds of building, from lower orders of the same family, by a power of the order; else 0.
 
     The code of compositions is of one length, but for the table of their stages.
     """

@@ -41,6 +41,19 @@ casimirs: {A: G1**2 + G2**2 + G3**2, B: P1*G1 + P2*G2 + P3*G3}
 reconstruct: quaternion
 """
 SYMMETRIC = TOP.replace("(P1**2/1 + P2**2/2 + P3**2/3)/2 + G1/3 + G3", "(P1**2 + P2**2)/2 + P3**2/3 + G3")
+SATELLITE = """
+coordinates: [m1, m2, m3, N1, N2, N3, G1, G2, G3]
+parameters: {n: 0.3}
+poisson:
+  brackets:
+    m1: {m2: -m3, m3: m2, N2: -N3, N3: N2, G2: -G3, G3: G2}
+    m2: {m3: -m1, N1: N3, N3: -N1, G1: G3, G3: -G1}
+    m3: {N1: -N2, N2: N1, G1: -G2, G2: G1}
+hamiltonian: m1**2/2 + m2**2/3 + m3**2/5 - n*(m1*N1 + m2*N2 + m3*N3) + G1**2/4 + G2**2/5
+casimirs: {N: N1**2 + N2**2 + N3**2}
+reconstruct: quaternion
+scheme: splitting
+"""
 
 
 def algebra(name, sign, n, *more):
@@ -61,6 +74,8 @@ CASES = {
     "momenta in space, split": algebra("so(3)", "plus", 3, "reconstruct: quaternion", "scheme: splitting"),
     "top": TOP,
     "symmetric top, split": SYMMETRIC + "scheme: splitting\n",
+    "satellite, split": SATELLITE,
+    "symmetric top by matrices, split": SYMMETRIC.replace("quaternion", "matrix") + "scheme: splitting\n",
     "top by Cayley": TOP + "birealisation: cayley\n",
     "top along paths": TOP + "birealisation: karasev\n",
     "motions, momenta in space": algebra("se(3)", "plus", 6, "reconstruct: quaternion", "scheme: series"),
@@ -308,6 +323,18 @@ def test_a_split_symmetric_top_has_those_of_the_whole_motion():
     found = solver("symmetric top, split", "numpy", 6).integrate(x0, 0.02, 100)
     whole = np.concatenate([found.x[-1], found.attitude[-1], found.position[-1]])
     assert np.abs(whole - exact).max() < 1e-9
+    motion = solver("symmetric top by matrices, split", "numpy", 6).integrate(x0, 0.02, 100).attitude[-1]
+    turned = np.column_stack([rotation(exact[6:10]), exact[10:]])
+    assert np.abs(motion - [*turned, [0, 0, 0, 1]]).max() < 1e-9
+
+
+def test_the_element_of_commuting_flows_keeps_the_directions_of_space():
+    x0 = np.array([0.4, 0.5, 0.3, 0, 0, 1, 1, 0, 0])
+    found = solver("satellite, split").integrate(x0, 0.1, 50)
+    for vector in (found.x[:, 3:6], found.x[:, 6:]):
+        in_space = (rotation(found.attitude) @ vector[..., None])[..., 0]
+        assert np.abs(in_space - in_space[0]).max() < 1e-13
+    assert np.abs(found.x[:, 3:6] - found.x[0, 3:6]).max() > 0.5
 
 
 @pytest.mark.slow
@@ -540,14 +567,14 @@ def test_other_solvers_have_none():
 
 
 ASKED = "reconstruct: quaternion"
-ROUND = TOP.replace("P1**2/1", "P1**2/2").replace("quaternion", "matrix") + "scheme: splitting\n"
+SHEARED = BODY.replace("(x1**2/I1 + x2**2/I2 + x3**2/I3)/2", "x3*(x1**2 + x2**2) + x1") + "scheme: splitting\n"
 REFUSED = {
     "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\nhamiltonian: p**2\n" + ASKED: "needs a linear π",
     algebra("sl(2)", "plus", 3, ASKED): "three coordinates with the brackets of so(3)",
     algebra(
         "so(3)", "plus", 3, ASKED, "birealisation: {kind: group-map, tau: (1 + P/2)/(1 - P/2)}"
     ): "no group element",
-    ROUND: "the part H_",
+    SHEARED: "the part H_2 = x1**2*x3 + x2**2*x3",
     BODY + "damping: 1/10\ngauge: {C: 1}\n": "with forces no multiple of a Casimir",
     BODY + "monitor: 1 + x1**2\ngauge: {C: 1}\n": "with a monitor no multiple of a Casimir",
 }

@@ -55,7 +55,7 @@ def test_one_wrong_bracket_is_one_error_and_not_those_that_follow_from_it(phigen
     for done in (phigen("build", path), phigen("check", path)):
         assert done.exit_code == 5
         assert done.stderr.count("refuted: ") + done.stderr.count(": refuted (") == 1, done.stderr
-    assert "rest on it: Casimirs, invariants, the method" in done.stdout
+    assert "depend on it: Casimirs, invariants, the method" in done.stdout
     assert "Casimirs, invariants" in phigen("build", path).stderr
 
 

@@ -224,7 +224,7 @@ def test_means_are_of_members_that_made_the_steps_of_the_run(phigen, write, sche
     assert all(extended[name]["mean"] == pytest.approx(whole[name]["mean"], abs=1e-13) for name in whole)
     told("--until", 2.05, "-o", "b.csv")
     refused = phigen("run", spec, "--until", 3, "--extend", "-o", "b.csv", "-t", "numpy")
-    assert (refused.exit_code, "ends with a part of a step" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "ends with a shorter step" in refused.stderr) == (2, True)
 
 
 @pytest.mark.parametrize("members", [1, 2])
@@ -410,20 +410,23 @@ def test_what_does_not_fit_is_told(phigen, write):
     Path("half.npz").write_bytes(b"PK\x03\x04 the rest is missing")
     np.savez("other.npz", x=np.ones((2, 2)))
     for args, said in (
-        ((swing, "--until", 3, "--steps", 5), "--until and --steps do not go together"),
+        ((swing, "--until", 3, "--steps", 5), "--until and --steps exclude each other"),
         ((swing, "--extend", "--lyapunov"), "--extend and --lyapunov"),
         ((swing, "--until", -3), "never reached"),
         ((swing, "--at", "7"), "not between 0.0 and 6.0"),
-        ((swing, "--at", "soon"), "times are numbers"),
+        ((swing, "--at", "soon"), "expected times or a file of times"),
         ((swing, "--every", "-1"), "must be positive"),
         ((swing, "--seed", 3), "swing has no noise"),
         ((swing, "--extend"), "name its file by --output"),
         ((swing, "--extend", "-o", "a.csv", "--set", "q=2"), "of another run"),
         ((swing, "--extend", "-o", "a.csv", "--until", 5), "never reached from 6.0"),
-        ((swing, "--from", "words.csv"), "no file of a run of swing: it has no column 't'"),
-        ((swing, "--from", "empty.npz"), "no file of a run of swing: No data left in file"),
-        ((swing, "--from", "half.npz"), "no file of a run of swing: File is not a zip file"),
-        ((swing, "--from", "other.npz"), "no file of a run of swing: it has no column 't'"),
+        ((swing, "--from", "words.csv"), "does not hold a run of swing: it has no column 't'"),
+        ((swing, "--from", "empty.npz"), "does not hold a run of swing: No data left in file"),
+        ((swing, "--from", "half.npz"), "does not hold a run of swing: File is not a zip file"),
+        ((swing, "--from", "other.npz"), "does not hold a run of swing: it has no column 't'"),
     ):
         done = phigen("run", *args, "-t", "numpy")
         assert (done.exit_code, said in done.stderr) == (2, True), (args, done.stderr)
+    for option in ("--until", "--steps"):
+        done = phigen("run", swing, option, 10**16, "-t", "numpy")
+        assert (done.exit_code, "more than the limit of 1000000000000" in done.stderr) == (3, True), done.stderr

@@ -9,7 +9,7 @@ ORBIT = """phigen: 1
 name: orbit
 coordinates: [q1, q2, p1, p2]
 poisson: {canonical: {q: [q1, q2], p: [p1, p2]}}
-hamiltonian: (p1**2 + p2**2)/2 - 1/sqrt(q1**2 + q2**2)
+hamiltonian: (p1**2 + p2**2)/2 - 1/sqrt(q1**2 + q2**2 + 1/100)
 order: 4
 scheme: splitting
 runs: {r: {initial: [1, 0, 0, 0.6], step: STEP, duration: 42}}

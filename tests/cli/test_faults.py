@@ -69,7 +69,7 @@ def test_a_run_that_fills_the_disk_goes_on_where_there_is_room(phigen, write, fi
     assert "--resume" in done.stderr
     done = phigen("run", "a.yaml", *options, file, "--resume")
     assert done.exit_code == 0
-    assert "going on after" in done.stderr
+    assert "resuming after" in done.stderr
     assert Path(file).read_bytes() == Path(f"whole-{file}").read_bytes()
     assert not [p for p in Path().iterdir() if p.suffix not in (".yaml", ".csv", ".npz")]
 

@@ -146,12 +146,25 @@ def test_a_lattice_that_falls_short_is_told(phigen, chain, monkeypatch, wrong, s
 
 @pytest.mark.parametrize(
     "command",
-    [["verify", "--plot", "a.svg"], ["run", "--until", "2"]],
+    [["verify", "--plot", "a.svg"], ["run", "--at", "2"], ["run", "--until", "1.01"]],
 )
 def test_what_lattices_do_not_have_is_refused(phigen, chain, command):
     done = phigen(*command, chain)
     assert done.exit_code in (1, 2)
     assert "lattice" in done.stderr
+
+
+def test_a_run_starts_at_the_end_of_another_and_ends_at_a_time(phigen, chain, tmp_path):
+    first, second, whole = (tmp_path / f"{name}.npz" for name in ("first", "second", "whole"))
+    for more in (["-o", first, "--until", "1"], ["--from", first, "-o", second, "--until", "1"], ["-o", whole]):
+        done = phigen("run", chain, "-t", "numpy", *more)
+        assert done.exit_code == 0, done.stderr
+    np.testing.assert_array_equal(np.load(second)["x"][-1], np.load(whole)["x"][-1])
+    done = phigen("run", chain, "--from", first, "--sizes", "13", "-t", "numpy")
+    assert (done.exit_code, "ends with a state of shape (2, 12), the run has (2, 13)" in done.stderr) == (2, True)
+    (tmp_path / "no.npz").write_text("no")
+    done = phigen("run", chain, "--from", tmp_path / "no.npz", "-t", "numpy")
+    assert (done.exit_code, "is no .npz of a run of a lattice" in done.stderr) == (2, True)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +188,7 @@ def test_a_film_of_a_lattice_is_drawn_and_refused_elsewhere(phigen, chain, tmp_p
     monkeypatch.setattr(FFMpegWriter, "isAvailable", lambda: False)
     refused = phigen("run", chain, "--plot", tmp_path / "chain.mp4")
     assert (refused.exit_code, "needs ffmpeg" in refused.stderr) == (2, True)
-    assert "films are of lattices" in phigen("run", "pendulum", "--plot", tmp_path / "p.gif").stderr
+    assert "films are for lattices" in phigen("run", "pendulum", "--plot", tmp_path / "p.gif").stderr
 
 
 def test_a_run_has_other_sizes_on_request(phigen, chain, tmp_path):
@@ -203,7 +216,7 @@ def test_sizes_that_do_not_fit_are_errors_of_the_command_line(phigen, chain, com
 
 
 def test_systems_without_sizes_say_so(phigen):
-    for name, said in (("kepler", "is no lattice"), ("chiral_magnet", "whose sites are those of its bonds")):
+    for name, said in (("kepler", "is not a lattice"), ("chiral_magnet", "whose sites are those of its bonds")):
         assert said in " ".join(phigen("run", name, "--sizes", "4").stderr.split())
 
 
@@ -253,7 +266,9 @@ def test_what_a_killed_run_left_is_not_overwritten(phigen, chain, killed):
     assert sorted(left) == ["wave.npz.checkpoint", "wave.npz.part.npy"]
     done = phigen(*command)
     assert done.exit_code == 2
-    assert "is there, of an interrupted run: go on with --resume, or remove it" in " ".join(done.stderr.split())
+    assert "belongs to an interrupted run: continue it with --resume, or remove the file" in " ".join(
+        done.stderr.split()
+    )
     assert files_beside(chain) == left
 
 
@@ -275,9 +290,9 @@ def test_a_complete_run_is_not_gone_on_with(phigen, chain, tmp_path):
     before = files_beside(chain)
     done = phigen(*command)
     assert done.exit_code == 2
-    assert "its run is complete, and there is nothing to go on with" in " ".join(done.stderr.split())
+    assert "its run is complete, and there is nothing to resume" in " ".join(done.stderr.split())
     assert files_beside(chain) == before
-    assert "give those of the interrupted run by --output" in phigen("run", chain, "--resume").stderr
+    assert "name them by --output" in phigen("run", chain, "--resume").stderr
 
 
 @pytest.mark.parametrize("harm", [lambda path: path.unlink(), lambda path: np.save(path, np.zeros((5, 2, 12)))])

@@ -163,7 +163,7 @@ def test_resuming_another_run_is_refused_and_says_why(phigen, in_tmp):
         done = phigen(*run, *change, "--resume")
         assert done.exit_code == 2, change
         assert re.search(said, done.stderr)
-    assert "go on with --resume, or remove it" in phigen(*run).stderr
+    assert "continue it with --resume, or remove the file" in phigen(*run).stderr
     assert files("a.csv", "a.csv.checkpoint") == kept
     Path("a.csv").write_text("t\n")
     assert "fewer than" in phigen(*run, "--resume").stderr
@@ -269,27 +269,27 @@ def test_with_noise_states_are_stored_after_whole_steps_only(phigen, tmp_path):
     assert some[2:4] == [every[2], every[4]]
     part, _ = made("c.csv", "--at", "0.12")
     assert part.exit_code == 2
-    assert "0.12 is not at the end of one" in part.stderr
+    assert "0.12 is between two" in part.stderr
 
 
 @pytest.mark.slow
 def test_states_too_far_apart_for_the_balance_of_energy_are_told(phigen, in_tmp):
     duffing = ("run", str(resources.bundled()["duffing"]), "--target", "numpy")
     assert "too far apart" not in phigen(*duffing).stdout
-    assert "They are too far apart" in phigen(*duffing, "--every", 2).stdout
+    assert "too far apart for an accurate integral" in phigen(*duffing, "--every", 2).stdout
 
 
 #: Files that no run has written, and why: their rows, or their arrays.
 STRANGE = {
-    "twice.csv": ("t,q,p,q\n0,1,2,3\n", "two columns have one name"),
+    "twice.csv": ("t,q,p,q\n0,1,2,3\n", "two columns have the same name"),
     "short.csv": ("t,q,p,energy\n0,1,2\n", "rows of another length"),
     "nan.csv": ("t,q,p\n0,1,nan\n", "its last state is not finite"),
     "names.csv": ("t,q,p\n", "has no rows"),
     "empty.csv": ("", "has no rows"),
-    "complex.npz": ({"t": [0.0], "x": [[1j, 0]]}, "x is no array of 2 real numbers"),
-    "texts.npz": ({"t": [0.0], "x": [["a", "b"]]}, "x is no array of 2 real numbers"),
-    "wide.npz": ({"t": [0.0], "x": [[1.0, 2.0, 3.0]]}, "x is no array of 2 real numbers"),
-    "flat.npz": ({"t": 0.0, "x": [[1.0, 2.0]]}, "t is no array of 1 real numbers"),
+    "complex.npz": ({"t": [0.0], "x": [[1j, 0]]}, "x is not an array of 2 real numbers"),
+    "texts.npz": ({"t": [0.0], "x": [["a", "b"]]}, "x is not an array of 2 real numbers"),
+    "wide.npz": ({"t": [0.0], "x": [[1.0, 2.0, 3.0]]}, "x is not an array of 2 real numbers"),
+    "flat.npz": ({"t": 0.0, "x": [[1.0, 2.0]]}, "t is not an array of 1 real numbers"),
 }
 
 

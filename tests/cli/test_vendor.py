@@ -181,7 +181,7 @@ def test_without_its_spec_a_solver_is_checked_against_the_copy_and_that_is_said(
     Path("models").rename("moved")
     done = vendored()
     assert done.exit_code == 0
-    assert "a: its spec (models/a.yaml) is not there: whether that has changed cannot be checked" in done.stderr
+    assert "a: its spec (models/a.yaml) was not found, so its changes cannot be checked" in done.stderr
     assert "unmodified and current" not in done.stderr
     damage_body()
     assert vendored().exit_code == 5
@@ -225,7 +225,7 @@ def test_second_time_leaves_files_alone(phigen, vendored):
     [
         ('"manifest": 1', '"manifest": 2', "format 1"),
         ('"manifest"', '"manifest', "not JSON"),
-        ('"a.c"', '"../a.c"', "'../a.c' is no file of that solver"),
+        ('"a.c"', '"../a.c"', "'../a.c' is not a file of that solver"),
         ('"order: 2"', '"order: 4"', "the text of its spec was changed"),
         ('"options"', '"choices"', "'options' is missing"),
         ('"targets"', '"directory"', "options that do not exist"),
@@ -236,7 +236,7 @@ def test_damaged_manifest_is_refused(phigen, vendored, before, after, told):
     for done in (phigen("vendor", EXT), phigen("vendor", "--check", EXT)):
         assert done.exit_code == 5
         assert told in done.stderr
-        assert "hint: take phigen-vendor.json from version control" in done.stderr
+        assert "hint: restore phigen-vendor.json from version control" in done.stderr
 
 
 def test_bundled_spec_is_vendored_by_its_name_and_followed_by_it(phigen, in_tmp, monkeypatch):
@@ -264,7 +264,7 @@ def test_wrong_usage_is_explained(phigen, write):
     for words, told in (
         (["a.yaml"], "phigen vendor a.yaml DEST"),
         (["a.yaml", "b.yaml"], "phigen vendor a.yaml b.yaml DEST"),
-        (["a.yaml", "new.yaml"], "new.yaml is no folder"),
+        (["a.yaml", "new.yaml"], "new.yaml is not a folder"),
         (["nothing"], "to put one there: phigen vendor SPEC nothing"),
     ):
         done = phigen("vendor", *words)

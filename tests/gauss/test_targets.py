@@ -1,6 +1,7 @@
 """Gauss steps in all targets and profiles: equal to round-off, tangents and failures included."""
 
 from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ from support import SCALED, compile_text, compiled, first_run, javascript, small
 
 from phigen.compiler import compile_spec
 from phigen.errors import StepError
+from phigen.spec import loads
+from phigen.symbolic.expression import number, substitute
 
 FORCED = """coordinates: [q, p]
 time: t
@@ -121,8 +124,6 @@ def test_steps_back_undo_steps():
 def test_gauge_shifts_the_hamiltonian_that_is_discretised():
     """H and H − λC have the same flow: with the shift the same states to the order, from other stages."""
     spec = spec_of("rigid_body")
-    from phigen.symbolic.expression import number
-
     shifted = replace(spec, gauge={"C": number(1) / number(3)})
     methods_ = [solver(compile_spec(given.overridden(order=8, scheme="gauss")), "c") for given in (spec, shifted)]
     plain, other = (method.integrate([0.4, -0.8, 0.5], 0.4, 20).x[-1] for method in methods_)
@@ -140,3 +141,33 @@ def test_structure_constants_may_be_parameters():
     states.append(javascript(compilation, options, "s.integrate(0.3, 20);", "[...s.x]"))
     for state in states[1:]:
         assert state == pytest.approx(states[0], abs=1e-14)
+
+
+STIFF = """coordinates: [x, y, z]
+parameters: {a: 103, b: 101, c: 4}
+poisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}}}
+hamiltonian: (a*x**2 + b*y**2 + c*z**2)/2
+casimirs: {C: x**2 + y**2 + z**2}
+scheme: gauss
+"""
+
+
+def gauged(text, order):
+    """The compilation of a spec as it is, with its automatic gauge."""
+    return compile_spec(loads(f"phigen: 1\nname: t\n{text}").overridden(order=order))
+
+
+def test_long_steps_take_few_sweeps():
+    """By the multiple of C that gauge: auto takes from H, the predictor, and an end of sweeps at rounding."""
+    compilation = gauged(STIFF, 16)
+    (sweeps,) = javascript(compilation, "x0: [1, 1, 1]", "s.integrate(0.01, 200);", "[s.evaluations/200]")
+    assert sweeps < 14
+
+
+def test_gauge_makes_velocities_small():
+    stiff, tops = gauged(STIFF, 4), compile_spec(spec_of("kowalevski_gauss"))
+    (multiple,) = stiff.gauge.fixed.values()
+    (value,) = substitute([multiple], {"a": number(103), "b": number(101), "c": number(4)})
+    assert value == number(Fraction(208, 6))  # C has the second derivatives 2
+    assert not tops.gauge.fixed  # those of its Casimirs are orthogonal to those of H
+    assert not gauged(f"{STIFF}gauge: none\n", 4).gauge.fixed

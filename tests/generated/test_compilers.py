@@ -8,6 +8,7 @@ from support import (
     NAMES,
     QUICK,
     WARNINGS,
+    as_given,
     compile_text,
     compiled,
     files,
@@ -52,13 +53,14 @@ def sources(name, tmp_path):
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.slow  # beside what differs in a single file, `test_all_solvers_can_be_one_translation_unit` does this
 def test_c_compiles_without_a_warning(name, compiler, sources):
-    """All warnings of clang come before it optimises; those of gcc that do not have been asked for by `library`."""
-    command = [tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}.c"]
-    run(command, sources)
-    run(command, sources / "single")
-    assert not list((sources / "single").glob("*.h"))
+    """All warnings of clang come before it optimises; `library` asks gcc for all of its own."""
     if compiler == "gcc":
         assert library(compiled(name)).exists()
+    else:
+        run([tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}.c"], sources)
+    if name in QUICK:
+        run([tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", f"{name}.c"], sources / "single")
+        assert not list((sources / "single").glob("*.h"))
 
 
 @pytest.mark.parametrize("name", ["lotka_volterra", "nambu_pendulum"])
@@ -91,7 +93,7 @@ def test_all_c_is_cpp_as_well(compiler, standard, tmp_path):
 
 
 #: A lattice, equations that are solved in lanes, an explicit step, and flows.
-BACK = [("g++", name) for name in ("klein_gordon", "lotka_volterra", "pendulum_euler", "kepler")]
+BACK = ["klein_gordon", "lotka_volterra", "pendulum_euler", "kepler"]
 
 
 def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
@@ -102,13 +104,15 @@ def test_splittings_with_derivatives_are_cpp_as_well(tmp_path):
     run([tool("g++"), "-x", "c++", "-std=c++20", *WARNINGS, "-fsyntax-only", "rigid_body.c"], tmp_path)
 
 
-@pytest.mark.parametrize(("compiler", "name"), slow_but(BACK, product(["g++", "clang++"], sorted(resources.bundled()))))
-def test_fast_code_with_derivatives_is_cpp_as_well(compiler, name, tmp_path):
+@pytest.mark.parametrize("name", slow_but(BACK, sorted(resources.bundled())))
+def test_fast_code_with_derivatives_is_cpp_as_well(name, tmp_path):
+    """By one standard of each compiler, `test_all_c_is_cpp_as_well` has both of both. clang alone says which inline
+    functions nothing calls."""
     found = spec_of(name)
     extras = {"tangent": not found.lattice, "adjoint": not found.noise and found.scheme != "gauss"}
     write(tmp_path, emit(compile_spec(found, **extras, profile="fast").program, "c", "phigen"))
-    for standard in ("c++17", "c++20"):
-        run([tool(compiler), "-x", "c++", f"-std={standard}", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)
+    for compiler, language, standard in (("clang", "c", "c99"), ("clang++", "c++", "c++17"), ("g++", "c++", "c++20")):
+        run([tool(compiler), "-x", language, f"-std={standard}", *WARNINGS, "-fsyntax-only", f"{name}.c"], tmp_path)
 
 
 @pytest.mark.parametrize("compiler", slow_but(["clang"], ["gcc", "clang"]))
@@ -116,7 +120,7 @@ def test_all_solvers_can_be_one_translation_unit(compiler, tmp_path):
     """No name of one is a name of another, static ones and macros included."""
     solvers = sorted(GENERATED.glob("*/*.c"))
     write(tmp_path, {"all.c": "".join(f'#include "{path}"\n' for path in solvers)})
-    assert len(solvers) > 20
+    assert len(solvers) >= 10
     run([tool(compiler), "-std=c99", *WARNINGS, "-fsyntax-only", "all.c"], tmp_path)
 
 
@@ -165,7 +169,10 @@ def check_with_sanitizers(compiler, compilation, folder, *without):
 #: clang puts sanitizers into code in half the time that gcc takes, and finds what those of gcc find. One for each kind
 #: of step, with stages and without.
 FEW = [("clang", name) for name in ("ablowitz_ladik3", "nambu_pendulum", "pendulum_euler", "rigid_body")]
-ALL = [*product(["clang"], NAMES), *product(["gcc"], ["lotka_volterra", "nambu_pendulum", "pendulum_euler"])]
+#: Kernels differ between systems, but hand on no pointers: of other systems those are here that have a kind of
+#: bi-realisation, an attitude, or many coordinates.
+FURTHER_SYSTEMS = ["guiding_centre", "lagrange_top", "lotka_volterra", "pendulum", "poisson_not_hamiltonian"]
+ALL = [*FEW, *product(["clang"], FURTHER_SYSTEMS), ("gcc", "lotka_volterra"), ("gcc", "nambu_pendulum")]
 
 
 @pytest.mark.parametrize(("compiler", "name"), slow_but(FEW, ALL))
@@ -195,7 +202,7 @@ def test_further_code_is_clean_under_sanitizers(case, tmp_path):
     check_with_sanitizers("clang", compilation, tmp_path)
 
 
-@pytest.mark.parametrize("name", slow_but(["toda3"], ["toda3", *QUICK]))
+@pytest.mark.parametrize("name", slow_but(["toda3"], ["toda3", "lotka_volterra", "nambu_pendulum", "pendulum_euler"]))
 def test_whole_interface_is_clean_under_valgrind(name, sources):
     """Uninitialised memory in particular, which the sanitizers do not see."""
     valgrind = tool("valgrind")
@@ -206,6 +213,6 @@ def test_whole_interface_is_clean_under_valgrind(name, sources):
 @pytest.mark.parametrize("name", ["food_web", "kdv", "heisenberg"])  # a graph, a chain, rows
 def test_compilers_see_that_all_is_initialised(name, tmp_path):
     """With -O1 it looks into functions, but not as far as with more; clang asks whether all ways to a use assign."""
-    code = GENERATED / name / f"{name}.c"
-    run([tool("gcc"), "-std=c99", "-O1", *WARNINGS, "-c", code, "-o", "object.o"], tmp_path)
-    run([tool("clang"), "-std=c99", "-Wconditional-uninitialized", "-Werror", "-fsyntax-only", code], tmp_path)
+    write(tmp_path, files(as_given(name), "c"))
+    run([tool("gcc"), "-std=c99", "-O1", *WARNINGS, "-c", f"{name}.c", "-o", "object.o"], tmp_path)
+    run([tool("clang"), "-std=c99", "-Wconditional-uninitialized", "-Werror", "-fsyntax-only", f"{name}.c"], tmp_path)

@@ -27,7 +27,8 @@ from support import (
 from phigen import spec
 from phigen.compiler import compile_spec
 from phigen.errors import ParameterError, StepError
-from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Newton, Path, Splitting
+from phigen.scheme.policies import PathPolicy
+from phigen.scheme.steps import Explicit, Newton, Path, Splitting
 
 pytestmark = [pytest.mark.usefixtures("as_users_compile"), pytest.mark.corpus]
 
@@ -135,7 +136,7 @@ def test_a_hopeless_path_ends_early(monkeypatch):
     monkeypatch.setattr(module, "_piece", lambda *arguments: pieces.append(1) or follow(*arguments))
     with pytest.raises(module.StepError, match="NO_CONVERGENCE"):
         module.step([1.7, 0.6, -0.5], 709.0)
-    assert len(pieces) <= MOST_PIECES + 4 * 2 * LONGEST_PATH
+    assert len(pieces) <= PathPolicy().most_pieces + 4 * 2 * PathPolicy().longest_path
 
 
 def test_a_path_of_numpy_costs_and_is_the_same_whatever_the_others_are(monkeypatch):
@@ -256,7 +257,9 @@ def test_parameters_that_give_no_steps_are_told_in_python(name, target):
         lambda **p: solve.ensemble(np.empty((0, len(x0))), 0.1, 3, **p),
     ]
     for call in calls:
-        with pytest.raises(ParameterError, match=r"m = 0\.0, .* what is computed from parameters alone is not finite"):
+        with pytest.raises(
+            ParameterError, match=r"m = 0\.0, .* a coefficient computed from parameters alone is not finite"
+        ):
             call(m=0)
         call(m=1)
     assert not np.isfinite(solve.hamiltonian(x0, m=0.0))

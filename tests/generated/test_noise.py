@@ -480,9 +480,9 @@ def test_arguments_of_noise_are_checked():
             noisy.integrate([0, 0, 1], 0.1, 3, **arguments)
     with pytest.raises(TypeError, match="has no noise"):
         quiet.integrate([0, 0, 1], 0.1, 3, seed=1)
-    with pytest.raises(TypeError, match="section is not offered with noise"):
+    with pytest.raises(TypeError, match="section is not available with noise"):
         noisy.section([0, 0, 1], 0.1, 3, lambda x: x[:, 0])
-    with pytest.raises(TypeError, match="solve_ivp is not offered with noise"):
+    with pytest.raises(TypeError, match="solve_ivp is not available with noise"):
         phigen.solve_ivp(noisy, (0, 1), [0, 0, 1], h=0.1)
 
 

@@ -51,7 +51,10 @@ def exercise(compilation, folder, optimisation, ulps, far):
     run([folder / "packs"], folder)
 
 
-@pytest.mark.parametrize("name", slow_but({*FAR} - {"ablowitz_ladik3", "spin_chain5", "volterra5"}, FAR))
+SAME = {*FAR} - {"kepler"}  # whose anomaly is found by other iterations in packs
+
+
+@pytest.mark.parametrize("name", slow_but(SAME - {"ablowitz_ladik3", "spin_chain5", "volterra5"}, sorted(SAME)))
 def test_members_of_splittings_equal_single_trajectories_bit_for_bit(name, tmp_path):
     """Where arguments are small and products are not fused; else to round-off."""
     exercise(compiled(name, 4, "splitting"), tmp_path, "-O0", 0, FAR[name])

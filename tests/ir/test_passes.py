@@ -19,7 +19,7 @@ from phigen.symbolic.expression import call, symbol
 Q, P = ir.Array(ir.Storage.STATE, 0, "q"), ir.Array(ir.Storage.STATE, 1, "p")
 
 
-def sweep(*body: ir.Statement, role: ir.Role = ir.Role.SWEEP) -> ir.Function:
+def sweep(*body: ir.Statement, role: ir.LoopRole = ir.LoopRole.SWEEP) -> ir.Function:
     return ir.Function("sweep", "a sweep", role, ("coef",), (ir.Loop("sites", body),))
 
 
@@ -62,7 +62,7 @@ def test_simultaneous_changes_are_computed_before_any_is_made() -> None:
             x[q] += change0
             x[p] += change1
         """)  # fmt: skip
-    one, other_role = sweep(ir.Store(Q, symbol("p"))), sweep(*before.body[0].body, role=ir.Role.STAGE)
+    one, other_role = sweep(ir.Store(Q, symbol("p"))), sweep(*before.body[0].body, role=ir.LoopRole.STAGE)
     assert simultaneous(one) == one
     assert simultaneous(other_role) == other_role
 
@@ -143,8 +143,8 @@ def test_sums_over_all_bonds_are_one_function_of_whole_arrays() -> None:
 
 
 def test_sweeps_that_differ_in_their_colour_share_a_function() -> None:
-    one = ir.Function("one", "", ir.Role.SWEEP, ("x", "colour=0"), (ir.Return(ir.fixed("x")),))
-    other = ir.Function("other", "", ir.Role.SWEEP, ("x", "colour=1"), one.body)
+    one = ir.Function("one", "", ir.LoopRole.SWEEP, ("x", "colour=0"), (ir.Return(ir.fixed("x")),))
+    other = ir.Function("other", "", ir.LoopRole.SWEEP, ("x", "colour=1"), one.body)
     first, second = identical([one, other])
     assert first == one
     expect(second, """

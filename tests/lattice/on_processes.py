@@ -60,11 +60,11 @@ for name in sys.argv[2:]:
     if name == "volterra":
         with contextlib.suppress(KeyboardInterrupt):
             lattice.integrate(x0, 0.2, 50, 20, progress=interrupt, **asked)
-        expect_refused("of an interrupted run: go on with resume=True, or remove it", resume=False, **asked)
+        expect_refused("to an interrupted run: continue it with resume=True, or remove the file", resume=False, **asked)
         expect_refused("the frames of an interrupted run", output=output, parameters=values)
     run = lattice.integrate(x0, 0.2, 50, 20, **asked)
     if name == "volterra":
-        expect_refused("its run is complete, and there is nothing to go on with", **asked)
+        expect_refused("its run is complete, and there is nothing to resume", **asked)
         lattice.integrate(x0, 0.2, 50, 20, resume=False, **asked)
         expect_failing_run_leaves_nothing()
     if MPI.COMM_WORLD.rank == 0:

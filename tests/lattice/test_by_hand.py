@@ -98,7 +98,7 @@ def test_planes_and_stages_that_there_are_not_are_refused() -> None:
     for stage, first, end in ((99, 0, 9), (0, 4, 3), (0, 0, 10)):
         with pytest.raises(ValueError, match="BAD_ARGUMENT"):
             session.sweep(stage, 1, first, end)
-    with pytest.raises(ValueError, match="no stepping driven by the caller"):
+    with pytest.raises(ValueError, match="no caller-driven stepping"):
         solver("charges", 4, "c").backend.stages()
 
 

@@ -168,5 +168,5 @@ def test_a_pipe_is_refused_at_once(tmp_path, name):
     start(tmp_path)
     (tmp_path / name).unlink()
     os.mkfifo(tmp_path / name)
-    with pytest.raises(SpecError, match=f"cannot read .*{name}.*: it is no regular file"):
+    with pytest.raises(SpecError, match=f"cannot read .*{name}.*: it is not a regular file"):
         start_of(load(tmp_path / "springs.yaml"), load(tmp_path / "springs.yaml").runs["r"])

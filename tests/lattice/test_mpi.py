@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lattice import test_acting as acting
-from lattice.test_sweeps import disorder, solver, start
+from lattice.test_sweeps import UNEVEN, disorder, solver, start, with_default
 
 from phigen.runtime import toolchain
 
@@ -22,8 +22,8 @@ MPIRUN = shutil.which("mpirun", path=f"{Path(sys.executable).parent}{os.pathsep}
 SCRIPT = Path(__file__).with_name("on_processes.py")
 #: Chains, one with colours, which is interrupted and gone on with; a box with open ends, given by its planes.
 SIZES = {"xxz": (37,), "volterra": (34,), "cube": (9, 3, 4)}
-#: And a plane with noise at every site.
-NAMES = (*SIZES, "hot")
+#: And a plane with noise at every site, and a chain whose parameter at sites has a formula of the whole as its default.
+NAMES = (*SIZES, "hot", "uneven")
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +44,11 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
         pickle.dump((found, x, {"T": 0.3}), file)
     run = found.integrate(x, 0.2, 50, 20, seed=7, T=0.3)
     np.savez(folder / "hot_alone.npz", x=run.x, energy=run.energy)
+    found, x = with_default(UNEVEN, "c"), start("dnls", (34,))
+    with (folder / "uneven.pickle").open("wb") as file:
+        pickle.dump((found, x, {}), file)
+    run = found.integrate(x, 0.2, 50, 20)
+    np.savez(folder / "uneven_alone.npz", x=run.x, energy=run.energy)
     return folder
 
 

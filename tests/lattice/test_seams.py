@@ -11,6 +11,7 @@ import pytest
 from lattice.lattices import with_threads
 from lattice.test_javascript import node
 from lattice.test_sweeps import poisson_at
+from systems import slow_but
 
 import phigen
 from phigen.compiler import compile_spec, emit
@@ -47,8 +48,8 @@ SIZES = {
     "layer": [(3, 5)],
 }
 CASES = [(name, sizes) for name, listed in SIZES.items() for sizes in listed]
-#: Those of one case each, and of two.
-FEW = [("bogoyavlensky", (13,)), ("layer", (3, 5))]
+#: The C is the same for all sizes with a seam: of each lattice the largest, which has all seams.
+IN_C = slow_but([("bogoyavlensky", (14,))], [(name, listed[-1]) for name, listed in SIZES.items()])
 
 
 def text(name: str, run: tuple[int, ...], profile: str) -> str:
@@ -100,7 +101,7 @@ def test_steps_follow_h_with_their_order(name: str, sizes: tuple[int, ...]) -> N
 
 
 @pytest.mark.parametrize("profile", ["fast", pytest.param("small", marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("name", "sizes"), [FEW[0], *(pytest.param(*c, marks=pytest.mark.slow) for c in CASES)])
+@pytest.mark.parametrize(("name", "sizes"), IN_C)
 def test_c_makes_the_steps_of_numpy(name: str, sizes: tuple[int, ...], profile: str) -> None:
     x, h = start(name, sizes), 0.2
     vectors = np.random.default_rng(2).normal(size=(2, *x.shape))
@@ -145,7 +146,7 @@ def test_sizes_that_colours_fit_have_the_bits_of_a_solver_without_a_seam(name: s
 
 
 @pytest.mark.parametrize("target", ["numpy", pytest.param("c", marks=pytest.mark.slow)])
-@pytest.mark.parametrize(("name", "sizes"), [FEW[0], *(pytest.param(*c, marks=pytest.mark.slow) for c in CASES)])
+@pytest.mark.parametrize(("name", "sizes"), IN_C)
 def test_pullback_is_the_gradient_of_the_run(name: str, sizes: tuple[int, ...], target: str) -> None:
     x, found, random = start(name, sizes), solver(name, odd(name), target, adjoint=True), np.random.default_rng(5)
     bar, along, width = random.normal(size=(3, *x.shape)), random.normal(size=x.shape), 1e-3

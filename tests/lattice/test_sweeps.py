@@ -6,6 +6,7 @@ import re
 import warnings
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -463,13 +464,13 @@ def test_files_of_interrupted_and_complete_runs_are_respected(tmp_path: Any) -> 
     with pytest.raises(KeyboardInterrupt):
         found.integrate(x, 0.1, 12, 3, progress=stop, **files)
     left = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    with pytest.raises(ValueError, match="of an interrupted run: go on with resume=True, or remove it"):
+    with pytest.raises(ValueError, match="to an interrupted run: continue it with resume=True, or remove the file"):
         found.integrate(x, 0.1, 12, 3, resume=False, **files)
-    with pytest.raises(ValueError, match="the frames of an interrupted run: go on with its checkpoints="):
+    with pytest.raises(ValueError, match="the frames of an interrupted run: continue it with its checkpoints="):
         found.integrate(x, 0.1, 12, 3, output=files["output"])
     assert left == {path: path.read_bytes() for path in tmp_path.iterdir()}
     whole = found.integrate(x, 0.1, 12, 3, **files)
-    with pytest.raises(ValueError, match="its run is complete, and there is nothing to go on with"):
+    with pytest.raises(ValueError, match="its run is complete, and there is nothing to resume"):
         found.integrate(x, 0.1, 12, 3, **files)
     assert np.array_equal(found.integrate(x, 0.1, 12, 3, resume=False, **files).x, whole.x)
     assert list(tmp_path.iterdir()) == [files["output"]]
@@ -595,7 +596,9 @@ def test_wrong_arguments_are_told(x: np.ndarray, more: dict[str, Any], error: ty
 
 
 def test_odd_sizes_do_not_fit_two_colours() -> None:
-    with pytest.raises(ValueError, match="multiples of 2; a run of such a size in the spec, or scheme='series', makes"):
+    with pytest.raises(
+        ValueError, match="multiples of 2; compile from a spec that has a run of this size, or with scheme='series'"
+    ):
         solver("volterra").integrate(np.ones((1, 7)), 0.1, 1)
 
 
@@ -636,13 +639,49 @@ def test_what_has_no_step_is_refused(text: str, said: str) -> None:
         compile_text(f"lattice: {{axes: [i], boundary: periodic}}\n{text}")
 
 
-def test_disorder_by_a_formula_has_to_be_given() -> None:
-    text = TEXTS["dnls"].replace("value: 0.1", 'value: "cos(i)"')
-    found = lattice_solver_of(compile_spec(specs.loads(f"phigen: 1\nname: disordered\n{text}\n")), "numpy")
-    with pytest.raises(TypeError, match="'e' has no default for all sizes"):
-        found.integrate(start("dnls"), 0.1, 1)
+def with_default(value: str, target: str = "numpy") -> LatticeSolver:
+    """A chain whose parameter e has that default, with a run of nine sites."""
+    run = "runs: {nine: {sizes: [9], initial: {q: 1, p: 0}, step: 0.1, steps: 2}}"
+    text = TEXTS["dnls"].replace("value: 0.1", f"value: {value}")
+    spec = specs.loads(f"phigen: 1\nname: disordered\n{text}\nadjoint: true\n{run}\n")
+    return lattice_solver_of(compile_spec(spec), target)
+
+
+UNEVEN = '"cos(i + 2*pi*i/N_i)"'
+
+
+@pytest.mark.parametrize(
+    ("value", "e"),
+    [
+        (UNEVEN, np.cos(np.arange(7) * (1 + 2 * np.pi / 7))),
+        ("{random: normal, seed: 5, scale: 2}", 2 * np.random.default_rng(5).normal(size=7)),
+        ("[1, 2, 3, 4, 5, 6, 7]", np.arange(1.0, 8)),
+    ],
+)
+def test_defaults_are_made_at_the_sizes_of_the_state(value: str, e: np.ndarray) -> None:
+    x, found = start("dnls"), with_default(value)
+    run = found.integrate(x, 0.1, 2)
+    np.testing.assert_allclose(run.parameters["e"], e, rtol=1e-15)
+    explicit = {"e": run.parameters["e"]}
+    assert np.array_equal(run.x, found.integrate(x, 0.1, 2, **explicit).x)
+    assert np.array_equal(run.x, found.run(sizes=[7], x0=x).x) or "[" in value
+    assert found.hamiltonian(x) == found.hamiltonian(x, **explicit)
+    assert np.array_equal(
+        found.ensemble(np.stack([x, -x]), 0.1, 2), found.ensemble(np.stack([x, -x]), 0.1, 2, **explicit)
+    )
+    gradients = [found.pullback(x, 0.1, 2, x, **given).parameters_bar["e"] for given in ({}, explicit)]
+    assert np.array_equal(*gradients)
     with pytest.raises(TypeError, match="'e' is given twice"):
-        found.integrate(start("dnls"), 0.1, 1, e=0.2, parameters={"e": 0.1})
+        found.integrate(x, 0.1, 1, e=0.2, parameters={"e": 0.1})
+
+
+def test_defaults_of_other_sizes_are_refused(tmp_path: Path) -> None:
+    np.save(tmp_path / "e.npy", np.ones(9))
+    hint = re.escape("hint: give e=, an array of shape (7,), or one number")
+    with pytest.raises(SpecError, match=rf"(?s)<string>:\d+:\d+: error: e: 3 values, not 7.*{hint}"):
+        with_default("[1, 2, 3]").integrate(start("dnls"), 0.1, 1)
+    with pytest.raises(SpecError, match=rf"(?s)e: cannot read .*9.*7.*{hint}"):
+        with_default(str(tmp_path / "e.npy")).hamiltonian(start("dnls"))
 
 
 @pytest.mark.parametrize("name", TEXTS)

@@ -79,5 +79,5 @@ def test_what_is_not_reached_is_told_by_the_status():
         phigen.solve_ivp(solver_of("pendulum"), (0, 1), [1, 0], t_eval=[0.5, 0.2])
     with pytest.raises(ValueError, match="two different numbers"):
         phigen.solve_ivp(solver_of("pendulum"), (1, 1), [1, 0])
-    with pytest.raises(TypeError, match="no 'method' here: it is that of the solver"):
+    with pytest.raises(TypeError, match="no 'method' here: the method is that of the solver"):
         phigen.solve_ivp(solver_of("pendulum"), (0, 1), [1, 0], method="RK45")

@@ -117,6 +117,21 @@ def test_observables_are_the_last_columns_of_files(tmp_path, monkeypatch):
     assert trajectory.to_xarray()["tilt"].dims == ("t",)
 
 
+def test_a_run_records_the_columns_that_it_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "body.yaml").write_text(BODY.replace("steps: 50}", "steps: 50, record: [tilt, C]}"))
+    for name in ("run.csv", "run.npz"):
+        assert CliRunner().invoke(group, ["run", "body.yaml", "-o", name], prog_name="phigen").exit_code == 0
+    trajectory = phigen.compile("body.yaml").run()
+    rows = np.loadtxt("run.csv", delimiter=",", skiprows=1)
+    assert (tmp_path / "run.csv").read_text().splitlines()[0] == "t,C,tilt"
+    np.testing.assert_array_equal(rows[:, 2], trajectory.observables["tilt"])
+    assert {"t", "casimir_C", "observable_tilt"} <= {*np.load("run.npz")}
+    assert "x" not in np.load("run.npz")
+    for option in (["-o", "run.csv", "--extend", "--steps", "9"], ["--from", "run.csv"]):
+        assert CliRunner().invoke(group, ["run", "body.yaml", *option], prog_name="phigen").exit_code == 2
+
+
 def test_averages_are_over_the_rows_that_the_run_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "driven.yaml").write_text(DRIVEN)
@@ -135,7 +150,7 @@ def test_averages_are_over_the_rows_that_the_run_says(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("hamiltonian: p**2/2", "hamiltonian: min(p, q) + p**2/2", "min is for observables and stop alone"),
+        ("hamiltonian: p**2/2", "hamiltonian: min(p, q) + p**2/2", "min is allowed in observables and stop only"),
         ("kinetic: speed**2/2", "q: p", "observables: 'q' is the name of a coordinate"),
         ("kinetic: speed**2/2", "t: p", "observables: 't' is the name of a column of every output"),
         ("kinetic: speed**2/2", "kinetic: if(p, 1, 2)", "if needs a comparison"),

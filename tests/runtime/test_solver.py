@@ -145,7 +145,7 @@ def test_progress_counts_up_to_the_number_of_steps(solver):
         ({"h": Fraction(10) ** 5000}, ValueError, "finite"),
         ({"h": "0.1"}, TypeError, "must be a number, not '0.1'"),
         ({"x0": [1, -(10**400), 3]}, ValueError, "x0 must be finite, but a number in it is too large"),
-        ({"x0": ["1", "2", "3"]}, TypeError, "array of numbers: texts are none"),
+        ({"x0": ["1", "2", "3"]}, TypeError, "array of numbers: text is not a number"),
         ({"steps": 10**400}, ValueError, "at most .*, not an integer of 401 digits"),
         ({"steps": -(10**5000)}, ValueError, "at least 0, not an integer of 5001 digits"),
         ({"stride": 2**63}, ValueError, "at most"),

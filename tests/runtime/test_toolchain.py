@@ -16,13 +16,13 @@ OUTPUT = 'while [ "$1" != -o ]; do shift; done\n'
 BROKEN = {
     "writes nothing": ("exit 0", "reported success, but wrote no library"),
     "writes an empty file": (f'{OUTPUT}: > "$2"', "reported success, but wrote an empty file"),
-    "writes junk": (f'{OUTPUT}echo junk > "$2"', "reported success, but wrote something that is no library"),
+    "writes junk": (f'{OUTPUT}echo junk > "$2"', "reported success, but wrote a file that is not a library"),
     "writes an object": (
         f'{shlex.quote(REAL.command[0])} -c -x c - -o "$0.o" < /dev/null\n{OUTPUT}cp "$0.o" "$2"',
-        "reported success, but what it wrote is no shared library",
+        "reported success, but its output is not a shared library",
     ),
     "refuses": ("echo no licence >&2; exit 3", "failed with exit code 3:\n    no licence"),
-    "says nothing": ("exit 3", "failed with exit code 3, and said nothing"),
+    "says nothing": ("exit 3", "failed with exit code 3 without a message"),
     "crashes": ("kill -SEGV $$", "was ended by SIGSEGV"),
     "hangs": ("sleep 60", "did not answer within 0.4 s"),
     "leaves something that hangs": ("sleep 60 & exit 2", "failed with exit code 2"),
@@ -68,8 +68,8 @@ def test_a_compiler_that_is_named_and_does_not_work_is_refused_with_the_reason(k
     ("version", "reason"),
     [
         ("sleep 60", "did not answer within 0.4 s"),
-        ("exit 1", "does not tell its version: --version failed with exit code 1"),
-        ("true", "does not tell its version: --version printed nothing"),
+        ("exit 1", "does not report its version: --version failed with exit code 1"),
+        ("true", "does not report its version: --version printed nothing"),
     ],
 )
 def test_a_compiler_tells_its_version(version, reason, compiler, monkeypatch):
@@ -83,7 +83,7 @@ def test_a_compiler_tells_its_version(version, reason, compiler, monkeypatch):
 @pytest.mark.parametrize(
     ("named", "reason"),
     [
-        ("no-such-compiler -x", "named in CC, no-such-compiler -x, is not there"),
+        ("no-such-compiler -x", "named in CC, no-such-compiler -x, was not found"),
         ("/dev/null", "named in CC, /dev/null, is not a program"),
         ('gcc "', 'CC=gcc " cannot be read as a command: No closing quotation'),
     ],
@@ -112,8 +112,8 @@ def test_without_any_that_works_numpy_is_chosen_and_the_reasons_told(compiler, t
     assert chosen_target("auto", told.append) == "numpy"
     compiler("exit 5", name="gcc")
     assert chosen_target("auto", told.append) == "numpy"
-    assert "using NumPy, which is slower: no C compiler works: none of cc, gcc, clang is there" in told[0]
-    assert "cc is not there; gcc failed with exit code 5, and said nothing; clang is not there" in told[1]
+    assert "using NumPy, which is slower: no C compiler works: none of cc, gcc, clang was found" in told[0]
+    assert "cc was not found; gcc failed with exit code 5 without a message; clang was not found" in told[1]
 
 
 def test_numpy_needs_no_compiler(monkeypatch):

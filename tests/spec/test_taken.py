@@ -59,9 +59,13 @@ def declared():
         "tangent: true\nadjoint: true\nmodified_hamiltonian: 1\n"
     )
     found = symbols("t", files(asked, "c")["t.h"])
-    for header in (resources.bundled_specs().parent / "generated").glob("*/*.h"):
+    root = resources.bundled_specs().parent
+    for header in (root / "generated").glob("*/*.h"):
         found |= symbols(header.stem, header.read_text())
-    assert {"init", "init_gauge", "default_params", "step_tangent", "modified_hamiltonian"} < found
+    for golden in (root / "tests" / "golden").glob("*.txt"):
+        header_text = golden.read_text().partition(f"==== {golden.stem}.h ====")[2].partition("\n==== ")[0]
+        found |= symbols(golden.stem, header_text)
+    assert {"attitude", "init", "init_gauge", "default_params", "step_tangent", "modified_hamiltonian"} < found
     return found
 
 

@@ -117,6 +117,22 @@ SYSTEMS = {
         "coordinates: [x, p, V]\npoisson: {nambu: [V + cos(x)]}\nhamiltonian: p**2/2 + V",
         ["x shifted; V turned", "p shifted"],
     ),
+    "a rotation about a vector that stands still": (
+        "coordinates: [x, y, z, u, v, w, a, b, c]\n"
+        "poisson: {brackets: {x: {y: -z, z: y, v: -w, w: v, b: -c, c: b}, y: {z: -x, u: w, w: -u, a: c, c: -a},"
+        " z: {u: -v, v: u, a: -b, b: a}}}\nparameters: {n: 0.3}\nhamiltonian: n*(x*u + y*v + z*w) + a**2 + 2*b**2",
+        ["a, b, c turned", "x, y, z shifted"],
+    ),
+    "a rotation about the momenta of wheels": (
+        "coordinates: [x, y, z, a, b, c, u, v, w]\n"
+        "poisson: {brackets: {x: {y: -z, z: y}, y: {z: -x}, a: {u: 1}, b: {v: 1}, c: {w: 1}}}\n"
+        "hamiltonian: x*u + y*v/2 + z*w/3 + cos(a)",
+        ["u shifted", "x, y, z, a, b, c turned and shifted"],
+    ),
+    "a static vector beside a quadratic term": (
+        BODY + "parameters: {B: 2}\nhamiltonian: x**2/2 + B*x + y + z/3",
+        ["x, y, z turned", "y, z turned"],
+    ),
     "a field that depends on the place": (
         "coordinates: [x, y, u, v]\npoisson: {brackets: {x: {u: 1}, y: {v: 1}, u: {v: 1 + x**2 + y**2}}}\n"
         "hamiltonian: (u**2 + v**2)/2 + x**4",

@@ -64,7 +64,7 @@ def test_the_balance_is_kept_to_the_order_of_the_method_and_has_no_drift():
 def test_all_checks_hold_from_any_time_on():
     compilation = compile_text(DUFFING)
     solvers = {target: solver(compilation, target) for target in ("c", "numpy")}
-    found = verify(compilation, solvers, "r", [1.2, 0], {}, 0.1, 200, t0=0.7, quick=True)
+    found = verify(compilation, solvers, "r", [1.2, 0], {}, 0.1, 100, t0=0.7, quick=True)
     assert found.failures == []
     named = {c.name: c for c in found.checks}
     assert named["observed order"].value > 5.7
@@ -95,7 +95,7 @@ def test_a_run_begins_at_its_time(tmp_path):
 def test_figures_and_reports_show_the_balance(tmp_path):
     path = tmp_path / "duffing.yaml"
     text = DUFFING.replace(
-        "tangent: true", "runs: {r: {initial: [1.2, 0], step: 0.1, steps: 100, start: 0.7, compare: [rk4]}}"
+        "tangent: true", "runs: {r: {initial: [1.2, 0], step: 0.1, steps: 40, start: 0.7, compare: [rk4]}}"
     )
     path.write_text(f"phigen: 1\nname: duffing\n{text}", encoding="utf-8")
     done = CliRunner().invoke(group, ["run", str(path), "--plot", str(tmp_path / "d.svg"), "--target", "numpy"])

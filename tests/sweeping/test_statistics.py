@@ -5,6 +5,7 @@ import pytest
 
 import phigen
 import phigen.spec
+from phigen.study.averages import Averages
 
 DRIVEN = """\
 phigen: 1
@@ -51,3 +52,43 @@ def test_what_is_no_observable_is_told():
         ValueError, match=r"cannot keep 'mean\(q\)'; there are final, .*, kinetic, inside, mean\(kinetic\)"
     ):
         phigen.sweep(phigen.spec.loads(DRIVEN), keep=["mean(q)"])
+
+
+CHAIN = """\
+phigen: 1
+name: chain
+coordinates: [q, p]
+lattice: {axes: [i]}
+parameters: {k: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: p**2/2 + k*(q[i+1] - q)**2/2 + q**4/4
+observables: {heat: {mean: p**2}, far: {max: abs(q)}, local: q**2}
+order: 2
+runs:
+  r: {initial: {random: normal, seed: 2}, sizes: [6], step: 0.1, steps: 400, stride: 2, average: {after: 3, blocks: 4}}
+sweeps:
+  s: {over: {k: [0.5, 2], seed: {count: 2}}, keep: [far, mean(heat), std(heat), error(heat), energy_error]}
+"""
+
+
+@pytest.mark.slow  # it starts a cluster of workers
+def test_statistics_of_lattices_are_those_of_single_runs(tmp_path):
+    spec = phigen.spec.loads(CHAIN)
+    data = phigen.sweep(spec, workers=1)
+    solver = phigen.compile(spec)
+    trajectory = solver.run(k=2.0)
+    heat = trajectory.observables["heat"][trajectory.t >= 3 - 1e-12]
+    assert float(data["far"][1, 0]) == pytest.approx(trajectory.observables["far"][-1], rel=1e-12)
+    assert float(data["mean(heat)"][1, 0]) == pytest.approx(heat.mean(), rel=1e-12)
+    assert float(data["std(heat)"][1, 0]) == pytest.approx(heat.std(ddof=1), rel=1e-12)
+    averages = Averages(1, blocks=4)
+    averages.see(np.arange(float(len(heat))), heat[:, None])
+    assert float(data["error(heat)"][1, 0]) == pytest.approx(averages.results()[0].error, rel=1e-12)
+    assert float(data["mean(heat)"][1, 1]) != float(data["mean(heat)"][1, 0])
+    energy = np.abs(trajectory.energy[-1] - trajectory.energy[0])
+    assert float(data["energy_error"][1, 0]) == pytest.approx(energy, rel=1e-9)
+
+
+def test_sweeps_of_lattices_keep_numbers_only():
+    with pytest.raises(phigen.SpecError, match=r"keep: 'mean\(local\)' is not known"):
+        phigen.spec.loads(CHAIN.replace("mean(heat)", "mean(local)"))

@@ -15,11 +15,12 @@ from phigen.symbolic.numeric import (
     evaluate_with_scale,
     is_rational,
 )
+from phigen.symbolic.universal import ANOMALY
 
 x, y = symbol("x"), symbol("y")
 
 
-@pytest.mark.parametrize("name", sorted(FUNCTIONS))
+@pytest.mark.parametrize("name", sorted({*FUNCTIONS} - {ANOMALY}))
 def test_every_function_agrees_between_floats_and_mpmath(name):
     at = {"x": 1.25, "y": 0.75} if name in ("acosh", "atan2", "power") else {"x": 0.375, "y": 0.75}
     e = call(name, *[x, y, x - y][: FUNCTIONS[name].arity])

@@ -9,7 +9,10 @@ from support import run, spec_of, tool, write
 
 from phigen import resources
 from phigen.compiler import compile_spec
+from phigen.targets import state
+from phigen.targets.c import phrases
 from phigen.targets.c.emitter import runtime_of
+from phigen.targets.c.files import CONDITIONS, guard
 from phigen.targets.c.macros import Macros
 
 RUNTIME = resources.templates() / "c/runtime"
@@ -93,13 +96,15 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     made, _, code = runtime_of(replace(with_derivatives(name, composition), profile=profile))
     own = {str(f.relative_to(RUNTIME)): f.read_text(encoding="utf-8") for f in RUNTIME.rglob("*.[ch]")}
     (tmp_path / "none").mkdir()
-    (tmp_path / "macros").mkdir()
     write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in own.items()})
+    printed = {"phrases.h": phrases.header(), **{file: state.header(file) for file in state.PARTS}}
+    write(tmp_path, {f: re.sub(r"\b(phi|PHI)_", f"{made.name}_", text) for f, text in printed.items()})
     write(tmp_path, {f: f"#ifndef {f[:-2]}_h\n#define {f[:-2]}_h\n{text}\n#endif" for f, text in made.printed.items()})
     made_text = made.text(code)
     write(tmp_path, {"made.c": made_text})
     write(tmp_path / "none", dict.fromkeys(re.findall("#include <(.*)>", "".join(own.values())), ""))
     switches = [f"-D{made.name}_{switch}={int(on)}" for switch, on in made.switches.items()]
+    switches += [f"-D{guard.replace('PHI_', made.name + '_')}" for guard in made.left_out.values()]
 
     def tokens(file):
         text = run([tool("gcc"), "-E", "-P", "-nostdinc", "-I", "none", *switches, file], tmp_path)
@@ -112,8 +117,26 @@ def test_code_is_what_a_preprocessor_makes_of_the_runtime(name, composition, pro
     assert not made.switches.get("ONE_ROW") or "r < s->rows" not in made_text
 
 
-def test_every_macro_of_the_runtime_is_used():
-    text = "".join(file.read_text(encoding="utf-8") for file in RUNTIME.glob("*.[ch]"))
-    for file in (RUNTIME / "macros").glob("*.h"):
-        names = re.findall(r"#define (PHI_(?!FILE)\w+)", file.read_text(encoding="utf-8"))
-        assert set(names) <= set(re.findall(r"\w+", text))
+def test_every_phrase_is_used_by_the_runtime():
+    text = "".join(file.read_text(encoding="utf-8") for file in RUNTIME.glob("*.[ch]")) + phrases.header()
+    for choice in phrases.ALL:
+        for name in choice.phrases:
+            word = f"PHI_{name.split('(')[0]}"
+            assert len(re.findall(rf"\b{word}\b", text)) > len(re.findall(rf"#define {word}\b", text)), word
+
+
+def test_phrases_have_a_text_for_each_condition_and_no_name_of_sizes():
+    """A phrase by the name of an enumerator would take its place wherever it is declared."""
+    names = [name.split("(")[0] for choice in phrases.ALL for name in choice.phrases]
+    assert len(names) == len(set(names))
+    for choice in phrases.ALL:
+        assert {len(texts) for texts in choice.phrases.values()} == {len(choice.conditions) + 1}
+    for system in ("rigid_body", "heisenberg_plane"):
+        made, header, code = runtime_of(with_derivatives(system, "auto"))
+        enumerators = re.findall(rf"\b{system}_([A-Z_]+) =", made.text(header) + made.text(code))
+        assert not set(names) & set(enumerators)
+
+
+def test_files_that_are_left_out_exist_with_their_guards():
+    for file in CONDITIONS:
+        assert f"#define {guard(file)}\n" in (RUNTIME / file).read_text(encoding="utf-8")

@@ -35,7 +35,7 @@ ARGUMENTS |= {
     "sign": (x - y,),
 }
 ARGUMENTS |= {"atan2": (-x, y - z), "power": (z, y - 3 * x), "tanhalf": (call("sin", y), call("versin", y))}
-ARGUMENTS |= {"choose": (x - y, x * z, y - z)}
+ARGUMENTS |= {"choose": (x - y, x * z, y - z), "anomaly": (x + y, z, x - y, y / 2 - x, y, x)}
 
 #: Arguments of φ and its derivatives: near 0, farther, and beyond 16, of either sign.
 SPECIAL_ARGUMENTS = {"near": x / 5, "near-": -x / 5, "far": 9 * z - 20 * y, "far-": 17 * x - 20 * z}
@@ -48,7 +48,7 @@ NUMBERS += [Fraction(1, 3), Fraction(-7, 11), Fraction(1, 1024), Fraction(123456
 NUMBERS += [Fraction(1, 10**39), Fraction(-1, 10**17), Fraction("0.1"), Fraction("-3.14159"), Fraction(2, 10**6 + 3)]
 
 #: Relative to the value. φ' and φ'' occur in Newton matrices and in what multiplies a last correction, nowhere else.
-BOUNDS = {"phi1": 1e-13, "phi2": 1e-13, "sinroot1": 1e-14, "exprel1": 1e-14}
+BOUNDS = {"phi1": 1e-13, "phi2": 1e-13, "sinroot1": 1e-14, "arcroot1": 1e-14, "exprel1": 1e-14}
 
 
 def binary(op, a, b):

@@ -1,20 +1,29 @@
 """The runtime of the C, as it lies in templates/c/runtime, with a pendulum written by hand: no generator takes part."""
 
+import re
 from math import sin
 from pathlib import Path
 
 import pytest
-from support import run, tool
+from support import run, tool, write
 
 from phigen import resources
+from phigen.scheme.policies import POLICIES
+from phigen.targets import state
+from phigen.targets.c import phrases
+from phigen.targets.c.files import CONDITIONS, guard
 from phigen.targets.c.layout import WIDTH, fitted
+from phigen.targets.policies import C
 
 BY_HAND = Path(__file__).with_name("pendulum_by_hand")
 CHAIN = Path(__file__).with_name("chain_by_hand")
 RUNTIME = resources.templates() / "c/runtime"
-INCLUDED = [f"-I{BY_HAND}", f"-I{RUNTIME}"]
+LEFT_OUT = ["-I.", "-include", "left_out.h"]
+INCLUDED = [f"-I{BY_HAND}", f"-I{RUNTIME}", *LEFT_OUT]
 WARNINGS = ("all", "extra", "pedantic", "conversion", "double-promotion", "shadow", "no-unused-function", "error")
 OF_LATTICES = ("lattice", "rows", "graph")
+#: The layer of FMUs is written for one model; tests/fmu compile it with the same warnings.
+OF_MODELS = ("fmu",)
 STRICT = ["-std=c99", *(f"-W{warning}" for warning in WARNINGS)]
 
 #: -O1 would take four times as long, sums of pointers with numbers a third more: tests/generated/test_compilers.py has
@@ -34,6 +43,22 @@ IMPLICIT += [("PATH", *more) for _, *more in IMPLICIT]
 IMPLICIT += [("NEWTON", "GAUGE"), ("NEWTON", "GAUGE", "FAST", "ADJOINT")]
 EXPLICIT = [(kind, *more) for kind in ("EXPLICIT", "SPLITTING") for more in ((), ("FAST",), ("TANGENT",), ("ADJOINT",))]
 EXPLICIT += [(kind, "FAST", "ADJOINT") for kind in ("EXPLICIT", "SPLITTING")]
+
+
+@pytest.fixture(autouse=True)
+def printed(tmp_path):
+    """Headers in place of what the emitter puts together: constants, phrases, files that are left out."""
+    sizes = ("DIFFERENCES", "DIRECTIONS")
+    texts = {name: C.text(policy, sizes) for name, policy in POLICIES.items()}
+    lines = ['#include "declarations.h"']
+    for file, condition in CONDITIONS.items():
+        negated = re.sub(r"\b([A-Z])", r"PHI_\1", condition)
+        lines.append(f"#if !({negated}) && !defined({guard(file)})\n#define {guard(file)}\n#endif")
+    write(tmp_path, {file: state.header(file) + "\n" for file in state.PARTS})
+    texts |= {"left_out": "\n".join(lines), "phrases": phrases.header()}
+    write(
+        tmp_path, {f"{name}.h": f"#ifndef {name}_H\n#define {name}_H\n{text}\n#endif\n" for name, text in texts.items()}
+    )
 
 
 def defined(switches):
@@ -81,7 +106,7 @@ def test_runtime_compiles_without_a_warning_by_clang(switches, tmp_path):
 
 def test_pendula_of_a_lattice_by_hand_move_as_they_should(tmp_path):
     """With the sanitisers: energy, reversibility, the field, failures, sizes that are not allowed (see main.c)."""
-    main = ["-I", CHAIN, "-I", RUNTIME, CHAIN / "main.c", "-o", "main", "-lm"]
+    main = ["-I", CHAIN, "-I", RUNTIME, *LEFT_OUT, CHAIN / "main.c", "-o", "main", "-lm"]
     run([tool("gcc"), *STRICT, *SANITISED, *main], tmp_path)
     assert run([tmp_path / "main"], tmp_path) == "ok\n"
 
@@ -89,12 +114,12 @@ def test_pendula_of_a_lattice_by_hand_move_as_they_should(tmp_path):
 @pytest.mark.parametrize("flags", [["-O2"], ["-O2", "-fopenmp=libgomp"]], ids=" ".join)
 def test_lattices_compile_without_a_warning_by_clang(flags, tmp_path):
     """clang may have no omp.h."""
-    main = [*flags, "-I", CHAIN, "-I", RUNTIME, CHAIN / "main.c"]
+    main = [*flags, "-I", CHAIN, "-I", RUNTIME, *LEFT_OUT, CHAIN / "main.c"]
     run([tool("clang"), *STRICT, "-fsyntax-only", *main], tmp_path)
 
 
 def test_code_of_lattices_needs_no_library_but_that_of_c():
-    for name in ("heisenberg", "klein_gordon"):
+    for name in ("heisenberg", "toda"):
         text = (resources.templates().parent / "generated" / name / f"{name}.c").read_text(encoding="utf-8")
         headers = {line for line in text.splitlines() if line.startswith("#include <")}
         assert headers <= {"#include <float.h>", "#include <math.h>", "#include <stdint.h>", "#include <string.h>"}
@@ -102,12 +127,12 @@ def test_code_of_lattices_needs_no_library_but_that_of_c():
 
 @pytest.mark.parametrize("name", ["lattice.c", "rows.c", "lane_functions.c", "status.c"])
 def test_each_file_of_lattices_compiles_by_itself(name, tmp_path):
-    run([tool("gcc"), *STRICT, "-fsyntax-only", "-I", CHAIN, "-I", RUNTIME, RUNTIME / name], tmp_path)
+    run([tool("gcc"), *STRICT, "-fsyntax-only", "-I", CHAIN, "-I", RUNTIME, *LEFT_OUT, RUNTIME / name], tmp_path)
 
 
 @pytest.mark.parametrize(
     "path",
-    [p for p in sorted(RUNTIME.glob("*.c")) if not p.name.startswith(OF_LATTICES)],
+    [p for p in sorted(RUNTIME.glob("*.c")) if not p.name.startswith(OF_LATTICES + OF_MODELS)],
     ids=lambda p: p.name,
 )
 def test_each_file_of_the_runtime_compiles_by_itself(path, tmp_path):

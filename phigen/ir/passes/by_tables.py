@@ -55,7 +55,7 @@ class _Tables:
 
     def _gather_sums(self, s: ir.GatherSums) -> Iterator[ir.Statement]:
         others = [p for p in self.function.parameters if p not in ("coef", "params", "start", "out")]
-        source = self.params if self.function.role in (ir.Role.STAGE, ir.Role.OBSERVABLE) else ir.fixed("coef")
+        source = self.params if self.function.role in (ir.LoopRole.STAGE, ir.LoopRole.OBSERVABLE) else ir.fixed("coef")
         yield ir.Call("fill", (ir.Constant(0),), ir.Member(SITES, "sums"))
         yield from (ir.Call(name, (source, *map(ir.fixed, others))) for name in s.functions)
 
@@ -122,7 +122,7 @@ class _Tables:
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         if array.storage is not ir.Storage.STATE or array.name in fields:
             own = ir.fixed(_ARRAYS.get(array.storage, "out"))
-            sums = array.storage is ir.Storage.SUM and self.function.role is not ir.Role.GATHER
+            sums = array.storage is ir.Storage.SUM and self.function.role is not ir.LoopRole.GATHER
             return ir.Entry(ir.Member(SITES, "sums") if sums else own, _of_field(site, array.number))
         if array.name in increments:
             drawn = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))

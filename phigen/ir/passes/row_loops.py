@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 from phigen.ir import nodes as ir
-from phigen.ir.nodes import Role
+from phigen.ir.nodes import LoopRole
 from phigen.ir.passes.by_rows import (
     AT_BONDS,
     BOND,
@@ -32,11 +32,13 @@ from phigen.symbolic.symbols import Symbol
 COEF, OUT = ir.fixed("coef"), ir.fixed("out")
 OTHER_SITE = ir.Entry(ir.Member(SOLVER, "other"), BOND)
 ZERO, ONE = ir.Constant(0.0), ir.Constant(1.0)
+#: The distance between the values of one site, in arrays that callers see.
+SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 
 def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, compensated: bool = False) -> ir.Block:
     """Return the statements of a sweep; of one colour it updates the sites that have the colour ``swept``."""
-    loop, tangent = lowered(function), function.role is Role.TANGENT_SWEEP
+    loop, tangent = lowered(function), function.role is LoopRole.TANGENT_SWEEP
     stores = [s for s in loop.body if isinstance(s, ir.Store)]
     updated = frozenset(s.array.name for s in stores) if not tangent else frozenset[str]()
     rows = Rows(layout, Reading(updated)).read((*function.body, *loop.body))
@@ -108,16 +110,21 @@ class BondLoop:
         return [s for s in self.loop.body if isinstance(s, ir.Store)]
 
 
-def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str]) -> ir.Block:
-    """Return the statements of a density, an energy or the vector field, after ``calls`` that sum over bonds."""
+def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Block:
+    """Return the statements of a density, an energy or the vector field, after ``calls`` that sum over bonds.
+
+    Values of one site are ``apart`` from each other.
+    """
     loop = lowered(function)
     rows = Rows(layout).read((*function.body, *loop.body))
     early = [ir.Call(name, (ROW,)) for name in calls]
     body = (*rows.at_site(), *rows.computed, *_observed(loop))
-    return (*early, *_apart(loop), *rows.before(), over_sites(body))
+    return (*early, *_apart(loop, apart), *rows.before(), over_sites(body))
 
 
-def observable_with_bonds(function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop]) -> ir.Block:
+def observable_with_bonds(
+    function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
+) -> ir.Block:
     """Return the same where each site sums over its bonds itself."""
     loop = lowered(function)
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
@@ -137,7 +144,7 @@ def observable_with_bonds(function: ir.Function, layout: RowLayout, sums: Sequen
         inner.append(_summed_over_bonds(one, rows))
     count = max((s.array.number for one in sums for s in one.stores), default=0) + 1
     body = (*rows.at_site(), _zeros(count), *inner, *computed, *_observed(loop))
-    return (*_apart(loop), *rows.before(), over_sites(body, ""))
+    return (*_apart(loop, apart), *rows.before(), over_sites(body, ""))
 
 
 def _is_computed(s: ir.Statement) -> bool:
@@ -148,10 +155,10 @@ def _at_bond(s: ir.Statement) -> bool:
     return isinstance(s, ir.Declare) and isinstance(s.items[0][1], ir.BondParameter)
 
 
-def _apart(loop: ir.Loop) -> list[ir.Statement]:
+def _apart(loop: ir.Loop, apart: ir.Value) -> list[ir.Statement]:
     """Return the declaration of the distance between outputs, where there are several."""
     several = any(isinstance(s, ir.Store) and s.array.number for s in loop.body)
-    return [ir.index(ir.fixed("apart"), ir.Cast(ir.Member(SOLVER, "sites")))] * several
+    return [ir.index(ir.fixed("apart"), apart)] * several
 
 
 def _observed(loop: ir.Loop) -> Iterator[ir.Statement]:

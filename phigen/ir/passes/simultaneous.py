@@ -11,7 +11,7 @@ from phigen.ir.walk import map_blocks
 
 def simultaneous(function: ir.Function) -> ir.Function:
     """Return a sweep with a name for each change, where it makes several; other functions as they are."""
-    if function.role not in (ir.Role.SWEEP, ir.Role.TANGENT_SWEEP):
+    if function.role not in (ir.LoopRole.SWEEP, ir.LoopRole.TANGENT_SWEEP):
         return function
 
     def change(body: ir.Block) -> Iterator[ir.Statement]:

@@ -2,8 +2,8 @@
 
 The files of ``templates/c/runtime`` are C99 as they lie there, with the prefix ``phi_`` and with switches and sizes
 (``PHI_BLOCKS``, ``PHI_DIM``) that a model defines. What a reader of the output should not see is resolved here, as a
-preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards, and macros that files in ``macros``
-define. All other directives stay.
+preprocessor would: ``#include "…"`` of these files, ``#if`` on switches, guards, and phrases
+(`phigen.targets.c.phrases`). All other directives stay.
 """
 
 from __future__ import annotations
@@ -13,6 +13,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from phigen import resources
+from phigen.targets import state
+from phigen.targets.c import phrases
+from phigen.targets.c.files import holds, left_out
 from phigen.targets.c.macros import Macros
 
 
@@ -27,6 +30,16 @@ class Amalgam:
     _defined: set[str] = field(default_factory=set)
     _macros: Macros = field(default_factory=Macros)
 
+    def __post_init__(self) -> None:
+        self._defined |= set(self.left_out.values())
+        for definition in phrases.definitions(self.switches):
+            self._macros.define(definition)
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """The files of the runtime that the solver lacks, with their include guards."""
+        return left_out(self.switches)
+
     def text(self, file: str) -> str:
         """The file with all that it includes and that was not included before."""
         text = re.sub(r"\n{3,}", "\n\n", "\n".join(self._expanded(file)))
@@ -40,9 +53,12 @@ class Amalgam:
         lines: list[str] = []
         own: list[str] = []
         for line in self._selected((resources.templates() / "c/runtime" / file).read_text(encoding="utf-8")):
-            if file.startswith("macros/"):
-                self._macros.define(line)
-            elif line.startswith('#include "'):
+            if line == '#include "phrases.h"':
+                continue
+            if line.startswith('#include "state_'):
+                own += state.part(line.split('"')[1], self.switches)
+                continue
+            if line.startswith('#include "'):
                 lines += [*self._own(own), *self._expanded(line.split('"')[1])]
                 own = []
             elif line.startswith("#include <"):
@@ -83,10 +99,7 @@ class Amalgam:
         return chosen
 
     def _holds(self, condition: str) -> bool:
-        return any(all(self._switch(s) for s in part.split(" && ")) for part in condition.split(" || "))
-
-    def _switch(self, text: str) -> bool:
-        return self.switches[text.removeprefix("!").removeprefix("PHI_")] != text.startswith("!")
+        return holds(condition.replace("PHI_", ""), self.switches)
 
     def _own(self, lines: Sequence[str]) -> list[str]:
         """Lines of the runtime with what macros stand for, and with the prefix of the solver."""

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
+from phigen.scheme.policies import PredictorPolicy
 from phigen.scheme.program import BOUND, Attitude, Noise, Program
 from phigen.scheme.steps import Adjoint, Explicit, Gauss, Implicit, Newton, Path, PathAdjoint, Splitting, Sweeps
 from phigen.spec.model import Parameter
@@ -26,6 +27,7 @@ from phigen.targets.c.layout import fitted
 from phigen.targets.c.single import single
 from phigen.targets.header import header_lines, plain, right_hand_side, sealed
 from phigen.targets.path import TERMS, Syntax, adjoint_program, statements, tangent_program
+from phigen.targets.policies import C, policies_of
 from phigen.targets.rendering import render
 
 #: Passes over a block that cost, per step, what an evaluation at one point costs: with loops that are vectorised, and
@@ -68,8 +70,9 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     """What is put together, and the files of the runtime to begin with: of a header, and of the code."""
     lanes = in_lanes(program)
     has = switches(program, lanes)
+    policies = _policies(program)
     if not isinstance(program.step, Sweeps):
-        return Amalgam(program.name, has, printed(program, lanes, has)), "solver.h", "runtime.c"
+        return Amalgam(program.name, has, policies | printed(program, lanes, has)), "solver.h", "runtime.c"
     from phigen.targets.c.lattice import adjoint as lattice_adjoint
     from phigen.targets.c.lattice import layout as lattice_layout
     from phigen.targets.c.lattice import model as lattice_model
@@ -88,7 +91,14 @@ def runtime_of(program: Program) -> tuple[Amalgam, str, str]:
     }
     if step.adjoint:
         texts["adjoint_sweeps.h"] = lattice_adjoint.printed(program, step, step.adjoint, lanes)
-    return Amalgam(program.name, has, texts), "lattice.h", "lattice.c"
+    return Amalgam(program.name, has, policies | texts), "lattice.h", "lattice.c"
+
+
+def _policies(program: Program) -> dict[str, str]:
+    """The headers with the constants of policies; sizes of arrays are declared with the solver."""
+    sizes = ("DIFFERENCES", "DIRECTIONS")
+    texts = {f"{name}.h": C.text(policy, sizes) for name, policy in policies_of(program).items()}
+    return {file: text.replace("PHI_", f"{program.name}_") for file, text in texts.items()}
 
 
 def _declared_lines(program: Program) -> list[str]:
@@ -152,6 +162,9 @@ def _declarations(program: Program, lanes: Lanes | None, has: Mapping[str, bool]
         if has["EACH"]:
             kept = 1 if isinstance(program.step, Splitting) else LANES * _packs_back(lanes, has)
             sizes.append(("TRAIL_EACH", trail * max(1, kept), "the same for members that go back together"))
+    if has["GUESSED"] and not has["RECURRENCES"] and not has["GAUSS"]:
+        predictor = PredictorPolicy()
+        sizes.append(("DIFFERENCES", predictor.differences, "that a step is extrapolated from: more amplify rounding"))
     sizes += gauss.declared(step, lanes) if isinstance(step, Gauss) else []
     if has["RECURRENCES"]:
         memory = remembered(program, lanes)
@@ -241,6 +254,7 @@ def _of_attitude(attitude: Attitude) -> Sizes:
 def _about(parameter: Parameter, member: str) -> str:
     """The comment on a member of the struct; with the name of the spec where the member has another."""
     said = plain(parameter.description) or f"default {float(parameter.value)!r}"
+    said += f" [{plain(parameter.unit)}]" * bool(parameter.unit)
     return said if member == parameter.name else f"{parameter.name}: {said}"
 
 

@@ -23,6 +23,7 @@ from phigen.symbolic.special import (
     order_of,
     rest_coefficients,
 )
+from phigen.symbolic.universal import ANOMALY
 from phigen.targets import special
 from phigen.targets.c.kernels import FUNCTIONS, printer
 from phigen.targets.c.layout import WIDTH
@@ -31,7 +32,7 @@ from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
 #: The functions of the library that have a version here, under whose name flows call them.
-FLOW_FUNCTIONS = tuple(f for f in NEAR_FUNCTIONS if f not in ENTIRE)
+FLOW_FUNCTIONS = tuple(f for f in NEAR_FUNCTIONS if f not in ENTIRE and f != ANOMALY)
 
 
 @dataclass(frozen=True)
@@ -78,12 +79,35 @@ def called(program: Program, unprinted: Sequence[Kernel] = ()) -> list[str]:
     small = [*entire_used(program), *(f for f in FLOW_FUNCTIONS if f in used)]
     phis = [render("c", "phi.c", _phi(program, f)) for f in special.used(program, unprinted)]
     polynomial = [render("c", "polynomial.c", {"NAME": program.name})] if phis else []
-    return [*polynomial, *phis, *(render("c", "small.c", _values(program, f)) for f in small)]
+    anomaly = [_anomaly(program)] if special.calls_anomaly(program) else []
+    functions = [render("c", "small.c", _values(program, f)) for f in small]
+    return [*polynomial, *phis, *functions, *anomaly, *_exponentials(program)]
+
+
+def _exponentials(program: Program) -> list[str]:
+    """The exponential of matrices, if ``prepare`` takes some, for the largest of them."""
+    rows, adjoint = special.largest_exponential(program), special.transposes_exponentials(program)
+    if not rows:
+        return []
+    values = {"NAME": program.name, "entries": (2 * rows if adjoint else rows) ** 2, "adjoint": adjoint}
+    return [render("c", "matrix_exponential.c", {**values, **special.exponential_constants()})]
 
 
 def near(program: Program, names: Iterable[str]) -> list[str]:
     """Versions for the loops over lanes, of small arguments only, of these functions."""
-    return [render("c", "small.c", _values(program, f) | {"near": True}) for f in names]
+    return [
+        _anomaly(program, near=True) if f == ANOMALY else render("c", "small.c", _values(program, f) | {"near": True})
+        for f in names
+    ]
+
+
+def _anomaly(program: Program, *, near: bool = False) -> str:
+    """The universal anomaly of Kepler motions, with c2 and c3 by series in the same powers."""
+    c2, c3 = special.stumpff()
+    lines, first = estrin(c2, "z", "a")
+    (_, *others), second = estrin(c3, "z", "e")
+    values = {"NAME": program.name, "near": near, "lines": [*lines, *others], "c2": first, "c3": second}
+    return render("c", "anomaly.c", values | special.anomaly_values(single=program.single))
 
 
 def near_rows(program: Program, names: Iterable[str]) -> list[str]:

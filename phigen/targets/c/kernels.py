@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS
-from phigen.scheme.kernel import SCALARS, Kernel
+from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel
 from phigen.scheme.lowering import Assignment
 from phigen.scheme.program import Program
 from phigen.symbolic import functions as elementary
@@ -93,6 +93,8 @@ def function(
     """
     if functions is None:
         functions = lane_calls(program) if lanes else FUNCTIONS
+    if kernel.exponents:
+        return _through_exponentials(program, kernel)
     own = f"{program.name}_{name or kernel.name}{'_lane' if single else '_lanes' if lanes else ''}"
     plain_arrays = {*shared, "work", *(o.name for o in kernel.outputs)} if single else {*shared}
     form = Form(own, exported, returning, lanes, single, sparse, functions, frozenset(plain_arrays), frozenset(alike))
@@ -104,7 +106,7 @@ def function(
     said = [] if exported else _comment(f"{called}." if lanes else sentence(kernel.purpose))  # the header says it
     head = [*said, _signature(program, kernel, form) + "\n{"]
     if len(pieces) == 1:
-        return "\n".join([*head, *_body(program, kernel, form, pieces[0]), "}"]) + "\n"
+        return "\n".join([*head, *_body(program, kernel, form, pieces[0]), *_exponentials(program, kernel), "}"]) + "\n"
     workspace = 1 + max((k for p in pieces for k in p.kept), default=0)
     texts = []
     for k, piece in enumerate(pieces, 1):
@@ -120,9 +122,36 @@ def function(
         head += [f"    double value[{len(kernel.roots)}];", *_default_parameters(program, kernel, form)]
     head += [_clear(array, size) for array, size in code.cleared]
     head += [f"    {own}_part{k}({arguments});" for k in range(1, len(pieces) + 1)]
+    head += _exponentials(program, kernel)
     if exported:
         head.append("    return value[0];" if returning else "    memcpy(out, value, sizeof value);")
     return "\n".join([*texts, *head, "}"]) + "\n"
+
+
+def _exponentials(program: Program, kernel: Kernel) -> list[str]:
+    """The statements that put exponentials less 1 in the places of matrices."""
+    array = kernel.outputs[0].name
+    return [f"    {program.name}_matrix_exponential({n}, {array} + {start});" for start, n in kernel.exponentials]
+
+
+def _through_exponentials(program: Program, kernel: Kernel) -> str:
+    """The transpose of a kernel with exponentials: the matrices, their cotangents, and what follows from these."""
+    assert kernel.exponents is not None
+    inner = kernel.exponents
+    outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
+    plain_kernel = replace(outer, name=kernel.name, inputs={k: s for k, s in kernel.inputs.items() if k != EXPONENTS})
+    form, count = Form(f"{program.name}_{kernel.name}"), len(inner.roots)
+    lines = [*_comment(sentence(kernel.purpose)), _signature(program, plain_kernel, form) + "\n{"]
+    lines += [f"    double {EXPONENTS}[{count}];"]
+    lines += [f"    {program.name}_{inner.name}({', '.join([*inner.inputs, EXPONENTS])});"]
+    place = 0
+    for start, n in kernel.exponentials:
+        arguments = f"{n}, coef_bar + {start}, {EXPONENTS} + {place}"
+        lines.append(f"    {program.name}_matrix_exponential_adjoint({arguments});")
+        place += n * n
+    passed = ", ".join([*kernel.inputs, *(o.name for o in kernel.outputs)])
+    lines += [f"    {program.name}_{outer.name}({passed});", "}"]
+    return "\n".join([function(program, inner), function(program, outer), *lines]) + "\n"
 
 
 def declaration(program: Program, kernel: Kernel, *, name: str = "", returning: bool = False) -> str:

@@ -41,7 +41,9 @@ class Macros:
     def expanded(self, lines: Sequence[str]) -> list[str]:
         """The lines with what macros stand for; ValueError where one lacks arguments."""
         nothing = [name for name, macro in self._known.items() if macro == Macro(None, "")]
-        return [self._line(line) for line in _without_heads(lines, nothing)]
+        lines = _without_heads(lines, nothing)
+        expanded = [(line, self._line(line)) for line in lines]
+        return [text for line, text in expanded if text or not line]  # a statement that is nothing leaves no line
 
     def _line(self, line: str) -> str:
         """The line with what macros stand for. A comma, or nothing, has no blank before it."""

@@ -10,8 +10,9 @@ from dataclasses import replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
+from phigen.scheme.policies import POLICIES
 from phigen.scheme.program import Attitude, Program
-from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, Explicit, Gauss, Implicit, Newton, Path, Splitting, Sweeps
+from phigen.scheme.steps import Explicit, Gauss, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import special
 from phigen.targets.features import switches
 from phigen.targets.header import facts, header_lines, sealed
@@ -19,6 +20,7 @@ from phigen.targets.js.functions import definitions
 from phigen.targets.js.printing import LANGUAGE, camel, comment, key, properties, wrapped
 from phigen.targets.js.runtime import assembled
 from phigen.targets.path import TERMS, Syntax, statements, tangent_program
+from phigen.targets.policies import policies_of
 from phigen.targets.rendering import render
 
 PATH_SYNTAX = Syntax(LANGUAGE.printer, slope="s[{i}][k + 1] = s[{slope}][k] / (k + 1);", sums="taylor{Kind}")
@@ -45,7 +47,7 @@ def _lattice(program: Program, step: Sweeps) -> str:
     early = [_function(kernel) for kernel in (step.prepare, step.refresh) if kernel]
     pieces = [lattice.tables(program, step), *early, *_functions(program)]
     model = "\n\n".join(piece.strip("\n") for piece in (*pieces, *lattice.kernels(program, step)))
-    return f"{model}\n\n{assembled(lattice.modules(program, step), lattice.features(program, step))}\n"
+    return f"{model}\n\n{assembled(lattice.modules(program, step), lattice.features(program, step), POLICIES)}\n"
 
 
 def _system_of_coordinates(program: Program) -> str:
@@ -65,12 +67,16 @@ def _system_of_coordinates(program: Program) -> str:
     modules += ["tangent", f"tangent_{chosen}"] if program.extras.tangent else []
     algebra = not isinstance(step, Splitting) or program.searches_gauge or program.extras.tangent
     modules += ["algebra"] if algebra else []
-    return f"{_model(program)}\n\n{assembled(modules, features)}\n"
+    return f"{_model(program)}\n\n{assembled(modules, features, policies_of(program))}\n"
 
 
 def _functions(program: Program) -> list[str]:
     """Functions that the file defines itself."""
-    return definitions(special.used(program), special.entire_used(program), LANGUAGE.printer)
+    anomaly = special.calls_anomaly(program)
+    found = definitions(special.used(program), special.entire_used(program), LANGUAGE.printer, anomaly=anomaly)
+    if special.largest_exponential(program):
+        found.append(render("js", "matrix_exponential.mjs", special.exponential_constants()).strip("\n"))
+    return found
 
 
 def _model(program: Program) -> str:
@@ -146,18 +152,15 @@ def _table(program: Program) -> Mapping[str, object]:
 
 def _inner(step: Newton | Path) -> Mapping[str, object]:
     varied = step.tangent.recurrences if isinstance(step, Path) and step.tangent else None
-    floor = "0" if step.inner.relative else "1e-6"
     return {
         "max_iterations": step.inner.max_iterations,
         "tolerance": repr(step.inner.tolerance),
-        "floor": floor if isinstance(step, Newton) else "",
+        "newton": isinstance(step, Newton),
         "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
         "fixed": len(step.recurrences.fixed) if isinstance(step, Path) else 0,
         "tangent_series": len(varied.series) if varied else 0,
         "tangent_fixed": len(varied.fixed) if varied else 0,
         "terms": TERMS,
-        "longest_path": LONGEST_PATH,
-        "most_pieces": MOST_PIECES,
     }
 
 
@@ -221,6 +224,9 @@ def _function(kernel: Kernel) -> str:
     arrays = {argument: camel(argument) for argument in (*kernel.inputs, *(o.name for o in kernel.outputs))}
     head = f"function {camel(kernel.name)}({', '.join(arrays.values())}) {{"
     lines = [part for line in LANGUAGE.statements(kernel, arrays) for part in wrapped(line)]
+    stored = camel(kernel.outputs[0].name)
+    for start, n in kernel.exponentials:
+        lines.append(f"  matrixExponential({n}, {stored}.subarray({start}, {start + n * n}));")
     return "\n".join([*comment(kernel.purpose), head, *lines, "}"])
 
 

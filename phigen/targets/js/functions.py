@@ -13,13 +13,21 @@ from phigen.targets.printer import Printer
 from phigen.targets.rendering import render
 
 
-def definitions(phis: Sequence[str], entire: Sequence[str], printer: Callable[[Scope], Printer]) -> list[str]:
-    """The definitions of functions of `SPECIAL` and of `ENTIRE`."""
+def definitions(
+    phis: Sequence[str], entire: Sequence[str], printer: Callable[[Scope], Printer], *, anomaly: bool = False
+) -> list[str]:
+    """The definitions of functions of `SPECIAL` and of `ENTIRE`, and of the universal anomaly of Kepler motions."""
     found = [render("js", "phi.mjs", _phi(f)) for f in phis] + [
         render("js", "entire.mjs", _entire(f, printer)) for f in entire
     ]
+    found += [_anomaly()] if anomaly else []
     polynomial = [render("js", "polynomial.mjs", {})] if found else []
     return [text.strip("\n") for text in (*polynomial, *found)]
+
+
+def _anomaly() -> str:
+    c2, c3 = (_listed([float(c) for c in series]) for series in special.stumpff())
+    return render("js", "anomaly.mjs", {"c2": c2, "c3": c3, **special.anomaly_values()})
 
 
 def _listed(numbers: Sequence[float]) -> list[str]:

@@ -56,6 +56,7 @@ def _facts(program: Program, step: Sweeps) -> dict[str, object]:
         **facts(program, json.dumps, key),
         **lattice.tables(program, step, json.dumps),
         "kinds": json.dumps(step.casimir_kinds),
+        "reductions": json.dumps([[r.kind, r.over] for r in program.observables.reductions]),
         "properties": properties(program.parameters),
     }
 
@@ -90,7 +91,7 @@ def _functions(lattice: LatticeLoops) -> Iterator[ir.Function]:
     for sweep in step.sweeps:
         yield from map(lattice.sums, sweep.gather.ends if sweep.gather else ())
         yield lattice.sweep(sweep)
-    for gather in (step.others.energy, step.others.field, step.others.varied):
+    for gather in step.others.gathers:
         yield from map(lattice.sums, gather.ends)
     yield from map(lattice.stage, step.equation.kernels if step.equation else ())
     yield from map(lattice.observable, lattice.program.observables.kernels)

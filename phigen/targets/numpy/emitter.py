@@ -8,10 +8,6 @@ from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.path import Recurrences
 from phigen.scheme.program import Program
 from phigen.scheme.steps import (
-    MOST_RISING,
-    ROUNDING,
-    SOLVED,
-    STALLS,
     Adjoint,
     Explicit,
     Gauss,
@@ -120,7 +116,8 @@ def _step(program: Program) -> list[str]:
             return [*early, function(program, linearise), *parts]
         case Gauss(slope=slope, change=change) as step:
             values |= _gauss_values(step)
-            return [*early, function(program, slope), function(program, change), *rendered("gauss")]
+            kernels = [slope, change, *([step.frame] if step.frame else [])]
+            return [*early, *(function(program, kernel) for kernel in kernels), *rendered("gauss")]
         case Sweeps():
             raise AssertionError("lattices have a module of their own")
 
@@ -149,13 +146,11 @@ def _gauss_values(step: Gauss) -> dict[str, object]:
     return {
         "weights": listed(step.tableau.weights),
         "mixing": [", ".join(map(repr, row)) for row in step.tableau.mixing],
+        "prediction": [", ".join(map(repr, row)) for row in step.tableau.prediction],
+        "framed": step.frame is not None,
         "plain": step.plain,
         "unknowns": step.unknowns,
         "most_sweeps": step.most_sweeps,
-        "solved": repr(SOLVED),
-        "rounding": repr(ROUNDING),
-        "stalls": STALLS,
-        "most_rising": MOST_RISING,
     }
 
 

@@ -14,7 +14,25 @@ from phigen.targets.rendering import render
 def called(program: Program) -> list[str]:
     """Functions of `SPECIAL` and of `ENTIRE` that kernels call."""
     phis = [render("numpy", "phi.py", special.values(f, f"_{f}")) for f in special.used(program)]
-    return phis + [render("numpy", "entire.py", _entire(f)) for f in special.entire_used(program)]
+    entire = [render("numpy", "entire.py", _entire(f)) for f in special.entire_used(program)]
+    anomaly = [_anomaly()] if special.calls_anomaly(program) else []
+    return [*phis, *entire, *anomaly, *_exponentials(program)]
+
+
+def _exponentials(program: Program) -> list[str]:
+    """The exponential of matrices, if ``prepare`` takes some."""
+    if not special.largest_exponential(program):
+        return []
+    values = {"adjoint": special.transposes_exponentials(program), **special.exponential_constants()}
+    return [render("numpy", "matrix_exponential.py", values)]
+
+
+def _anomaly() -> str:
+    """The universal anomaly of Kepler motions."""
+    c2, c3 = ([repr(float(c)) for c in reversed(series)] for series in special.stumpff())
+    others = list(zip(c2[1:], c3[1:], strict=True))
+    values = {"c2_last": c2[0], "c3_last": c3[0], "others": others, **special.anomaly_values()}
+    return render("numpy", "anomaly.py", values)
 
 
 def _entire(function: str) -> Mapping[str, object]:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 
-from phigen.scheme.kernel import SCALARS, Kernel
+from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
 from phigen.symbolic.expression import Expression
@@ -20,6 +21,8 @@ from phigen.targets.reserved import PYTHON_RESERVED
 
 def function(program: Program, kernel: Kernel) -> str:
     """A kernel as a function: from arrays with any axes before that of the coordinates to such arrays."""
+    if kernel.exponents:
+        return _through_exponentials(program, kernel, kernel.exponents)
     code = lower(kernel)
     arguments = ", ".join("parameters" if i == "params" else i for i in kernel.inputs)
     lines = [f"def _{kernel.name}({arguments}):", *_docstring(kernel.purpose)]
@@ -30,6 +33,20 @@ def function(program: Program, kernel: Kernel) -> str:
     lines += [f"    {scope[a.target]} = {printer(a.value)}" for a in code.assignments]
     lines.append(_result(program, kernel, code, printer))
     return "\n".join(lines) + "\n"
+
+
+def _through_exponentials(program: Program, kernel: Kernel, inner: Kernel) -> str:
+    """The transpose of a kernel with exponentials: the matrices, their cotangents, and what follows from these."""
+    outer = replace(kernel, name=f"{kernel.name}_of_exponents", exponentials=(), exponents=None)
+    names = {i: "parameters" if i == "params" else i for i in kernel.inputs}
+    matrices = f"_{inner.name}({', '.join(names[i] for i in inner.inputs)})"
+    lines = [
+        f"def _{kernel.name}({', '.join(name for i, name in names.items() if i != EXPONENTS)}):",
+        *_docstring(kernel.purpose),
+        f"    {EXPONENTS} = _exponents_bar({matrices}, coef_bar, {kernel.exponentials!r})",
+        f"    return _{outer.name}({', '.join(names.values())})",
+    ]
+    return "\n\n".join([function(program, inner), function(program, outer), "\n".join(lines) + "\n"])
 
 
 def _docstring(text: str) -> list[str]:
@@ -52,6 +69,8 @@ def _result(program: Program, kernel: Kernel, code: Code, printer: Printer) -> s
     state = _state(kernel)
     if not state:
         lists = [_list([printer(v) for v in entries]) for entries in values.values()]
+        if kernel.exponentials:
+            lists[0] = f"_with_exponentials({lists[0]}, {kernel.exponentials!r})"
         return "    return " + ", ".join(lists)
     n = program.dimension
     arrays = []

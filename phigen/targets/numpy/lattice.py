@@ -9,13 +9,16 @@ from phigen.ir.lattice import LatticeLoops
 from phigen.ir.passes.temporaries import temporaries
 from phigen.ir.passes.whole_arrays import WholeArrays, identical, transposed_sums_name
 from phigen.scheme.kernel import Kernel
+from phigen.scheme.policies import POLICIES
 from phigen.scheme.program import Program
 from phigen.scheme.steps import BACK, Gather, Sweep, Sweeps
+from phigen.spec.names import OVER
 from phigen.targets import lattice
 from phigen.targets.header import facts
 from phigen.targets.numpy import functions
 from phigen.targets.numpy.language import listed, quoted
 from phigen.targets.numpy.loops import function
+from phigen.targets.policies import PYTHON
 from phigen.targets.rendering import render
 
 #: The templates of implicit steps.
@@ -24,9 +27,10 @@ _SERIES = ("lattice_series", "lattice_guesses", "lattice_newton")
 
 def body(program: Program, step: Sweeps, prepare: str) -> str:
     """The text of the module; ``prepare`` are the functions that compute coefficients."""
-    values = {
+    values: dict[str, object] = {
         **facts(program, listed, quoted),
         **lattice.tables(program, step, listed),
+        **{name: PYTHON.text(policy) for name, policy in POLICIES.items()},
         "schedule": repr(tuple(step.schedule.flows)),
         "by_colour": repr(step.by_colour),
     }
@@ -53,10 +57,19 @@ def body(program: Program, step: Sweeps, prepare: str) -> str:
     if step.adjoint:
         kind = "series" if step.equation else "splitting"
         pieces += [render("numpy", f"lattice_adjoint{part}.py", values) for part in (f"_{kind}", "")]
-    pieces += [render("numpy", "lattice_seen.py", values), prepare]
+    pieces += [render("numpy", "lattice_seen.py", {**values, **_reductions(program)}), prepare]
     pieces += functions.called(program)
     pieces += _functions(LatticeLoops(program, step))
     return "\n\n".join(piece.strip("\n") + "\n" for piece in pieces)
+
+
+def _reductions(program: Program) -> dict[str, object]:
+    """Return the rows of observables by the method of arrays that reduces them, and those that are means of bonds."""
+    reductions = program.observables.reductions
+    methods = ["mean" if r.kind == "mean" and r.over == "sites" else r.kind.replace("mean", "sum") for r in reductions]
+    rows = {m: [k for k, own in enumerate(methods) if own == m] for m in dict.fromkeys(methods)}
+    means = {over: [k for k, r in enumerate(reductions) if (r.kind, r.over) == ("mean", over)] for over in OVER}
+    return {"reduced": [*rows.items()], "over_bonds": means["bonds"], "over_pairs": means["pairs"]}
 
 
 def _table(name: str, comment: str, parts: Iterable[Iterable[Sweep]], suffix: str = "") -> str:
@@ -75,7 +88,7 @@ def _functions(loops: LatticeLoops) -> Iterator[str]:
     if step.partners and not step.others.graph:
         yield render("numpy", "pairs.py", {})
     gathers = [s.gather for s in step.sweeps if s.gather]
-    gathers += [g for g in (step.others.energy, step.others.field, step.others.varied) if g.names]
+    gathers += [g for g in step.others.gathers if g.names]
     yield from (function(summed(gather)) for gather in gathers)
     swept = [lowering.sweep(temporaries(loops.sweep(sweep))) for sweep in step.sweeps]
     yield from map(function, identical(swept))

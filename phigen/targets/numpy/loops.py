@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from phigen.ir import nodes as ir
-from phigen.ir.nodes import Role
+from phigen.ir.nodes import LoopRole
 from phigen.targets.numpy.language import LANGUAGE
 from phigen.targets.spelling import Dialect, Spelling
 
@@ -15,14 +15,14 @@ _BONDS = {"here", "there", "bond", "gathered"}
 _SWEEPS = {"v", "moved", "gathered", "colour", "window"}
 _TRANSPOSED = {"start", "bar", "own", "coef_bar", *_BONDS}
 _RESERVED = {
-    Role.SWEEP: _SWEEPS,
-    Role.TANGENT_SWEEP: _SWEEPS,
-    Role.STAGE: {"start", "gathered", "v"},
-    Role.OBSERVABLE: {"out", "gathered"},
-    Role.GATHER: {"v", "sums", *_BONDS},
-    Role.TRANSPOSED_SWEEP: {"change_bar", "colour", "window", *_TRANSPOSED},
-    Role.TRANSPOSED_STAGE: {"start_bar", *_TRANSPOSED},
-    Role.TRANSPOSED_GATHER: {"gathered_bar", "sums_bar", *_TRANSPOSED},
+    LoopRole.SWEEP: _SWEEPS,
+    LoopRole.TANGENT_SWEEP: _SWEEPS,
+    LoopRole.STAGE: {"start", "gathered", "v"},
+    LoopRole.OBSERVABLE: {"out", "gathered"},
+    LoopRole.GATHER: {"v", "sums", *_BONDS},
+    LoopRole.TRANSPOSED_SWEEP: {"change_bar", "colour", "window", *_TRANSPOSED},
+    LoopRole.TRANSPOSED_STAGE: {"start_bar", *_TRANSPOSED},
+    LoopRole.TRANSPOSED_GATHER: {"gathered_bar", "sums_bar", *_TRANSPOSED},
 }
 
 DIALECT = Dialect(LANGUAGE, operators={"not": "not "}, select="np.where({0}, {1}, {2})")

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from phigen.scheme.policies import PathPolicy
 from phigen.scheme.program import Program
-from phigen.scheme.steps import LONGEST_PATH, MOST_PIECES, PLAUSIBLE, Implicit, InnerSolve, Path, Splitting
+from phigen.scheme.steps import Implicit, InnerSolve, Path, Splitting
 from phigen.targets.header import facts, plain
 from phigen.targets.numpy.language import listed, quoted
 from phigen.targets.path import TERMS
+from phigen.targets.policies import PYTHON, policies_of
 
 _NOISE_ARGUMENTS = """ The random
     numbers are a function of seed, member (that of the first, or one for each) and the number of the step, from step0
@@ -25,7 +27,8 @@ _OF_TAU = """
 def values_of(program: Program) -> dict[str, object]:
     """All of it, by subjects."""
     said = {"title": plain(program.about.title) or program.name, **facts(program, listed, quoted)}
-    return {**said, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
+    policies = {name: PYTHON.text(policy) for name, policy in policies_of(program).items()}
+    return {**said, **policies, **_of_fixed(program), **_of_time(program), **_of_noise(program), **_of_step(program)}
 
 
 def _of_fixed(program: Program) -> dict[str, object]:
@@ -35,7 +38,7 @@ def _of_fixed(program: Program) -> dict[str, object]:
         "monitored": program.monitor is not None,
         "said_of_tau": _OF_TAU * bool(program.monitor),
         "said_of_gauge": _OF_LEVEL if program.monitor else _OF_GAUGE,
-        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), 1e-100" if program.held else "values, 1e-100",
+        "prepare_arguments": "values, np.zeros((len(GAUGE), 1)), PROBE_STEP" if program.held else "values, PROBE_STEP",
     }
 
 
@@ -57,6 +60,7 @@ def _of_step(program: Program) -> dict[str, object]:
     """The kind of step, its coefficients and stages, and by what its equation is solved."""
     step = program.step
     inner = step.inner if isinstance(step, Implicit) else InnerSolve()
+    longest = PathPolicy().longest_path
     return {
         "path": isinstance(step, Path),
         "splitting": isinstance(step, Splitting),
@@ -65,13 +69,9 @@ def _of_step(program: Program) -> dict[str, object]:
         "moments": listed(step.schedule.moments) if isinstance(step, Splitting) and step.refresh else "",
         "middles": listed(program.midpoints),
         "fractions": listed(program.fractions),
-        "plausible": repr(PLAUSIBLE),
         "max_iterations": inner.max_iterations,
         "tolerance": repr(inner.tolerance),
-        # The floor of the scale of a component: see _size.
-        "floor": "0.0" if inner.relative else "1e-6",
-        "path_pieces": repr(tuple(1 << k for k in range(LONGEST_PATH.bit_length()))),
-        "most_pieces": MOST_PIECES,
+        "path_pieces": repr(tuple(1 << k for k in range(longest.bit_length()))),
         "terms": TERMS,
         "series": len(step.recurrences.series) if isinstance(step, Path) else 0,
     }

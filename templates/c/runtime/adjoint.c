@@ -7,9 +7,7 @@
 #include "algebra.c"
 #include "model.h"
 #include "solver.c"
-#if PHI_TRACED
 #include "adjoint_lanes.c"
-#endif
 
 /* Go back to where the step begins that led to s, but for the state. */
 static void phi_go_back(phi_solver *s)
@@ -201,11 +199,7 @@ static phi_status phi_leave_trail(phi_solver *s, size_t steps, size_t stride, do
 
 #if PHI_PARAMETERS || PHI_MONITOR
 /* Add the cotangents of parameters that follow from those of coefficients. */
-#if PHI_MONITOR
-static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, phi_params *params_bar, double *e_bar)
-#else
-static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, phi_params *params_bar)
-#endif
+static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, phi_params *params_bar PHI_AND_DOUBLE(e_bar))
 {
     double found[sizeof(phi_params) / sizeof(double) + 1];
 #if PHI_PARAMETERS
@@ -230,13 +224,7 @@ static void phi_add_parameters(const phi_solver *s, const phi_cotangent *bar, ph
 #endif
 #else
     PHI_EACH_STAGE {
-#if PHI_MONITOR
-        phi_prepare_adjoint(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found, level);
-#elif PHI_GAUGE
-        phi_prepare_adjoint(&s->params, s->gauge, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found);
-#else
-        phi_prepare_adjoint(&s->params, PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found);
-#endif
+        phi_prepare_adjoint(&s->params PHI_AND_GAUGE(s->gauge), PHI_FRACTION(s->h), PHI_OF(bar->coef, stage), found PHI_AND_LEVEL(level));
 #endif
 #if PHI_PARAMETERS
         for (size_t i = 0; i < sizeof sums / sizeof sums[0]; ++i) sums[i] += found[i];

@@ -3,11 +3,8 @@
 #include <string.h>
 
 #include "adjoint_members.c"
-#if PHI_GROUPS
 #include "groups.c"
-#else
 #include "packs.c"
-#endif
 #include "model.h"
 #include "solver.c"
 

@@ -3,25 +3,12 @@
 #include <string.h>
 
 #include "model.h"
-#if PHI_ABREAST
 #include "adjoint_groups.c"
-#else
 #include "adjoint_members.c"
-#endif
 
-#if PHI_TIMED
-phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *t0, const double *h,
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
     double *trail, unsigned char *status)
-#elif PHI_GAUGE
-phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *gauge, const double *h,
-    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
-    double *trail, unsigned char *status)
-#else
-phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *h,
-    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
-    double *trail, unsigned char *status)
-#endif
 {
     phi_status result = PHI_OK;
     const int given = x0 != NULL && h != NULL && rows_bar != NULL && x0_bar != NULL && trail != NULL && stride > 0;
@@ -35,11 +22,7 @@ phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t 
     all.x0 = x0;
     all.h = h;
     all.rows_bar = rows_bar;
-#if PHI_TIMED
-    all.t0 = t0;
-#elif PHI_GAUGE
-    all.gauge = gauge;
-#endif
+    PHI_TAKE_OWN
     all.members = members;
     all.steps = steps;
     all.stride = stride;

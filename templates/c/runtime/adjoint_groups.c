@@ -3,11 +3,8 @@
 #include <string.h>
 
 #include "adjoint_abreast.c"
-#if PHI_SPLITTING
 #include "adjoint_segments.c"
-#else
 #include "adjoint_kept.c"
-#endif
 #include "model.h"
 
 /* What was found for a member. 0 where it has values that are not finite. */

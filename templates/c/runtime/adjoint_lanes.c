@@ -4,9 +4,7 @@
 #include <string.h>
 
 #include "adjoint_stage.c"
-#if PHI_PATH
 #include "expansion_lanes.c"
-#endif
 #include "model.h"
 #include "model_lanes.h"
 #include "solver.c"

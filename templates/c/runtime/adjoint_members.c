@@ -24,13 +24,7 @@ static phi_status phi_pull_begin(const phi_pulled *all, size_t m, phi_solver *s)
 {
     const phi_params *params = all->params != NULL ? all->params + m : NULL;
     const double *x0 = all->x0 + m * PHI_DIM;
-#if PHI_GAUGE
-    return phi_init_gauge(s, params, x0, all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL);
-#elif PHI_TIMED
-    return phi_init_at(s, params, x0, all->t0[m]);
-#else
-    return phi_init(s, params, x0);
-#endif
+    return PHI_INIT_OWN(s, params, x0, all->t0[m], all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL);
 }
 
 #if PHI_MONITOR

@@ -4,7 +4,6 @@
 #include <math.h>
 #include <string.h>
 
-#include "macros/attitude.h"
 #include "model.h"
 
 /* ---- Attitude ---- */
@@ -37,7 +36,7 @@ static void phi_normalise(const double g[PHI_ELEMENT], double factor[PHI_ELEMENT
 #endif
             excess[i * N + j] = 0.5 * sum;
         }
-    PHI_ADDED(excess, factor, change);
+    PHI_ADDED_FACTOR(excess, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) factor[i] -= excess[i] + change[i];
 }
 
@@ -231,7 +230,7 @@ static inline void phi_turn_by(phi_solver *s, double factor[PHI_ELEMENT])
         for (int i = 0; i < PHI_ELEMENT; ++i) carry[i] += change[i];
     }
 #endif
-    PHI_ADDED(element, factor, change);
+    PHI_ADDED_FACTOR(element, factor, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) {
         const double moved = change[i] + carry[i], sum = s->turned[i] + moved;
         s->turned_carry[i] = moved - (sum - s->turned[i]);
@@ -275,7 +274,7 @@ static void phi_joined(const double first[PHI_ELEMENT], const double second[PHI_
 #else
     whole[0] += 1.0;
 #endif
-    PHI_ADDED(whole, second, change);
+    PHI_ADDED_FACTOR(whole, second, change);
     for (int i = 0; i < PHI_ELEMENT; ++i) both[i] = first[i] + change[i];
 }
 
@@ -311,11 +310,7 @@ static void phi_read_attitude(phi_solver *s)
 /* Where x or the attitude has been set: the rate at which the Casimirs that are taken from H turn from here on. */
 static void phi_take_rate(phi_solver *s)
 {
-#if PHI_GAUGE
-    phi_rate(&s->params, s->gauge, s->x, s->rate);
-#else
-    phi_rate(&s->params, s->x, s->rate);
-#endif
+    phi_rate(&s->params PHI_AND_GAUGE(s->gauge), s->x, s->rate);
 #if !PHI_MATRICES
     phi_carry_rate(s->turned, s->rate);
 #endif
@@ -340,11 +335,7 @@ static void phi_begin_attitude(phi_solver *s, const double first[PHI_ELEMENT])
     phi_read_attitude(s);
 }
 
-#if PHI_POSITION
-phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE], const double position[3])
-#else
-phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE])
-#endif
+phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]))
 {
     double first[PHI_ELEMENT], size = 0.0;
     if (s == NULL || attitude == NULL) return PHI_BAD_ARGUMENT;

@@ -5,9 +5,7 @@
 #include "attitude.c"
 #include "members.c"
 #include "model.h"
-#if PHI_NOISE
 #include "noise.c"
-#endif
 
 /* ---- Members with attitudes ---- */
 /* Start a member with the attitude and the random numbers that the ensemble has for it. */
@@ -16,11 +14,7 @@ static phi_status phi_take_turned(const phi_members *all, size_t m, double x[PHI
     double element[PHI_ELEMENT];
     phi_status status = phi_take_member(all, m, x, s);
     for (size_t i = 0; i < PHI_ELEMENT; ++i) element[i] = all->attitude[i * all->members + m];
-#if PHI_POSITION
-    if (status == PHI_OK) status = phi_set_attitude(s, element, element + 4);
-#else
-    if (status == PHI_OK) status = phi_set_attitude(s, element);
-#endif
+    if (status == PHI_OK) status = phi_set_attitude(s, element PHI_AND_POSITION(element + 4));
 #if PHI_NOISE
     if (status == PHI_OK) status = phi_set_noise(s, all->seed, all->first_member + (uint32_t)m, all->first_step);
 #endif
@@ -43,15 +37,9 @@ static phi_status phi_turn_member(const phi_members *all, size_t m)
 
 /* The arguments are in the order of phi_ensemble_each and phi_ensemble_of. */
 phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *attitude, size_t members,
-#if PHI_TIMED
-    const double *t0,
-#elif PHI_GAUGE
-    const double *gauge,
-#endif
+    PHI_OWN_POINTER
     const double *h, size_t steps,
-#if PHI_NOISE
-    uint64_t seed, uint32_t first_member, uint64_t first_step,
-#endif
+    PHI_RANDOM_NUMBERS
     size_t stride, double *frames, double *attitudes, unsigned char *status)
 {
     phi_members all = phi_asked(params, x, members, h, steps, status);

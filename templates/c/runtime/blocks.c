@@ -136,11 +136,7 @@ static void phi_runge_kutta(const phi_solver *s, double h, double x[PHI_DIM], do
     memcpy(point, x, sizeof point);
     memset(mean, 0, PHI_DIM * sizeof mean[0]);
     for (int part = 0; part < 4; ++part) {
-#if PHI_TIMED
-        phi_slope(s, t + after[part] * h, point, slope);
-#else
-        phi_slope(s, point, slope);
-#endif
+        phi_slope(s PHI_AND_T(t + after[part] * h), point, slope);
         for (int i = 0; i < PHI_DIM; ++i) {
             mean[i] += weight[part] * slope[i];
             point[i] = x[i] + h * reach[part] * slope[i];
@@ -175,11 +171,7 @@ static void phi_stride(const phi_solver *s, double t, double h, double x[PHI_DIM
 static void phi_note_slope(const phi_solver *s, double slope[PHI_DIM][PHI_SLOPES], int done, const double x[PHI_DIM])
 {
     double here[PHI_DIM];
-#if PHI_TIMED
-    phi_slope(s, s->t + (done - PHI_PAST) * s->h, x, here);
-#else
-    phi_slope(s, x, here);
-#endif
+    phi_slope(s PHI_AND_T(s->t + (done - PHI_PAST) * s->h), x, here);
     for (int i = 0; i < PHI_DIM; ++i) slope[i][done] = here[i];
 }
 
@@ -399,11 +391,7 @@ static int phi_elapse(const phi_solver *s, phi_table *table, phi_model *model, p
 static void phi_take_stage(phi_lanes turns[PHI_ELEMENT] PHI_AND_INT_STAGE, double sequence[][PHI_ELEMENT])
 {
     for (int lane = 0; lane < PHI_LANES; ++lane)
-#if PHI_COMPOSED
-        for (int i = 0; i < PHI_ELEMENT; ++i) sequence[PHI_STAGES * lane + stage][i] = turns[i][lane];
-#else
-        for (int i = 0; i < PHI_ELEMENT; ++i) sequence[lane][i] = turns[i][lane];
-#endif
+        for (int i = 0; i < PHI_ELEMENT; ++i) sequence[PHI_STAGE_OF_LANE][i] = turns[i][lane];
 }
 
 #if PHI_TURNED_BY_COVECTOR
@@ -571,11 +559,7 @@ static phi_status phi_single(phi_solver *s)
 {
     const size_t before = s->evaluations;
     const phi_status status = phi_single_steps(s, s->h, 1);
-#if PHI_COMPOSED
-    const double evaluations = (double)(s->evaluations - before) / (double)PHI_STAGES;
-#else
-    const double evaluations = (double)(s->evaluations - before);
-#endif
+    const double evaluations = (double)(s->evaluations - before) PHI_PER_STAGE;
     s->blocks.evaluations_per_stage += PHI_LATEST * (evaluations - s->blocks.evaluations_per_stage);
     return status;
 }

@@ -3,18 +3,11 @@
 #include <math.h>
 
 #include "model.h"
-#if PHI_GROUPS
 #include "groups.c"
-#elif PHI_PACKS
 #include "packs.c"
-#elif PHI_EACH
 #include "members.c"
-#else
 #include "solver.c"
-#endif
-#if PHI_ATTITUDES
 #include "attitudes.c"
-#endif
 
 #if PHI_EACH || PHI_NOISE
 /* ---- Ensembles ---- */
@@ -60,13 +53,8 @@ static phi_status phi_run(const phi_members *all)
 
 #endif
 #if PHI_EACH || PHI_GROUPS || PHI_PACKS
-#if PHI_TIMED
-phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+phi_status PHI_ENSEMBLE_AT(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     unsigned char *status)
-#else
-phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
-    unsigned char *status)
-#endif
 {
     const phi_params shared = params != NULL ? *params : phi_default_params;
     phi_members all = phi_asked(&shared, x, members, &h, steps, status);
@@ -79,19 +67,8 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 }
 
 #else
-#if PHI_NOISE && PHI_TIMED
-phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
-    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
-#elif PHI_NOISE
-phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double h, size_t steps,
-    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status)
-#elif PHI_TIMED
-phi_status phi_ensemble_at(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
-    unsigned char *status)
-#else
-phi_status phi_ensemble(const phi_params *params, double *x, size_t members, double h, size_t steps,
-    unsigned char *status)
-#endif
+phi_status PHI_ENSEMBLE_OF(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
+    PHI_RANDOM_NUMBERS unsigned char *status)
 {
     phi_status result = isfinite(h) ? PHI_OK : PHI_BAD_ARGUMENT;
 #if PHI_NOISE
@@ -106,11 +83,7 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
     for (size_t m = 0; m < members; ++m) {
         phi_solver s;
         for (size_t i = 0; i < PHI_DIM; ++i) s.x[i] = x[i * members + m];
-#if PHI_TIMED
-        phi_status ended = phi_init_at(&s, params, s.x, t0);
-#else
-        phi_status ended = phi_init(&s, params, s.x);
-#endif
+        phi_status ended = PHI_INIT_AT(&s, params, s.x, t0);
 #if PHI_NOISE
         if (ended == PHI_OK) phi_set_noise(&s, seed, first_member + (uint32_t)m, first_step);
 #endif

@@ -17,9 +17,7 @@ static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE)
 }
 
 #elif PHI_SPLITTING
-#if PHI_ATTITUDE
 #include "attitude.c"
-#endif
 #include "flows.h"
 
 /* The coefficients of all flows of a step: a row for each time. */

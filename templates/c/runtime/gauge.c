@@ -5,15 +5,9 @@
 #include <string.h>
 
 #include "model.h"
-#if PHI_GAUGE_SEARCH
 
 /* ---- The choice of the gauge: multiples of Casimirs taken from H ---- */
-enum {
-    PHI_SAMPLES = 32, /* states along a short piece of the trajectory */
-    PHI_DEGREE = 6, /* S_3 is cubic in H, so the square of the error is of degree six in each multiple */
-    PHI_SWEEPS = 4 /* most rounds over the multiples */
-};
-#define PHI_CLOSE_CALL 1e-12 /* errors, in sizes of all on a line, that are as good: rounding does not decide */
+#include "gauge_search.h"
 
 /* The direction of the motion at a point, of size 1; 0 where there is none. */
 static void phi_direction(const phi_params *params, const double at[PHI_DIM], double direction[PHI_DIM])
@@ -31,7 +25,7 @@ static void phi_sample(const phi_params *params, const double x[PHI_DIM], double
     double direction[PHI_DIM], middle[PHI_DIM], length = 0.0;
     for (int i = 0; i < PHI_DIM; ++i) {
         samples[0][i] = x[i];
-        length += 0.25 * fabs(x[i]);
+        length += PHI_SAMPLE_LENGTH * fabs(x[i]);
     }
     for (int k = 1; k < PHI_SAMPLES; ++k) {
         const double *y = samples[k - 1];
@@ -57,7 +51,7 @@ static double phi_gauge_error(const phi_params *params, const double gauge[PHI_G
 static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 {
     double error = difference[PHI_DEGREE];
-    for (int k = PHI_DEGREE - 1; k >= 0; --k) error = difference[k] + (t + 3.0 - k) / (k + 1) * error;
+    for (int k = PHI_DEGREE - 1; k >= 0; --k) error = difference[k] + (t + PHI_DEGREE / 2 - k) / (k + 1) * error;
     return error;
 }
 
@@ -65,18 +59,18 @@ static double phi_on_line(const double difference[PHI_DEGREE + 1], double t)
 static double phi_least_on_line(const phi_params *params, const double gauge[PHI_GAUGES], int c, double width,
     double samples[][PHI_DIM])
 {
-    double moved[PHI_GAUGES], difference[PHI_DEGREE + 1], size = 0.0, best = 0.0, mesh = 0.125;
+    double moved[PHI_GAUGES], difference[PHI_DEGREE + 1], size = 0.0, best = 0.0, mesh = PHI_MESH;
     memcpy(moved, gauge, sizeof moved);
     for (int j = 0; j <= PHI_DEGREE; ++j) {
-        moved[c] = gauge[c] + (j - 3) * width;
+        moved[c] = gauge[c] + (j - PHI_DEGREE / 2) * width;
         difference[j] = phi_gauge_error(params, moved, samples);
         size += difference[j];
     }
     for (int order = 1; order <= PHI_DEGREE; ++order)
         for (int j = PHI_DEGREE; j >= order; --j) difference[j] -= difference[j - 1];
     double least = phi_on_line(difference, best);
-    for (int level = 0; level < 3; ++level, mesh *= 0.125) {
-        const int reach = level == 0 ? 24 : 8;
+    for (int level = 0; level < PHI_GRIDS; ++level, mesh *= PHI_MESH) {
+        const int reach = level == 0 ? PHI_FIRST_REACH : PHI_REACH_OF_GRID;
         const double centre = best;
         for (int j = -reach; j <= reach; ++j) {
             const double t = centre + j * mesh, error = phi_on_line(difference, t);
@@ -114,18 +108,4 @@ static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], 
     }
     if (!isfinite(phi_gauge_error(params, gauge, samples))) memset(gauge, 0, PHI_GAUGES * sizeof gauge[0]);
 }
-
-#else
-/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where that gives
-   nothing finite. */
-static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
-{
-    double out[1 + 2 * PHI_GAUGES];
-    phi_products(params, x, out);
-    for (int c = 0; c < PHI_GAUGES; ++c) {
-        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
-        gauge[c] = isfinite(multiple) ? multiple : 0.0;
-    }
-}
-#endif
 #endif

@@ -28,37 +28,39 @@ static void phi_start(const phi_solver *s, double point[PHI_POINT])
 #endif
 }
 
-/* h b_j times the vector field at all stages, where the unknowns are z. */
-static void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *z, phi_lanes *moves)
+/* h b_j times the vector field at all stages, where the unknowns are z; the weights are h b_j. */
+static inline void phi_slopes(const phi_solver *s, double point[PHI_POINT], phi_lanes *weights, phi_lanes *z, phi_lanes *moves)
 {
 #if PHI_STAGED
-    phi_stage_field_lanes(s->coef, point, z, moves);
-    for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        double *move = moves[k];
-        PHI_EACH_LANE
-        for (int lane = 0; lane < PHI_WIDTH; ++lane) move[lane] *= s->h * phi_weights[lane];
-    }
+    phi_stage_field_lanes(s->coef, point, z, weights, moves);
 #else
-    double at[PHI_UNKNOWNS], slope[PHI_UNKNOWNS];
+    double at[PHI_UNKNOWNS], move[PHI_UNKNOWNS];
     for (int i = 0; i < PHI_NODES; ++i) {
         for (int k = 0; k < PHI_UNKNOWNS; ++k) at[k] = z[k][i];
-        phi_stage_field(s->coef, point, at, slope);
-        for (int k = 0; k < PHI_UNKNOWNS; ++k) moves[k][i] = s->h * phi_weights[i] * slope[k];
+        phi_stage_field(s->coef, point, at, &weights[0][i], move);
+        for (int k = 0; k < PHI_UNKNOWNS; ++k) moves[k][i] = move[k];
     }
 #endif
 }
 
-/* The largest change at any stage, in sizes of the unknowns: of coordinates the norm of x, of group elements 1. */
-static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lanes *after)
+/* The square of the size of coordinates, that of x; where x is 0 that of the moves. */
+static double phi_square(const double x[PHI_DIM], phi_lanes *moves)
 {
-    double norm = DBL_MIN, largest = 0.0;
-    phi_lanes sum = { 0.0 };
-    for (int i = 0; i < PHI_DIM; ++i) norm += x[i] * x[i];
-    if (norm <= DBL_MIN)
+    double square = DBL_MIN;
+    for (int i = 0; i < PHI_DIM; ++i) square += x[i] * x[i];
+    if (square <= DBL_MIN)
         for (int k = 0; k < PHI_PLAIN; ++k)
-            for (int i = 0; i < PHI_NODES; ++i) norm += after[k][i] * after[k][i];
+            for (int i = 0; i < PHI_NODES; ++i) square += moves[k][i] * moves[k][i];
+    return square;
+}
+
+/* The largest change at any stage, in sizes of the unknowns: of coordinates that of x, of group elements 1. */
+static double phi_change_of(double square, phi_lanes *before, phi_lanes *after)
+{
+    double largest = 0.0;
+    phi_lanes sum = { 0.0 };
     for (int k = 0; k < PHI_UNKNOWNS; ++k) {
-        const double *old = before[k], *now = after[k], scale = k < PHI_PLAIN ? 1.0 / norm : 1.0;
+        const double *old = before[k], *now = after[k], scale = k < PHI_PLAIN ? 1.0 / square : 1.0;
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_WIDTH; ++lane) sum[lane] += (now[lane] - old[lane]) * (now[lane] - old[lane]) * scale;
     }
@@ -67,50 +69,50 @@ static double phi_change_of(const double x[PHI_DIM], phi_lanes *before, phi_lane
     return sqrt(largest);
 }
 
-enum {
-    PHI_STALLS = 2,      /* changes in the size of rounding that are not less than those before: no more is to be gained */
-    PHI_MOST_RISING = 3, /* sweeps one after the other that change more than those before: the step is too large */
-    PHI_PROBE = 16       /* every so many steps it is tried whether one sweep less will do */
-};
-#define PHI_SOLVED 2e-18   /* what a next sweep may change; 2e-17 leaves a linear drift of energy and Casimirs */
-#define PHI_ROUNDING 2e-14 /* changes below this that do not shrink are rounding */
+#include "gauss_policy.h"
 
-/* Solve for the moves of all stages by sweeps, from those that the last step predicts. Changes are looked at only from that
-   sweep on that was the last one in the step before. */
+/* Solve for the moves of all stages by sweeps, from those that the last step predicts. The change by a sweep is looked at from
+   that sweep on that was the last one in the step before, or from the one before it. */
 static phi_status phi_collocate(phi_solver *s, double point[PHI_POINT], phi_lanes *moves)
 {
     phi_history *past = &s->history;
-    phi_lanes z[PHI_UNKNOWNS], next[PHI_UNKNOWNS];
+    phi_lanes z[PHI_UNKNOWNS], next[PHI_UNKNOWNS], weights[1] = { { 0.0 } };
     double last = HUGE_VAL;
-    int rising = 0, stalls = 0;
+    int rising = 0, rises = 0;
+    for (int i = 0; i < PHI_NODES; ++i) weights[0][i] = s->h * phi_weights[i];
     if (past->count > 0) {
-        phi_lanes known[PHI_UNKNOWNS];
-        memcpy(known, past->moves, sizeof known);
-        phi_mixed(phi_prediction, known, z);
+        memcpy(next, past->moves, sizeof next); /* which need not be aligned as lanes are */
+        phi_mixed(phi_prediction, next, z);
     } else {
         memset(z, 0, sizeof z);
         past->rate = 0.5;
         past->sweeps = 2;
     }
-    phi_slopes(s, point, z, moves);
+    phi_slopes(s, point, weights, z, moves);
+    const double square = phi_square(s->x, moves);
     for (int sweep = 2; sweep <= PHI_MAX_SWEEPS; ++sweep) {
         phi_mixed(phi_mixing, moves, z);
-        phi_slopes(s, point, z, next);
         ++s->evaluations;
         if (sweep < past->sweeps) {
-            memcpy(moves, next, sizeof next);
+            phi_slopes(s, point, weights, z, moves);
             continue;
         }
-        const double change = phi_change_of(s->x, moves, next), rate = change / last;
+        phi_slopes(s, point, weights, z, next);
+        const double change = phi_change_of(square, moves, next), rate = change / last;
         memcpy(moves, next, sizeof next);
         if (!isfinite(change)) return PHI_NOT_FINITE;
-        if (rate < 1.0 && last < HUGE_VAL && change > PHI_ROUNDING) past->rate = 0.7 * past->rate + 0.3 * rate;
-        if (change * past->rate <= PHI_SOLVED || (change <= PHI_ROUNDING && change >= last && ++stalls == PHI_STALLS)) {
-            past->sweeps = sweep > 2 && past->count % PHI_PROBE == 0 ? sweep - 1 : sweep;
+        if (rate > 0.0 && rate < 1.0 && change > PHI_NEARLY_ROUNDING) past->rate = 0.7 * past->rate + 0.3 * rate;
+        const int solved = change * past->rate <= PHI_SOLVED;
+        const int slow = rate >= 1.0 || rate > fmax(PHI_STALLED, 1.5 * past->rate);
+        if (rate >= 1.0 && change <= PHI_NEARLY_ROUNDING) ++rises;
+        if (solved || (slow && change <= PHI_ROUNDING) || rises > 1) {
+            if (sweep == past->sweeps || rate > 2.0 * past->rate) --past->sweeps; /* the first change was rounding too */
+            else past->sweeps = sweep - 1;
+            if (past->sweeps < 2) past->sweeps = 2;
             return PHI_OK;
         }
-        rising = rate >= 1.0 ? rising + 1 : 0;
-        if (rising >= PHI_MOST_RISING) return PHI_NO_CONVERGENCE;
+        rising = rate >= 1.0 ? rising + 1 : 0; /* transients may rise over as many sweeps as there are stages */
+        if (rising >= (int)PHI_NODES + PHI_MOST_RISING) return PHI_NO_CONVERGENCE;
         last = change;
     }
     return PHI_NO_CONVERGENCE;
@@ -145,7 +147,7 @@ static phi_status phi_attempt(phi_solver *s)
 #else
     memcpy(past->moves, moves, sizeof moves);
 #endif
-    past->count = past->count % PHI_PROBE + 1;
+    past->count = 1;
     return PHI_OK;
 }
 #endif

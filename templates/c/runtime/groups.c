@@ -327,11 +327,7 @@ static phi_status phi_group_end(const phi_group *group, int lane, const phi_memb
     if (status != PHI_OK) {
         phi_end_member(all, m, 0, NULL, status);
     } else if (group->steps_left[lane] > 0) {
-#if PHI_GAUGE
-        const phi_status begun = phi_begin_member(all, m, x, group->gauge[lane], &s);
-#else
-        const phi_status begun = phi_begin_member(all, m, x, &s);
-#endif
+        const phi_status begun = phi_begin_member(all, m, x PHI_AND_GAUGE(group->gauge[lane]), &s);
         for (int i = 0; i < PHI_DIM && begun == PHI_OK; ++i) s.carry[i] = group->carry[i][lane];
         status = phi_end_member(all, m, all->steps - group->steps_left[lane], &s, begun);
         if (begun == PHI_OK) memcpy(x, s.x, sizeof x);

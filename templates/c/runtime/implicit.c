@@ -5,13 +5,11 @@
 
 #include "model.h"
 
-#if PHI_RECURRENCES
 #include "recurrence.c"
 
-#endif
 #if PHI_GUESSED
 /* ---- Starting guesses ---- */
-#define PHI_REACH 4.0 /* how far from the last value a guess may be, in sizes of that value */
+#include "predictor_policy.h"
 
 #if PHI_RECURRENCES
 /* Whether a guess is where the next values may be. Far away the equation of a step has solutions that have nothing to do
@@ -156,8 +154,7 @@ static void phi_remember(phi_history *history, const double value[PHI_DIM])
 
 #endif
 #endif
-#define PHI_PLAUSIBLE 1.5 /* how far any step may lead, in sizes of the state and of its motion */
-#define PHI_LOST 0.5      /* part of the energy that one which leads farther must not lose */
+#include "plausibility_policy.h"
 
 /* Whether an increment is that of the motion. Where the step is too large, the equation may have been solved by a point far
    away, at another energy, that has nothing to do with it. */
@@ -169,11 +166,7 @@ static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double inc
         size += fabs(s->x[i]);
     }
     if (moved <= PHI_PLAUSIBLE * size) return 1;
-#if PHI_TIMED
-    phi_vector_field(&s->params, s->t, s->x, field);
-#else
-    phi_vector_field(&s->params, s->x, field);
-#endif
+    phi_vector_field(&s->params PHI_AND_T(s->t), s->x, field);
 #if PHI_MONITOR
     const double rate = phi_monitor(&s->params, s->x);
     for (int i = 0; i < PHI_DIM; ++i) size += fabs(PHI_FRACTION(s->h) * rate * field[i]);
@@ -182,21 +175,13 @@ static int phi_plausible(const phi_solver *s PHI_AND_INT_STAGE, const double inc
 #endif
 #if PHI_NOISE
     double fields[PHI_SOURCES * PHI_DIM];
-#if PHI_TIMED
-    phi_noise_fields(&s->params, s->t, s->x, fields);
-#else
-    phi_noise_fields(&s->params, s->x, fields);
-#endif
+    phi_noise_fields(&s->params PHI_AND_T(s->t), s->x, fields);
     for (int k = 0; k < PHI_SOURCES * PHI_DIM; ++k) size += fabs(s->dw[k / PHI_DIM] * fields[k]);
 #endif
     if (moved <= PHI_PLAUSIBLE * size) return 1;
     for (int k = 0; k < 3; ++k) { /* before, halfway, after */
         for (int i = 0; i < PHI_DIM; ++i) point[i] = s->x[i] + 0.5 * (double)k * increment[i];
-#if PHI_TIMED
-        H[k] = phi_hamiltonian(&s->params, s->t, point);
-#else
-        H[k] = phi_hamiltonian(&s->params, point);
-#endif
+        H[k] = phi_hamiltonian(&s->params PHI_AND_T(s->t), point);
     }
     return fabs(H[2] - H[0]) <= PHI_LOST * (fabs(H[0]) + fabs(H[1]) + fabs(H[2]));
 }

@@ -10,11 +10,10 @@
 #include "lane_functions.c"
 #include "sweeps.h"
 #include "graph.c"
-#if PHI_NOISE
 #include "lattice_noise.c"
-#endif
 
 /* ---- The lattice ---- */
+#include "start_policy.h"
 #if PHI_SERIES
 /* Before a loop over pieces: they are worked at in parallel. */
 #ifdef _OPENMP
@@ -201,9 +200,7 @@ static void phi_put_kinds(const phi_solver *s)
             }
             row[i] = (double)(window * PHI_COLOUR_COUNT + colour % PHI_COLOUR_COUNT);
         }
-#if PHI_HALO
-        phi_ends(row, s->length, 0, s->length);
-#endif
+        PHI_COPY_ENDS(row, s->length, 0, s->length)
     }
 }
 
@@ -351,7 +348,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const size_t sizes[
 #else
     double coef[PHI_COEFFICIENTS];
 #endif
-    phi_prepare_step(&own, 1e-100, coef);
+    phi_prepare_step(&own, PHI_PROBE_STEP, coef);
     if (!phi_finite(coef, PHI_COEFFICIENTS)) return PHI_BAD_ARGUMENT;
     memset(s, 0, sizeof *s);
     memcpy(s->sizes, sizes, sizeof s->sizes);
@@ -492,11 +489,8 @@ static void phi_vector(const phi_solver *s, size_t number, double *v[PHI_DIM])
 }
 
 #endif
-#if PHI_SERIES
 #include "lattice_stages.c"
-#else
 #include "lattice_flows.c"
-#endif
 
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
@@ -532,9 +526,7 @@ static phi_status phi_move(phi_solver *s, const double *x, double kept)
                 if (!isfinite(moved)) return PHI_BAD_ARGUMENT;
                 row[i] = moving ? moved : row[i];
             }
-#if PHI_HALO
-            phi_ends(row, s->length, 0, s->length);
-#endif
+            PHI_COPY_ENDS(row, s->length, 0, s->length)
         }
 #if PHI_COMPENSATED
     phi_forget(s);
@@ -549,13 +541,9 @@ phi_status phi_set_state(phi_solver *s, const double *x) { return phi_move(s, x,
 phi_status phi_kick(phi_solver *s, const double *change) { return phi_move(s, change, 1.0); }
 #endif
 
-#if PHI_TANGENT
 #include "lattice_tangent.c"
-#endif
 
-#if PHI_ADJOINT
 #include "lattice_adjoint.c"
-#endif
 
 #if !PHI_SERIES && !PHI_NOISE || !PHI_SERIES && PHI_NEAR
 int phi_saved(const phi_solver *s, double *x, size_t *far)
@@ -644,10 +632,63 @@ void phi_vector_field(const phi_solver *s, double *out)
         phi_vector_field_row(&row, PHI_VALUES_AT(out));
     }
 }
+#if PHI_OBSERVED
 
-#if PHI_BY_HAND
-#include "lattice_by_hand.c"
+/* Adds densities of one observable to their sum, compensated after A. Neumaier, or takes the largest or least of them. */
+static void phi_reduce(int kind, size_t count, const double *density, double *sum, double *rest)
+{
+    for (size_t i = 0; i < count; ++i) {
+        const double next = density[i], total = *sum + next;
+        if (kind < 2) {
+            *rest += fabs(*sum) >= fabs(next) ? (*sum - total) + next : (next - total) + *sum;
+            *sum = total;
+        } else if (next != next || (kind == 2 ? next > *sum : next < *sum)) {
+            *sum = next; /* one that is not a number stays, as no other is larger or less */
+        }
+    }
+}
+
+void phi_observables(const phi_solver *s, double *out)
+{
+    double density[PHI_OBSERVABLES * PHI_SHARE], rest[PHI_OBSERVABLES] = { 0.0 };
+    for (int k = 0; k < PHI_OBSERVABLES; ++k) {
+        const int kind = phi_reductions[k][0];
+        out[k] = kind < 2 ? 0.0 : kind == 2 ? -HUGE_VAL : HUGE_VAL;
+    }
+    PHI_EACH_ROW {
+        phi_row row = PHI_WHOLE_ROW;
+        for (row.to = 0; row.to < s->length;) {
+            row.from = row.to;
+            row.to = s->length - row.from > PHI_SHARE ? row.from + PHI_SHARE : s->length;
+            phi_observables_row(&row, density);
+            for (int k = 0; k < PHI_OBSERVABLES; ++k)
+                phi_reduce(phi_reductions[k][0], (size_t)(row.to - row.from), density + k * PHI_SHARE, out + k, rest + k);
+        }
+    }
+    const double sites = (double)s->sites;
+#if PHI_GRAPH
+    const double counts[3] = { sites, (double)s->bonds[s->sites] / 2.0, 0.0 };
+#else
+    const double counts[3] = { sites, 0.0, sites * (sites - 1.0) / 2.0 };
 #endif
+    for (int k = 0; k < PHI_OBSERVABLES; ++k) {
+        out[k] += rest[k];
+        if (phi_reductions[k][0] == 0) out[k] /= counts[phi_reductions[k][1]];
+    }
+}
+#endif
+#if PHI_OBSERVED_FIELDS
+
+void phi_observed_fields(const phi_solver *s, double *out)
+{
+    PHI_EACH_ROW {
+        const phi_row row = PHI_WHOLE_ROW;
+        phi_observed_fields_row(&row, PHI_VALUES_AT(out));
+    }
+}
+#endif
+
+#include "lattice_by_hand.c"
 #include "status.c"
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }

@@ -1,8 +1,7 @@
 #ifndef PHI_FILE_LATTICE_H
 #define PHI_FILE_LATTICE_H
 #include "declarations.h"
-#include "macros/lattices.h"
-#include "macros/stages.h"
+#include "phrases.h"
 #include "status.h"
 
 #if PHI_GUESSES
@@ -249,6 +248,16 @@ void phi_density(const phi_solver *s, double *out);
 void phi_casimirs(const phi_solver *s, double *out);
 void phi_vector_field(const phi_solver *s, double *out);
 
+#if PHI_OBSERVED
+/* The observables, in the order of phi_OBSERVABLES. Sums are compensated, and the same for any number of threads. */
+void phi_observables(const phi_solver *s, double *out);
+
+#endif
+#if PHI_OBSERVED_FIELDS
+/* The observables out[k][site] that have a value at each site, in the order of phi_OBSERVED_FIELDS. */
+void phi_observed_fields(const phi_solver *s, double *out);
+
+#endif
 #if PHI_BY_HAND
 /* Steps by hand, for lattices that are distributed over several memories. A step is the stages 0, 1, ... before
    phi_stages(), each a sweep over all planes: the sites of one place along the first axis. Number phi_stages(), which with

@@ -8,11 +8,8 @@
 #include "model.h"
 #include "rows.c"
 #include "lattice_trail.c"
-#if PHI_SERIES
 #include "lattice_adjoint_stages.c"
-#else
 #include "lattice_adjoint_flows.c"
-#endif
 
 /* ---- The transpose of runs ---- */
 /* The cotangents of coefficients: sums over all pieces, in their order, which are 0 then. */

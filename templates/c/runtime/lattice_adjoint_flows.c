@@ -41,11 +41,8 @@ static int phi_part_of(const phi_solver *s, int sweep)
 }
 
 #endif
-#if PHI_UNDONE
 #include "lattice_undoing.c"
-#else
 #include "lattice_keeping.c"
-#endif
 
 /* Pull the cotangent of a row back, which is the state after so many steps, and add it. */
 static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, const double *row_bar)
@@ -80,9 +77,7 @@ static void phi_row_back(const phi_solver *s, phi_transpose *g, size_t steps, co
                 double *restrict to = PHI_HERE(g->bar[f]);
                 for (ptrdiff_t i = row.from; i < row.to; ++i) to[i] += from[i];
 #if PHI_UNDONE
-#if PHI_HALO
-                phi_ends(to, s->length, row.from, row.to);
-#endif
+                PHI_COPY_ENDS(to, s->length, row.from, row.to)
 #endif
             }
         }
@@ -122,11 +117,7 @@ static phi_status phi_walk(phi_solver *s, phi_transpose *g, size_t done, size_t 
         double *const kept = s->kept;
         s->kept = NULL;
 #endif
-#if PHI_NEAR
-        if (s->open && !phi_close(s)) status = PHI_NOT_FINITE;
-#else
-        if (s->open && !phi_try(s, 0)) status = PHI_NOT_FINITE;
-#endif
+        if (s->open && !PHI_TRY_FLOWS) status = PHI_NOT_FINITE;
         phi_take(s, s->x, rows + (row - 1) * PHI_DIM * s->sites);
         phi_copy(s->x, s->before, s);
 #if !PHI_UNDONE
@@ -152,11 +143,7 @@ static phi_status phi_settle(phi_solver *s, phi_transpose *g, size_t steps, phi_
     s->far = g->last_far;
     s->steps = g->first_step + steps;
     s->open = PHI_FLOWS > 1;
-#if PHI_NEAR
-    if (s->open && !phi_close(s)) status = PHI_NOT_FINITE;
-#else
-    if (s->open && !phi_try(s, 0)) status = PHI_NOT_FINITE;
-#endif
+    if (s->open && !PHI_TRY_FLOWS) status = PHI_NOT_FINITE;
     s->t = s->t_before_h + (double)(s->steps - s->steps_before_h) * s->h;
 #if PHI_TIMED
     s->now = s->t;

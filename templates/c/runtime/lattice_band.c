@@ -86,9 +86,7 @@ static void phi_probe(phi_solver *s, const phi_matrix *m, const double *coef, in
     for (int k = 0; k < PHI_DIM; ++k) {
         for (ptrdiff_t i = PHI_LEAST_COPY; i < PHI_AND_COPIES(sites); ++i) s->v[k][i] = 0.0;
         for (ptrdiff_t i = 0; k == f && i < count; ++i) s->v[k][first + i * apart] = 1.0;
-#if PHI_HALO
-        phi_ends(s->v[k], sites, 0, sites);
-#endif
+        PHI_COPY_ENDS(s->v[k], sites, 0, sites)
     }
 #if PHI_ADJOINT
     double *const *y = s->y[s->side != NULL ? 2 : now];
@@ -190,9 +188,7 @@ static void phi_eliminate(phi_solver *s, int now)
 #endif
     for (int k = 0; k < PHI_DIM; ++k) {
         for (ptrdiff_t i = 0; i < sites; ++i) s->y[1 - now][k][i] = s->y[now][k][i] + m.side[i * PHI_DIM + k];
-#if PHI_HALO
-        phi_ends(s->y[1 - now][k], sites, 0, sites);
-#endif
+        PHI_COPY_ENDS(s->y[1 - now][k], sites, 0, sites)
     }
 }
 #endif

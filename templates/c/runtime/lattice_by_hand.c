@@ -1,5 +1,5 @@
-#ifndef PHI_FILE_BY_HAND
-#define PHI_FILE_BY_HAND
+#ifndef PHI_FILE_LATTICE_BY_HAND
+#define PHI_FILE_LATTICE_BY_HAND
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
@@ -90,17 +90,13 @@ phi_status phi_put_planes(phi_solver *s, size_t field, size_t from, size_t to, c
     s->open = 0;
 #if PHI_ONE_ROW
     memcpy(s->x[field] + from, x, (to - from) * sizeof *x);
-#if PHI_HALO
-    phi_ends(s->x[field], s->length, 0, s->length);
-#endif
+    PHI_COPY_ENDS(s->x[field], s->length, 0, s->length)
 #else
     const size_t rows = phi_rows_of_plane(s), length = (size_t)s->length;
     for (size_t r = from * rows; r < to * rows; ++r, x += length) {
         double *row = PHI_ROW_AT(s->x[field]);
         memcpy(row, x, length * sizeof *x);
-#if PHI_HALO
-        phi_ends(row, s->length, 0, s->length);
-#endif
+        PHI_COPY_ENDS(row, s->length, 0, s->length)
     }
 #endif
     return PHI_OK;

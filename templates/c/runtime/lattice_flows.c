@@ -1,5 +1,5 @@
-#ifndef PHI_FILE_FLOWS
-#define PHI_FILE_FLOWS
+#ifndef PHI_FILE_LATTICE_FLOWS
+#define PHI_FILE_LATTICE_FLOWS
 #include "lattice.h"
 #include "model.h"
 #include "rows.c"
@@ -105,10 +105,8 @@ static void phi_make_flow(const phi_solver *s, size_t steps, int number)
 static void phi_go_back(const phi_solver *s, const phi_flow *flow, size_t first, size_t end);
 
 #endif
-#if PHI_WAVES
 #include "lattice_waves.c"
 
-#endif
 #if PHI_NOISE && PHI_SHARED
 /* The increments of a part of a step after so many, at all sites. */
 static void phi_draw(const phi_solver *s, size_t steps, int part)
@@ -263,11 +261,7 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     status = phi_march(s, steps);
 #endif
 #if !PHI_NOISE
-#if PHI_NEAR
-    if (s->open && !phi_close(s)) { /* the last flow of the last step, before which steps go on */
-#else
-    if (s->open && !phi_try(s, 0)) { /* the last flow of the last step, before which steps go on */
-#endif
+    if (s->open && !PHI_TRY_FLOWS) { /* the last flow of the last step, before which steps go on */
         status = PHI_NOT_FINITE;
         s->open = 0;
         --s->steps;

@@ -8,8 +8,7 @@
 #include "sweeps.h"
 
 /* ---- Krylov spaces ---- */
-#define PHI_SOLVED 1e-6 /* how well a correction solves the equation for it, if the space allows, */
-#define PHI_USEFUL 0.9  /* and how well it has to */
+#include "lattice_newton_policy.h"
 
 /* The sum of x y over all sites and fields, in usual sizes. Those of pieces are added in their order: the bits do not depend on
    threads. */
@@ -48,9 +47,7 @@ static void phi_combine(const phi_solver *s, double *const *to, double a, double
             double *sum = PHI_HERE(to[k]);
             PHI_EACH_SITE
             for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] = a * one[i] + b * other[i];
-#if PHI_HALO
-            phi_ends(sum, s->length, row.from, row.to);
-#endif
+            PHI_COPY_ENDS(sum, s->length, row.from, row.to)
         }
     }
 }
@@ -148,9 +145,7 @@ static void phi_apply_blocks(const phi_solver *s, double *const *v, double *cons
                 PHI_EACH_SITE
                 for (ptrdiff_t i = row.from; i < row.to; ++i) sum[i] += by[i] * one[i];
             }
-#if PHI_HALO
-            phi_ends(sum, s->length, row.from, row.to);
-#endif
+            PHI_COPY_ENDS(sum, s->length, row.from, row.to)
         }
     }
 }

@@ -7,15 +7,12 @@
 #include "rows.c"
 #include "sweeps.h"
 
-#if PHI_BANDED
 #include "lattice_band.c"
-#endif
-#if PHI_KRYLOV
 #include "lattice_krylov.c"
-#endif
 
 /* ---- Newton's method where sweeps fail ---- */
-#define PHI_PLAUSIBLE 1.5 /* in sizes of x and of what the field says */
+#include "lattice_newton_policy.h"
+#include "lattice_sweep_policy.h"
 
 /* The sum of the distances of y from x; with x added that of the sizes of x. */
 static double phi_distance(const phi_solver *s, int side, double added)
@@ -57,10 +54,6 @@ static double phi_range(phi_solver *s, const double *coef)
     return PHI_PLAUSIBLE * phi_distance(s, 1, 1.0);
 }
 
-#define PHI_SETTLED 0x1p-55   /* what further sweeps may still change, in sizes of y */
-#define PHI_ROUNDING 0x1p-40  /* changes below this may be rounding */
-#define PHI_SLOW 0.6          /* changes that shrink by less are left to Newton's method, ... */
-enum { PHI_PATIENCE = 10 };   /* ... after so many sweeps */
 
 /* y in the middle of a stage, from the guess in s->y[0] until only rounding would change: by sweeps or, where these have failed, by
    corrections, and then no farther from x than in that range. It is in s->y[*now]. */
@@ -77,7 +70,7 @@ static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, 
         /* what further sweeps would change, with the rate change / before; or changes shrink no more */
         if (change * change <= shrunk * PHI_SETTLED || (shrunk <= 0.0 && change <= PHI_ROUNDING && count > 0))
             return (s->stiff ? phi_distance(s, *now, 0.0) <= range : phi_all_hold(s, s->y[*now])) ? PHI_OK : failed;
-        if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > 0x1p-30) break;
+        if (!s->stiff && count >= PHI_PATIENCE && change > PHI_SLOW * before && change > PHI_NEARLY_SETTLED) break;
 #if PHI_BANDED
         if (count > 0 && change > 0.25 * before && change > PHI_ROUNDING) s->factored = NULL;
 #endif
@@ -87,7 +80,7 @@ static phi_status phi_middle(phi_solver *s, const double *coef PHI_AND_INT_FAR, 
 }
 #if PHI_TANGENT
 
-#define PHI_CARRIED 1e-11 /* what may be left of the equation of a tangent vector where corrections shrink it no more */
+#include "lattice_tangent_policy.h"
 
 /* A tangent vector after a stage whose y is s->y[now]: dy = (what a sweep does to dy) + side is solved, and moves it. */
 static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t number)
@@ -109,7 +102,7 @@ static phi_status phi_vary(phi_solver *s, const double *coef, int now, size_t nu
         phi_combine(s, s->space[0], 1.0, s->space[0], -1.0, side);
         const double left = phi_krylov(s, coef, now, dy, dy);
         if (!isfinite(left)) return PHI_NO_CONVERGENCE;
-        if (left <= 0x1p-54 * size || (left > 0.5 * before && left <= PHI_CARRIED * size)) {
+        if (left <= PHI_CARRIED * size || (left > PHI_CARRIED_SHRINKING * before && left <= PHI_NEARLY_CARRIED * size)) {
             PHI_EACH_PIECE
             for (size_t unit = 0; unit < units; ++unit) phi_follow_piece(s, coef, s->y[now], dy, v, unit);
             return PHI_OK;

@@ -6,11 +6,10 @@
 #include "model.h"
 #include "rows.c"
 #include "sweeps.h"
-#if PHI_ADJOINT
 #include "lattice_back.c"
-#endif
 
 /* ---- The stages ---- */
+#include "lattice_sweep_policy.h"
 enum { PHI_WIDTH = 32 }; /* numbers that are kept apart, so that loops vectorise */
 
 static inline void phi_raise(double *largest, double value) { *largest = value > *largest ? value : *largest; }
@@ -77,7 +76,7 @@ static double phi_relaxed(phi_solver *s, const double *coef PHI_AND_INT_FAR, int
     }
     for (int k = 0; k < PHI_DIM; ++k) phi_raise(&largest, size[k]);
     for (int k = 0; k < PHI_DIM; ++k) {
-        s->usual[k] = size[k] + 1e-3 * largest + 1e-300;
+        s->usual[k] = size[k] + PHI_LEAST_SIZE * largest + 1e-300;
         change[k] /= s->usual[k]; /* no number where both are infinite */
         moved = isnan(change[k]) || change[k] > moved ? change[k] : moved;
     }

@@ -24,9 +24,7 @@ static void phi_hand_nothing(const phi_solver *s, const phi_transpose *g, size_t
         for (int k = 0; k < PHI_HANDED / 2; ++k) {
             double *restrict handed = PHI_HERE(phi_handed_by(g, flow)[k]);
             for (ptrdiff_t i = row.from; i < row.to; ++i) handed[i] = 0.0;
-#if PHI_HALO
-            phi_ends(handed, s->length, row.from, row.to);
-#endif
+            PHI_COPY_ENDS(handed, s->length, row.from, row.to)
         }
     }
     phi_wait();

@@ -5,11 +5,8 @@
 
 #include "solver.h"
 #include "model.h"
-#if PHI_BLOCKS
 #include "blocks.c"
-#else
 #include "solver.c"
-#endif
 
 /* ---- Members of an ensemble ---- */
 /* What an ensemble was asked for. Where own is 1, member m has the parameters params[m] and the step h[m]; where it is 0,
@@ -53,21 +50,10 @@ static phi_members phi_asked(const phi_params *params, double *x, size_t members
 }
 
 /* Start a member at a state, with what is its own, and with all that its step size asks for. */
-#if PHI_GAUGE
-static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM], const double *gauge,
-    phi_solver *s)
-#else
-static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM], phi_solver *s)
-#endif
+static phi_status phi_begin_member(const phi_members *all, size_t m, const double x[PHI_DIM] PHI_AND_GAUGE(const double *gauge), phi_solver *s)
 {
     const phi_params *params = all->params != NULL ? all->params + m * all->own : NULL;
-#if PHI_GAUGE
-    const phi_status status = phi_init_gauge(s, params, x, gauge);
-#elif PHI_TIMED
-    const phi_status status = phi_init_at(s, params, x, all->t0[m * all->own]);
-#else
-    const phi_status status = phi_init(s, params, x);
-#endif
+    const phi_status status = PHI_INIT_OWN(s, params, x, all->t0[m * all->own], gauge);
     return status == PHI_OK ? phi_integrate(s, all->h[m * all->own], 0) : status;
 }
 
@@ -75,11 +61,7 @@ static phi_status phi_begin_member(const phi_members *all, size_t m, const doubl
 static phi_status phi_take_member(const phi_members *all, size_t m, double x[PHI_DIM], phi_solver *s)
 {
     for (size_t i = 0; i < PHI_DIM; ++i) x[i] = all->x[i * all->members + m];
-#if PHI_GAUGE
-    return phi_begin_member(all, m, x, all->gauge != NULL ? all->gauge + m * PHI_GAUGES : NULL, s);
-#else
-    return phi_begin_member(all, m, x, s);
-#endif
+    return phi_begin_member(all, m, x PHI_AND_GAUGE_OF(all, m), s);
 }
 
 /* How many steps there are to the next frame, or to the end. */

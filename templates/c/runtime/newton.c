@@ -6,28 +6,13 @@
 
 #include "algebra.c"
 #include "implicit.c"
-#if PHI_ATTITUDE
 #include "attitude.c"
-#endif
 #include "model.h"
 
 /* ---- The implicit step, by Newton's method ---- */
 /* A step leads from x = alpha(y) to beta(y), two maps of a point y between, which is what is solved for. */
-#if PHI_RELATIVE
-/* Size of a correction relative to each component of y (coordinates keep their sign, and may be of very
-   different size); NaN or infinite if the correction is. */
-static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
-{
-    double size = 0.0;
-    for (int i = 0; i < PHI_DIM; ++i) {
-        const double ratio = fabs(delta[i]) / (fabs(y[i]) + DBL_MIN);
-        if (!isfinite(ratio)) return ratio;
-        size = ratio > size ? ratio : size;
-    }
-    return size;
-}
-#else
-#define PHI_FLOOR 1e-6 /* components of y are measured no finer than by this part of the largest */
+#include "measure_policy.h"
+#include "newton_policy.h"
 
 /* Size of a correction relative to each component of y; NaN or infinite if the correction is. */
 static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
@@ -41,10 +26,6 @@ static double phi_size(const double y[PHI_DIM], const double delta[PHI_DIM])
     }
     return size;
 }
-#endif
-
-#define PHI_NEARLY_SOLVED 1e-8 /* corrections below this have reached the level of rounding, ... */
-#define PHI_SHRINKING 0.25     /* ... if one is more than this part of the one before */
 
 /* Solve (y - x) + displacement(y) = 0 for y by Newton's method from the extrapolated guess, and advance. The last
    correction changes the increment to first order, without an evaluation: it is accepted if the error that remains,
@@ -87,18 +68,14 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
         if (!(elapsed[0] * (PHI_FRACTION(s->h)) > 0.0)) return PHI_NOT_FINITE;
 #endif
         if (!phi_advance(s, increment, small)) return PHI_NOT_FINITE;
-#if PHI_MONITOR
-        phi_pass(s, elapsed[0]);
-#endif
+        PHI_PASS(s, elapsed[0])
 #if PHI_RECURRENCES
         phi_remember(&PHI_OF(s->history, stage), y, iteration);
 #elif PHI_GUESSED
         phi_remember(&PHI_OF(s->history, stage), y);
 #endif
-#if PHI_RATE_OF_GAUGE
-        phi_turn_by(s, factor, PHI_AT_FIRST(s->aside));
-#elif PHI_ATTITUDE
-        phi_turn_by(s, factor);
+#if PHI_ATTITUDE
+        phi_turn_by(s, factor PHI_AND_ASIDE(s->aside));
 #endif
         return PHI_OK;
     }

@@ -11,12 +11,7 @@
 #include "model_lanes.h"
 
 /* ---- Newton's method in lanes ---- */
-/* Components of y are measured no finer than by this part of the largest. */
-#if PHI_RELATIVE
-#define PHI_FLOOR_OF_LANES 0.0
-#else
-#define PHI_FLOOR_OF_LANES 1e-6
-#endif
+#include "measure_policy.h"
 
 /* A stage in all lanes, linearised around y. */
 typedef struct {
@@ -60,7 +55,7 @@ static void phi_measure(const phi_model *model, phi_lanes unit[restrict PHI_DIM]
 #endif
         PHI_EACH_LANE
         for (int lane = 0; lane < PHI_LANES; ++lane) {
-            const double least = PHI_FLOOR_OF_LANES * unit[i][lane];
+            const double least = PHI_FLOOR * unit[i][lane];
             norm[lane] = least > norm[lane] ? least : norm[lane];
         }
     }
@@ -141,7 +136,7 @@ static void phi_correct(phi_model *model, phi_lanes unit[restrict PHI_DIM], phi_
    second, there is rounding only, if the next is below the third. */
 #define PHI_FROZEN 1e-4
 #define PHI_SMALL 1e-8
-#define PHI_ROUNDING 1e-10
+#define PHI_BLOCK_ROUNDING 1e-10
 #define PHI_CAUTION 32.0 /* frozen matrices leave twice what new ones did, of the same correction; this is far more */
 
 /* What corrections of this size leave, after those of the size before: the first leave their square, later ones the part of
@@ -151,7 +146,7 @@ static void phi_leave(const phi_lanes size, const phi_lanes before, phi_lanes le
     PHI_EACH_LANE
     for (int lane = 0; lane < PHI_LANES; ++lane) {
         const double part = before[lane] < HUGE_VAL ? PHI_CAUTION * size[lane] / before[lane] : size[lane];
-        left[lane] = before[lane] < PHI_SMALL && size[lane] < PHI_ROUNDING ? 0.0 : part * size[lane];
+        left[lane] = before[lane] < PHI_SMALL && size[lane] < PHI_BLOCK_ROUNDING ? 0.0 : part * size[lane];
     }
 }
 

@@ -6,28 +6,13 @@
 
 #include "algebra.c"
 #include "implicit.c"
-#if PHI_ATTITUDE
 #include "attitude.c"
-#endif
 #include "model.h"
 #include "taylor.c"
 #include "path_model.h"
 
 /* ---- The implicit step, along paths dm/dt = pi(m) p ---- */
-enum {
-    PHI_LONGEST_PATH = 128, /* pieces of a path, a power of 2 */
-    PHI_MOST_PIECES = 512,  /* of all paths that are tried in a solve: steps that need more are wrong by as much as the state */
-    PHI_PATIENCE = 3        /* iterations with the approximate Jacobian, before it is asked whether it contracts */
-};
-
-#define PHI_NEGLIGIBLE 1e-17      /* terms that rounding hides in their sum, in sizes of the path */
-#define PHI_LEAST_SHARE 1e-5      /* coordinates are measured no finer than by this part of all together */
-#define PHI_ROUNDED_SLOPE 2e-15   /* rounding of the slope of a path, in sizes of the path and its slope */
-#define PHI_DIFFERENCE 1e-7       /* of arguments in a quotient, in sizes of p: about the root of rounding */
-#define PHI_SOLVED 4e-16          /* a residual, in sizes of p, that is rounding; */
-#define PHI_NEARLY_SOLVED 1e-12   /* one below this is so too if it is ... */
-#define PHI_SHRINKING 0.25        /* ... more than this part of the one before */
-#define PHI_CONTRACTING 0.05      /* part of the residual that an iteration with a useful Jacobian leaves at most */
+#include "path_policy.h"
 
 /* Whether dm/dt = pi(m) p holds at a point m, where the expansion has the given slope: one with gaps between its terms,
    like t + t^9, or across the kink of an absolute value, only looks as if it had converged. */
@@ -158,9 +143,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
             if (!(elapsed[0] * (PHI_FRACTION(s->h)) > 0.0)) return PHI_NOT_FINITE;
 #endif
             if (!phi_advance(s, change, s->carry)) return PHI_NOT_FINITE;
-#if PHI_MONITOR
-            phi_pass(s, elapsed[0]);
-#endif
+            PHI_PASS(s, elapsed[0])
 #if PHI_RECURRENCES
             phi_remember(&PHI_OF(s->history, stage), y, iteration);
 #elif PHI_GUESSED
@@ -169,11 +152,7 @@ static phi_status phi_attempt(phi_solver *s PHI_AND_INT_STAGE)
 #if PHI_ATTITUDE
             double factor[PHI_ELEMENT];
             phi_factor(s PHI_AND_STAGE, y, factor);
-#if PHI_RATE_OF_GAUGE
-            phi_turn_by(s, factor, PHI_AT_FIRST(s->aside));
-#else
-            phi_turn_by(s, factor);
-#endif
+            phi_turn_by(s, factor PHI_AND_ASIDE(s->aside));
 #endif
             return PHI_OK;
         }

@@ -10,7 +10,7 @@
 
 /* ---- Blocks along paths ---- */
 #define PHI_SLOPE_ACCURACY 1e-7 /* of the derivatives of paths */
-#define PHI_SETTLED 1e-9        /* accuracy of middles: what is left, the passes mend */
+#define PHI_MIDDLES_SETTLED 1e-9 /* accuracy of middles: what is left, the passes mend */
 #define PHI_GUESS_ACCURACY 1e-6 /* of expansions for guesses, which are no better */
 
 /* alpha - y and beta - alpha to leading order, from one short expansion. */
@@ -79,7 +79,7 @@ static void phi_update(phi_lanes coef[restrict], phi_model *model, int matrices)
     if (matrices) phi_curvature_lanes(coef, model->y, e.p, hessian);
     else phi_momentum_lanes(coef, model->y, e.p);
     phi_halve(e.p);
-    if (matrices) phi_find_middles(coef, model->y, model->middle, &e, PHI_SETTLED);
+    if (matrices) phi_find_middles(coef, model->y, model->middle, &e, PHI_MIDDLES_SETTLED);
     else phi_begin_at(coef, model->y, model->middle, &e);
     phi_extend(coef, &e, PHI_NEGLIGIBLE);
     phi_check_ends(coef, &e, wrong);

@@ -5,15 +5,9 @@
 
 #include "algebra.c"
 #include "model.h"
-#if PHI_GUESSED && !PHI_GAUSS
 #include "implicit.c"
-#endif
-#if PHI_MONITOR
 #include "level.c"
-#endif
-#if PHI_ATTITUDE
 #include "attitude.c"
-#endif
 #if PHI_RECURRENCES
 #define PHI_NEAR_BY 0.125 /* how far the state may be moved, in its own size, for guesses to move with it */
 
@@ -105,9 +99,7 @@ phi_status phi_set_state(phi_solver *s, const double x[PHI_DIM])
 #endif
     memmove(s->x, x, sizeof s->x); /* x may be a part of *s */
     memset(s->carry, 0, sizeof s->carry);
-#if PHI_MONITOR
-    if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;
-#endif
+    PHI_TAKE_LEVEL(s, from)
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
 #elif PHI_GAUSS
@@ -137,9 +129,7 @@ phi_status phi_kick(phi_solver *s, const double change[PHI_DIM])
     memcpy(carry, s->carry, sizeof carry);
 #endif
     if (!phi_advance(s, change, s->carry)) return PHI_BAD_ARGUMENT;
-#if PHI_MONITOR
-    if (!phi_take_level(s, from, carry)) return PHI_BAD_ARGUMENT;
-#endif
+    PHI_TAKE_LEVEL(s, from)
 #if PHI_RECURRENCES
     phi_move_guesses(s, from);
 #elif PHI_GAUSS

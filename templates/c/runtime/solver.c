@@ -4,38 +4,25 @@
 #include <string.h>
 
 #include "solver.h"
-#if PHI_NEWTON
+#include "start_policy.h"
 #include "newton.c"
-#elif PHI_PATH
 #include "path.c"
-#elif PHI_GAUSS
 #include "gauss.c"
-#else
 #include "explicit.c"
-#endif
-#if PHI_ATTITUDE
 #include "attitude.c"
-#endif
-#if PHI_MONITOR
 #include "level.c"
-#elif PHI_GAUGE_SEARCH
 #include "gauge.c"
-#endif
 #if PHI_BLOCKS
 #include <limits.h>
 #endif
 
-#if PHI_NOISE
 #include "noise.c"
-#endif
 
 #if !PHI_EXPLICIT
 /* ---- The solver ---- */
 #endif
-#if PHI_GAUGE && !PHI_MONITOR && !PHI_GAUGE_SEARCH
-#include "gauge.c"
+#include "gauge_formula.c"
 
-#endif
 /* The arguments may be parts of *s, which is therefore written last. */
 #if PHI_GAUGE
 phi_status phi_init_gauge(phi_solver *s, const phi_params *params, const double x0[PHI_DIM],
@@ -46,11 +33,7 @@ phi_status phi_init_at(phi_solver *s, const phi_params *params, const double x0[
 phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI_DIM])
 #endif
 {
-#if PHI_TIMED
-    if (s == NULL || x0 == NULL || !isfinite(t0)) return PHI_BAD_ARGUMENT;
-#else
-    if (s == NULL || x0 == NULL) return PHI_BAD_ARGUMENT;
-#endif
+    if (s == NULL || x0 == NULL PHI_OR_NO_T0) return PHI_BAD_ARGUMENT;
     if (params == NULL) params = &phi_default_params;
     phi_solver fresh;
     memset(&fresh, 0, sizeof fresh);
@@ -61,11 +44,7 @@ phi_status phi_init(phi_solver *s, const phi_params *params, const double x0[PHI
     fresh.t = t0;
 #endif
 #if PHI_PARAMETERS
-#if PHI_GAUGE
-    phi_prepare(&fresh.params, fresh.gauge, 1e-100, PHI_OF(fresh.coef, 0)); /* so short a step does not matter */
-#else
-    phi_prepare(&fresh.params, 1e-100, PHI_OF(fresh.coef, 0)); /* so short a step does not matter */
-#endif
+    phi_prepare(&fresh.params PHI_AND_GAUGE(fresh.gauge), PHI_PROBE_STEP, PHI_OF(fresh.coef, 0));
     if (!phi_finite(fresh.x, PHI_DIM) || !phi_allowed(&fresh.params) || !phi_finite(PHI_OF(fresh.coef, 0), PHI_COEFFICIENTS))
         return PHI_BAD_ARGUMENT;
 #else
@@ -120,23 +99,11 @@ static void phi_renew(phi_solver *s)
         const int late = k - (PHI_ROWS_OF_FLOWS - PHI_DRAWS); /* in the half after the flows of H */
         const double dw[1] = { k < PHI_SOURCES ? s->dw[k] : late >= PHI_SOURCES ? s->dw[late] : 0.0 };
 #endif
-#if PHI_NOISE && PHI_TIMED
-        phi_at_step(row, s->t + phi_moments[k] * s->h, dw, row + PHI_PREPARED);
-#elif PHI_NOISE
-        phi_at_step(row, dw, row + PHI_PREPARED);
-#else
-        phi_at_time(row, s->t + phi_moments[k] * s->h, row + PHI_PREPARED);
-#endif
+        PHI_RENEWAL(row PHI_AND_T(s->t + phi_moments[k] * s->h) PHI_AND_DW(dw), row + PHI_PREPARED);
     }
 #else
     PHI_EACH_STAGE
-#if PHI_NOISE && PHI_TIMED
-        phi_at_step(PHI_OF(s->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h, s->dw, PHI_OF(s->coef, stage) + PHI_PREPARED);
-#elif PHI_NOISE
-        phi_at_step(PHI_OF(s->coef, stage), s->dw, PHI_OF(s->coef, stage) + PHI_PREPARED);
-#else
-        phi_at_time(PHI_OF(s->coef, stage), s->t + PHI_OF(phi_middles, stage) * s->h, PHI_OF(s->coef, stage) + PHI_PREPARED);
-#endif
+        PHI_RENEWAL(PHI_OF(s->coef, stage) PHI_AND_T(s->t + PHI_OF(phi_middles, stage) * s->h) PHI_AND_DW(s->dw), PHI_OF(s->coef, stage) + PHI_PREPARED);
 #endif
 }
 
@@ -160,30 +127,11 @@ static phi_status phi_stage(phi_solver *s PHI_AND_INT_STAGE) { return phi_attemp
 /* The stages of one step. If one fails, the state is as before the step. */
 static phi_status phi_stages(phi_solver *s)
 {
-    double x[PHI_DIM], carry[PHI_DIM];
     phi_status status = PHI_OK;
-#if PHI_MONITOR
-    const double t = s->t, t_carry = s->t_carry;
-#endif
-    memcpy(x, s->x, sizeof x);
-    memcpy(carry, s->carry, sizeof carry);
-#if PHI_ATTITUDE
-    double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT];
-    memcpy(turned, s->turned, sizeof turned);
-    memcpy(turned_carry, s->turned_carry, sizeof turned_carry);
-#endif
+#include "state_saved.h"
     for (int stage = 0; stage < PHI_STAGES && status == PHI_OK; ++stage) status = phi_stage(s, stage);
     if (status != PHI_OK) {
-        memcpy(s->x, x, sizeof x);
-        memcpy(s->carry, carry, sizeof carry);
-#if PHI_ATTITUDE
-        memcpy(s->turned, turned, sizeof turned);
-        memcpy(s->turned_carry, turned_carry, sizeof turned_carry);
-#endif
-#if PHI_MONITOR
-        s->t = t;
-        s->t_carry = t_carry;
-#endif
+#include "state_restored.h"
     }
     return status;
 }
@@ -208,30 +156,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps)
     if (s == NULL || !isfinite(h)) return PHI_BAD_ARGUMENT;
     if (memcmp(&h, &s->h, sizeof h) != 0) { /* what depends on the step size */
         PHI_EACH_STAGE
-#if PHI_GAUGE
-            phi_prepare(&s->params, s->gauge, PHI_FRACTION(h), PHI_OF(s->coef, stage));
-#else
-            phi_prepare(&s->params, PHI_FRACTION(h), PHI_OF(s->coef, stage));
-#endif
-#if PHI_GUESSED
-        memset(&s->history, 0, sizeof s->history);
-#endif
-#if PHI_RECURRENCES
-        PHI_EACH_STAGE PHI_OF(s->history, stage).slow_steps_allowed = PHI_REPAY;
-#endif
-#if PHI_BLOCKS
-        memset(&s->blocks, 0, sizeof s->blocks);
-        s->blocks.single_steps = 2 * PHI_AHEAD;
-        s->blocks.passes_without_recurrences = INT_MAX;
-#endif
-        s->h = h;
-#if PHI_RATE_OF_GAUGE
-        phi_set_aside(s);
-#endif
-#if !PHI_MONITOR
-        s->t_before_h = s->t;
-        s->steps_before_h = s->steps;
-#endif
+            phi_prepare(&s->params PHI_AND_GAUGE(s->gauge), PHI_FRACTION(h), PHI_OF(s->coef, stage));
+#include "state_reset.h"
     }
     for (; steps > 0; --steps) {
 #if PHI_NOISE && PHI_ATTITUDE
@@ -302,10 +228,8 @@ phi_status phi_integrate(phi_solver *s, double h, size_t steps) { return phi_int
 phi_status phi_step(phi_solver *s, double h) { return phi_integrate(s, h, 1); }
 
 #endif
-#if PHI_KICKED
 #include "placing.c"
 
-#endif
 #include "status.c"
 
 size_t phi_solver_size(void) { return sizeof(phi_solver); }

@@ -1,7 +1,7 @@
 #ifndef PHI_FILE_SOLVER_H
 #define PHI_FILE_SOLVER_H
 #include "declarations.h"
-#include "macros/stages.h"
+#include "phrases.h"
 #include "status.h"
 const char *phi_status_string(phi_status status);
 
@@ -15,8 +15,6 @@ typedef struct {
 } phi_history;
 
 #elif PHI_GUESSED && !PHI_RECURRENCES
-enum { PHI_DIFFERENCES = 9 }; /* those of higher order amplify rounding more than they gain */
-
 /* The last value of the unknown and its backward differences, for a guess at the next. */
 typedef struct {
     int count, order; /* differences that are known; how many of them the extrapolation adds up */
@@ -57,71 +55,7 @@ typedef struct {
 #endif
 /* A plain value: copy it to branch, keep one per thread. Arguments may be parts of it, or overlap. */
 typedef struct {
-    double x[PHI_DIM];     /* the state; read it freely, change it only through functions */
-    double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */
-    size_t steps;          /* good steps since phi_init */
-#if PHI_GAUSS
-    size_t evaluations;    /* sweeps over the stages, for statistics */
-#else
-    size_t evaluations;    /* of the generating function, for statistics */
-#endif
-#if PHI_MONITOR
-    double t, t_carry;     /* physical time since phi_init, t + t_carry: steps are equal in tau, not in it */
-#elif PHI_TIMED
-    double t;              /* the time of x */
-#else
-    double t;              /* time since phi_init */
-#endif
-#if PHI_NOISE
-    uint64_t seed, first_step; /* which random numbers are taken, see phi_set_noise */
-    uint32_t member;
-    double dw[PHI_DRAWS];  /* the increments of the noise in the last step */
-#endif
-    double h;              /* the last step size; NaN before the first step */
-    phi_params params;
-#if PHI_MONITOR
-    double gauge[PHI_GAUGES]; /* e = -H(x0): K = monitor (H + e) is 0 along the trajectory */
-#elif PHI_GAUGE
-    double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */
-#endif
-#if PHI_NOISE
-    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* what depends on params and h only, then on dw and the time as well */
-#elif PHI_RENEWED
-    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* what depends on params and h only, then on the time of the step as well */
-#else
-    double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS]; /* all that depends on params and h only */
-#endif
-#if PHI_ATTITUDE
-#if PHI_MATRICES
-    double attitude[PHI_ATTITUDE_SIZE]; /* a matrix, row by row; change it only through phi_set_attitude */
-#else
-    double attitude[PHI_ATTITUDE_SIZE]; /* the quaternion (w, x, y, z) that turns body into space; see phi_set_attitude */
-#endif
-#if PHI_POSITION
-    double position[3]; /* of the body, in space */
-#endif
-#if PHI_MATRICES
-    double first[PHI_ELEMENT]; /* where the attitude began */
-#endif
-    double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT]; /* the product of what steps turned by; what rounding took */
-#if PHI_RATE_OF_GAUGE
-    double rate[PHI_RATE]; /* the gradient of the Casimirs that are taken from H: the body turns by them too */
-    double aside[PHI_ELEMENT]; /* what it turns by so in a step, less 1 */
-#endif
-#if PHI_RATE_OF_GAUGE && PHI_BLOCKS
-    double aside_of_block[PHI_ELEMENT]; /* the same in a block of steps */
-#endif
-#endif
-#if !PHI_MONITOR
-    size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */
-    double t_before_h;
-#endif
-#if PHI_GUESSED
-    phi_history PHI_OF(history, PHI_STAGES); /* for starting guesses */
-#endif
-#if PHI_BLOCKS
-    phi_learnt blocks;
-#endif
+#include "state_members.h"
 } phi_solver;
 size_t phi_solver_size(void); /* for bindings to other languages, as what follows */
 size_t phi_solver_steps_done(const phi_solver *s);
@@ -168,10 +102,8 @@ phi_status phi_set_noise(phi_solver *s, uint64_t seed, uint32_t member, uint64_t
 #endif
 #if PHI_POSITION
 /* The position may be NULL for the origin. */
-phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE], const double position[3]);
-#else
-phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE]);
 #endif
+phi_status phi_set_attitude(phi_solver *s, const double attitude[PHI_ATTITUDE_SIZE] PHI_AND_POSITION(const double position[3]));
 
 #endif
 #if PHI_MONITOR
@@ -220,13 +152,8 @@ phi_status phi_ensemble(const phi_params *params, double *x, size_t members, dou
 #if PHI_NOISE
 /* The same where member m takes the random numbers of first_member + m, from those of first_step on; these and the seed
    are 0 for phi_ensemble. With OpenMP, members in parallel: the results do not depend on threads. */
-#if PHI_TIMED
-phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double t0, double h, size_t steps,
+phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members PHI_AND_T0, double h, size_t steps,
     uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
-#else
-phi_status phi_ensemble_of(const phi_params *params, double *x, size_t members, double h, size_t steps,
-    uint64_t seed, uint32_t first_member, uint64_t first_step, unsigned char *status);
-#endif
 
 #endif
 #if PHI_TIMED
@@ -268,15 +195,9 @@ phi_status phi_ensemble_each(const phi_params *params, double *x, size_t members
    the defaults. frames and attitudes (or NULL) receive what x and attitude are after every stride-th step, those after
    (k + 1) * stride steps as row k, NaN where a member failed before. Arrays must not overlap. */
 phi_status phi_ensemble_attitudes(const phi_params *params, double *x, double *attitude, size_t members,
-#if PHI_TIMED
-    const double *t0,
-#elif PHI_GAUGE
-    const double *gauge,
-#endif
+    PHI_OWN_POINTER
     const double *h, size_t steps,
-#if PHI_NOISE
-    uint64_t seed, uint32_t first_member, uint64_t first_step,
-#endif
+    PHI_RANDOM_NUMBERS
     size_t stride, double *frames, double *attitudes, unsigned char *status);
 
 #endif
@@ -321,19 +242,9 @@ phi_status phi_pullback(phi_solver *s, double h, size_t steps, size_t stride, do
    as x0, and params_bar[m] gains what is its own. trail is room for PHI_TRAIL_EACH numbers for each step, whatever the
    number of members; status (or NULL) receives a status for each. Threads may share members out, each with a trail; that
    changes no bit where shares begin at multiples of 32. The first status that is not OK. */
-#if PHI_TIMED
-phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *t0, const double *h,
+phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, PHI_OWN_POINTER const double *h,
     size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
     double *trail, unsigned char *status);
-#elif PHI_GAUGE
-phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *gauge, const double *h,
-    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
-    double *trail, unsigned char *status);
-#else
-phi_status phi_pullback_each(const phi_params *params, const double *x0, size_t members, const double *h,
-    size_t steps, size_t stride, double *rows, const double *rows_bar, double *x0_bar, phi_params *params_bar,
-    double *trail, unsigned char *status);
-#endif
 
 #endif
 #endif

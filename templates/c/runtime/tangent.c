@@ -16,14 +16,11 @@
 #endif
 
 #if PHI_IMPLICIT
-#define PHI_TANGENT_SOLVED 1e-15        /* a correction of this size is rounding; */
-#define PHI_TANGENT_NEARLY_SOLVED 1e-10 /* one below this is so too if it is ... */
-#define PHI_TANGENT_SHRINKING 0.25      /* ... more than this part of the one before */
+#include "tangent_policy.h"
 
 #endif
 #if PHI_PATH
-#define PHI_TANGENT_NEGLIGIBLE 1e-18    /* terms that rounding hides in their sum, in sizes of start and sum */
-#define PHI_TANGENT_ROUNDED_SLOPE 1e-13 /* rounding of slopes, in sizes of the path and its slope: variations add some */
+#include "path_tangent_policy.h"
 
 #endif
 /* The product of two matrices, into a third. */
@@ -74,9 +71,7 @@ static phi_status phi_tangent_stage(const double *coef, const double x[PHI_DIM],
 
 #elif PHI_GAUSS
 enum { PHI_SLOPES = PHI_UNKNOWNS * (PHI_DIM + PHI_UNKNOWNS) }; /* of a stage, along x and along the unknowns */
-#define PHI_TANGENT_SOLVED 1e-17        /* a relative change of this size is rounding; */
-#define PHI_TANGENT_NEARLY_SOLVED 1e-13 /* one below this is so too if it is ... */
-#define PHI_TANGENT_SHRINKING 0.4       /* ... more than this part of the one before */
+#include "gauss_tangent_policy.h"
 
 /* How moves of the stages vary along coordinate j, by sweeps of the linear equations that they satisfy; 0 if these do not
    come to an end. */

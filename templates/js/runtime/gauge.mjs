@@ -1,16 +1,9 @@
 import { TINY } from "./algebra.mjs";
+import { CLOSE_CALL, DEGREE, FIRST_REACH, GRIDS, MESH, SAMPLES } from "./gauge_search.mjs";
+import { REACH_OF_GRID, SAMPLE_LENGTH, SWEEPS } from "./gauge_search.mjs";
 import { DIM, GAUGE, guide, products, vectorField } from "./model.mjs";
 
 // ---- The choice of the gauge: multiples of Casimirs taken from H ----
-
-/** States along a short piece of the trajectory. */
-const SAMPLES = 32;
-
-/** S_3 is cubic in H, so the square of the error is of degree six in each multiple. */
-const DEGREE = 6;
-
-/** Most rounds over the multiples. */
-const SWEEPS = 4;
 
 /** The direction of the motion at a point, of size 1; 0 where there is none. */
 function direction(params, at) {
@@ -30,7 +23,7 @@ function total(values) {
  */
 function sampled(params, x) {
   const states = [Float64Array.from(x)];
-  const length = 0.25 * total(states[0]);
+  const length = SAMPLE_LENGTH * total(states[0]);
   while (states.length < SAMPLES) {
     const y = states[states.length - 1];
     const first = direction(params, y);
@@ -54,7 +47,7 @@ function gaugeError(params, gauge, samples) {
 /** The error polynomial at centre + t width, by Newton's formula from forward differences. */
 function errorOnLine(difference, t) {
   let error = difference[DEGREE];
-  for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + 3 - k) / (k + 1)) * error;
+  for (let k = DEGREE - 1; k >= 0; k--) error = difference[k] + ((t + DEGREE / 2 - k) / (k + 1)) * error;
   return error;
 }
 
@@ -66,7 +59,7 @@ function leastOnLine(params, gauge, c, width, samples) {
   const errors = [];
   for (let j = 0; j <= DEGREE; j++) {
     const nearby = Float64Array.from(gauge);
-    nearby[c] = gauge[c] + (j - 3) * width;
+    nearby[c] = gauge[c] + (j - DEGREE / 2) * width;
     errors.push(gaugeError(params, nearby, samples));
   }
   const size = errors.reduce((sum, error) => sum + error, 0);
@@ -75,12 +68,13 @@ function leastOnLine(params, gauge, c, width, samples) {
   }
   let best = 0;
   let least = errorOnLine(errors, best);
-  for (const [reach, mesh] of [[24, 1 / 8], [8, 1 / 64], [8, 1 / 512]]) {
+  for (let grid = 0, mesh = MESH; grid < GRIDS; grid++, mesh *= MESH) {
+    const reach = grid === 0 ? FIRST_REACH : REACH_OF_GRID;
     const centre = best;
     for (let j = -reach; j <= reach; j++) {
       const t = centre + j * mesh;
       const error = errorOnLine(errors, t);
-      if (!(error < least - 1e-12 * size)) continue; // close calls are not decided by rounding
+      if (!(error < least - CLOSE_CALL * size)) continue;
       least = error;
       best = t;
     }

@@ -1,4 +1,5 @@
 import { advance } from "./algebra.mjs";
+import { MOST_RISING, NEARLY_ROUNDING, ROUNDING, SOLVED, STALLED } from "./gauss_policy.mjs";
 import { DIM, MAX_SWEEPS, MIXING, PLAIN, POINT, PREDICTION, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageField } from "./model.mjs";
 // #if FRAMED
@@ -8,16 +9,6 @@ import { nextFrame } from "./model.mjs";
 // ---- The implicit step, by Gauss collocation ----
 
 const NODES = WEIGHTS.length;
-
-/** What a next sweep may change; changes below the second that do not shrink are rounding. */
-const SOLVED = 2e-18;
-const ROUNDING = 2e-14;
-/** Changes in the size of rounding that are not less than those before: no more is to be gained. */
-const STALLS = 2;
-/** Sweeps one after the other that change more than those before: the step is too large. */
-const MOST_RISING = 3;
-/** Every so many steps it is tried whether one sweep less will do. */
-const PROBE = 16;
 
 /** An array with the unknowns of each stage. */
 export function stages() {
@@ -67,11 +58,13 @@ export function mixed(matrix, moves, z) {
   }
 }
 
+const weight = new Float64Array(1);
+
 /** h b_j times the vector field at all stages. */
 function slopes(solver, stage, start, z, moves) {
   for (let i = 0; i < NODES; i++) {
-    stageField(solver.coef[stage], start, z[i], moves[i]);
-    for (let k = 0; k < UNKNOWNS; k++) moves[i][k] *= solver.h * WEIGHTS[i];
+    weight[0] = solver.h * WEIGHTS[i];
+    stageField(solver.coef[stage], start, z[i], weight, moves[i]);
   }
 }
 
@@ -102,7 +95,7 @@ const mixedMoves = stages();
 export function collocate(solver, stage, start, history, moves) {
   let last = Infinity;
   let rising = 0;
-  let stalls = 0;
+  let rises = 0;
   if (history.count > 0) {
     mixed(PREDICTION, history.moves, predicted);
   } else {
@@ -120,13 +113,17 @@ export function collocate(solver, stage, start, history, moves) {
     const change = changeOf(start, moves.next, moves.now);
     const rate = change / last;
     if (!Number.isFinite(change)) return "NOT_FINITE";
-    if (rate < 1 && last < Infinity && change > ROUNDING) history.rate = 0.7 * history.rate + 0.3 * rate;
-    if (change * history.rate <= SOLVED || (change <= ROUNDING && change >= last && ++stalls === STALLS)) {
-      history.sweeps = sweep > 2 && history.count % PROBE === 0 ? sweep - 1 : sweep;
+    if (rate > 0 && rate < 1 && change > NEARLY_ROUNDING) history.rate = 0.7 * history.rate + 0.3 * rate;
+    const solved = change * history.rate <= SOLVED;
+    const slow = rate >= 1 || rate > Math.max(STALLED, 1.5 * history.rate);
+    if (rate >= 1 && change <= NEARLY_ROUNDING) rises++;
+    if (solved || (slow && change <= ROUNDING) || rises > 1) {
+      const early = sweep === history.sweeps || rate > 2 * history.rate; // the first change was rounding too
+      history.sweeps = Math.max(2, early ? history.sweeps - 1 : sweep - 1);
       return "OK";
     }
-    rising = rate >= 1 ? rising + 1 : 0;
-    if (rising >= MOST_RISING) return "NO_CONVERGENCE";
+    rising = rate >= 1 ? rising + 1 : 0; // transients may rise over as many sweeps as there are stages
+    if (rising >= NODES + MOST_RISING) return "NO_CONVERGENCE";
     last = change;
   }
   return "NO_CONVERGENCE";
@@ -155,7 +152,7 @@ function attempt(solver, stage) {
   // #else
   work.now.forEach((move, i) => history.moves[i].set(move));
   // #endif
-  history.count = (history.count % PROBE) + 1;
+  history.count = 1;
   return "OK";
 }
 

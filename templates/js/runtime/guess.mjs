@@ -1,3 +1,5 @@
+import { LOST, PLAUSIBLE } from "./plausibility_policy.mjs";
+import { DIFFERENCES, REACH } from "./predictor_policy.mjs";
 import { DIM, FRACTIONS, energy, vectorField } from "./model.mjs";
 // #if NOISE
 import { SOURCES, noiseFields } from "./model.mjs";
@@ -7,12 +9,6 @@ import { rateAt } from "./level.mjs";
 // #endif
 
 // ---- Starting guesses, and whether a solution may be right ----
-
-/** Differences that are kept: extrapolation of more than order 8 amplifies rounding more than it gains. */
-const DIFFERENCES = 9;
-
-/** How far from the last value a guess may be, in sizes of that value. */
-const REACH = 4;
 
 /**
  * The last value of the unknown and its backward differences, which the next is extrapolated by. For
@@ -97,15 +93,6 @@ export class History {
     if (this.count < DIFFERENCES) this.count++;
   }
 }
-
-/**
- * How far a step may lead, in sizes of the state and of what the vector field says, if the energy is
- * lost.
- */
-const PLAUSIBLE = 1.5;
-
-/** The part of the energy that counts as lost. */
-const LOST = 0.5;
 
 const speed = new Float64Array(DIM);
 const point = new Float64Array(DIM);

@@ -1,16 +1,9 @@
-import { relax, slope } from "./model.mjs";
+import { DIRECTIONS, PLAUSIBLE, SOLVED, USEFUL } from "./lattice_newton_policy.mjs";
+import { MOST_SWEEPS, relax, slope } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
 import { sizeOf, solved, usual } from "./sweeps.mjs";
 
 // ---- Newton's method for a stage that sweeps do not solve, its linear equations in Krylov spaces ----
-
-/** Newton's corrections; directions of the space that each is taken from; how well it solves, and has to. */
-const MOST_CORRECTIONS = 200;
-const DIRECTIONS = 24;
-const SOLVED = 1e-6;
-const USEFUL = 0.9;
-/** How far from x a solution is one of the motion, in sizes of x and of what the field says. */
-const PLAUSIBLE = 1.5;
 
 const dot = (a, b) => a.reduce((sum, v, k) => sum + v * b[k], 0);
 const norm = (a) => Math.sqrt(dot(a, a));
@@ -80,7 +73,7 @@ export function byNewton(coef, x, guess, sites) {
   relax(coef, x, x, sites, image);
   const far = PLAUSIBLE * (total(x) + total(image.map((v, k) => v - x[k])));
   let before = 0;
-  for (let correction = 0; correction < MOST_CORRECTIONS; correction++) {
+  for (let correction = 0; correction < MOST_SWEEPS; correction++) {
     relax(coef, x, y, sites, image);
     if (!allFinite(image)) return null;
     const change = linearised(coef, x, y, image.map((v, k) => v - y[k]), usual(image), sites);

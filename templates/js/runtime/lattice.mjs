@@ -1,8 +1,15 @@
+import { PROBE_STEP } from "./start_policy.mjs";
 import { StepError, finite } from "./errors.mjs";
 import { march } from "./march.mjs";
 import { CASIMIRS, CASIMIR_KINDS, COORDINATES, DEFAULT_PARAMETERS, DIM, NAME, ORDER } from "./model.mjs";
 import { AXES, COEFFICIENTS, SPEC_SHA256, TIMES, VERSION } from "./model.mjs";
 import { casimirs, energy, prepare, vectorField } from "./model.mjs";
+// #if OBSERVED
+import { OBSERVABLES, REDUCTIONS, observables } from "./model.mjs";
+// #endif
+// #if OBSERVED_FIELDS
+import { OBSERVED_FIELDS, observedFields } from "./model.mjs";
+// #endif
 // #if KICKS
 import { MULTIPLES } from "./model.mjs";
 // #endif
@@ -16,6 +23,17 @@ import { Sites } from "./sites.mjs";
 import { makeStep } from "./flows.mjs";
 
 // ---- The solver ----
+
+/** The sum of values, compensated after A. Neumaier. */
+function sumOf(values) {
+  let sum = 0, rest = 0;
+  for (const value of values) {
+    const total = sum + value;
+    rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
+    sum = total;
+  }
+  return sum + rest;
+}
 
 /** The coefficients of all flows or stages of a step: a row for each time. */
 function prepareStep(params, h, rows) {
@@ -38,6 +56,12 @@ export class Solver {
   static COORDINATES = COORDINATES;
   static CASIMIRS = CASIMIRS;
   static CASIMIR_KINDS = CASIMIR_KINDS;
+  // #if OBSERVED
+  static OBSERVABLES = OBSERVABLES;
+  // #endif
+  // #if OBSERVED_FIELDS
+  static OBSERVED_FIELDS = OBSERVED_FIELDS;
+  // #endif
   static DEFAULT_PARAMETERS = DEFAULT_PARAMETERS;
 
   /** The state, one field after the other, in each the sites, the last axis fastest; to be read only. */
@@ -107,7 +131,7 @@ export class Solver {
     Object.assign(this, drawsOf(options));
     if (this.step0 >= 2 ** 48) throw new StepError("BAD_ARGUMENT", 0, `step0 is ${this.step0}`);
     // #endif
-    const rows = prepareStep(this.sites.params, 1e-100, this.rows);
+    const rows = prepareStep(this.sites.params, PROBE_STEP, this.rows);
     if (!rows.every((row) => row.every(Number.isFinite))) {
       throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
     }
@@ -217,13 +241,7 @@ export class Solver {
 
   /** The Hamiltonian, of x or of another state. */
   hamiltonian(...at) {
-    let sum = 0, rest = 0;
-    for (const value of this.density(...at)) { // compensated, after A. Neumaier
-      const total = sum + value;
-      rest += Math.abs(sum) >= Math.abs(value) ? (sum - total) + value : (value - total) + sum;
-      sum = total;
-    }
-    return sum + rest;
+    return sumOf(this.density(...at));
   }
 
   /**
@@ -236,6 +254,58 @@ export class Solver {
     return out;
   }
 
+  // #if OBSERVED
+  // #if TIMED
+  /** The observables, in the order of OBSERVABLES, of x and its time or of others. */
+  observables(x = this.x, t = this.t) {
+    this.sites.t = t;
+    return this.#reduced(x);
+  }
+  // #else
+  /** The observables, in the order of OBSERVABLES, of x or of another state. */
+  observables(x = this.x) {
+    return this.#reduced(x);
+  }
+  // #endif
+
+  #reduced(x) {
+    const { count } = this.sites;
+    const densities = new Float64Array(OBSERVABLES.length * count);
+    observables(this.params, x, this.sites, densities);
+    const counts = { sites: count };
+    // #if GRAPH
+    counts.bonds = this.sites.bondCount;
+    // #else
+    counts.pairs = (count * (count - 1)) / 2;
+    // #endif
+    return Float64Array.from(REDUCTIONS, ([kind, over], k) => {
+      const own = densities.subarray(k * count, (k + 1) * count);
+      if (kind === "max") return own.reduce((most, value) => Math.max(most, value), -Infinity);
+      if (kind === "min") return own.reduce((least, value) => Math.min(least, value), Infinity);
+      return kind === "mean" ? sumOf(own) / counts[over] : sumOf(own);
+    });
+  }
+
+  // #endif
+  // #if OBSERVED_FIELDS
+  // #if TIMED
+  /** The observables of sites in the order of OBSERVED_FIELDS, of x and its time or of others. */
+  observedFields(x = this.x, t = this.t) {
+    const out = new Float64Array(OBSERVED_FIELDS.length * this.sites.count);
+    this.sites.t = t;
+    observedFields(this.params, x, this.sites, out);
+    return out;
+  }
+  // #else
+  /** The observables of sites in the order of OBSERVED_FIELDS, of x or of another state. */
+  observedFields(x = this.x) {
+    const out = new Float64Array(OBSERVED_FIELDS.length * this.sites.count);
+    observedFields(this.params, x, this.sites, out);
+    return out;
+  }
+  // #endif
+
+  // #endif
   // #if TIMED
   /** The right-hand side pi(x) grad H(t, x), laid out as x. */
   vectorField(x = this.x, t = this.t) {

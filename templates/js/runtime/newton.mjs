@@ -6,13 +6,11 @@ import { pass, timeOf } from "./level.mjs";
 // #if ATTITUDE
 import { turnStage } from "./attitude.mjs";
 // #endif
-import { DIM, FLOOR, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
+import { FLOOR } from "./measure_policy.mjs";
+import { NEARLY_SOLVED, SHRINKING } from "./newton_policy.mjs";
+import { DIM, MAX_ITERATIONS, TOLERANCE, linearise } from "./model.mjs";
 
 // ---- The implicit step, by Newton's method ----
-
-/** Corrections below the first that shrink by less than the second have reached the level of rounding. */
-const NEARLY_SOLVED = 1e-8;
-const SHRINKING = 0.25;
 
 /**
  * Size of a correction relative to each component of y, but no finer than FLOOR of the largest; NaN if it

@@ -6,7 +6,9 @@ import { pass, timeOf } from "./level.mjs";
 // #if ATTITUDE
 import { turnStage } from "./attitude.mjs";
 // #endif
-import { DIM, FIXED, LONGEST_PATH, MAX_ITERATIONS, MOST_PIECES, SERIES, TERMS } from "./model.mjs";
+import { CONTRACTING, DIFFERENCE, LEAST_SHARE, LONGEST_PATH, MOST_PIECES } from "./path_policy.mjs";
+import { NEARLY_SOLVED, NEGLIGIBLE, PATIENCE, ROUNDED_SLOPE, SHRINKING, SOLVED } from "./path_policy.mjs";
+import { DIM, FIXED, MAX_ITERATIONS, SERIES, TERMS } from "./model.mjs";
 import { generate, pathBegin, pathField, pathOrder } from "./model.mjs";
 
 // ---- The implicit step, along paths dm/dt = pi(m) p ----
@@ -27,7 +29,7 @@ function holds(coef, p) {
   let scale = 0;
   for (let i = 0; i < DIM; i++) scale += Math.abs(end[i]) + Math.abs(slope[i]);
   for (let i = 0; i < DIM; i++) {
-    if (!(Math.abs(field[i] - slope[i]) <= 2e-15 * scale)) return false;
+    if (!(Math.abs(field[i] - slope[i]) <= ROUNDED_SLOPE * scale)) return false;
   }
   return true;
 }
@@ -54,8 +56,8 @@ function followPiece(coef, p, start, shift, mean) {
       mean[i] += term / (k + 2);
       slope[i] += (k + 1) * term;
       end[i] = start[i] + shift[i];
-      const size = Math.abs(start[i]) + Math.abs(shift[i]) + 1e-5 * norm;
-      if (!(Math.abs(term) <= 1e-17 * size)) negligible = false;
+      const size = Math.abs(start[i]) + Math.abs(shift[i]) + LEAST_SHARE * norm;
+      if (!(Math.abs(term) <= NEGLIGIBLE * size)) negligible = false;
     }
     small = negligible ? small + 1 : 0;
     if (small >= 2 && holds(coef, p)) return true;
@@ -125,7 +127,7 @@ function differentiate(solver, coef, p, residual, jacobian) {
   for (let i = 0; i < DIM; i++) norm = Math.max(norm, Math.abs(p[i]));
   for (let j = 0; j < DIM; j++) {
     const q = Float64Array.from(p);
-    q[j] += 1e-7 * norm;
+    q[j] += DIFFERENCE * norm;
     const path = findResidual(solver, coef, q, elsewhere, moved, other, unused);
     made += path.made;
     if (!path.good) return { good: false, made };
@@ -168,7 +170,7 @@ function attempt(solver, stage) {
     }
     size /= norm;
     // The second test: residuals no longer shrink, the solve has reached the level of rounding.
-    if (size <= 4e-16 || (previous < 1e-12 && size > 0.25 * previous)) {
+    if (size <= SOLVED || (previous < NEARLY_SOLVED && size > SHRINKING * previous)) {
       if (!plausible(solver, stage, change)) return "NO_CONVERGENCE";
       // #if MONITOR
       const time = timeOf(solver, stage, y);
@@ -184,7 +186,7 @@ function attempt(solver, stage) {
       history.remember(y);
       return "OK";
     }
-    if (iteration >= 3 && size > 0.05 * previous) {
+    if (iteration >= PATIENCE && size > CONTRACTING * previous) {
       const found = differentiate(solver, coef, p, residual, jacobian);
       made += found.made;
       if (!found.good) return "NO_CONVERGENCE";

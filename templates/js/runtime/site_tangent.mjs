@@ -1,14 +1,10 @@
 import { linearised } from "./krylov.mjs";
-import { follow, side, slope } from "./model.mjs";
+import { CARRIED, CARRIED_SHRINKING, NEARLY_CARRIED } from "./lattice_tangent_policy.mjs";
+import { MOST_SWEEPS, follow, side, slope } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
 import { usual } from "./sweeps.mjs";
 
 // ---- Tangent vectors of the series ----
-
-/** Corrections of a variation of y; how small is rounding, and what is left when they shrink no more. */
-const MOST_REFINED = 200;
-const REFINED = 2 ** -54;
-const NEARLY = 1e-11;
 
 /** Where a stage carries v, in place: dy = S dy + side is solved, and moves it; false where that fails. */
 export function carry(coef, x, y, v, sites) {
@@ -22,11 +18,11 @@ export function carry(coef, x, y, v, sites) {
   if (!Number.isFinite(size)) return false;
   const found = Float64Array.from(own);
   let before = Infinity;
-  for (let correction = 0; correction < MOST_REFINED; correction++) {
+  for (let correction = 0; correction < MOST_SWEEPS; correction++) {
     slope(coef, x, y, found, sites, moved);
     const left = own.map((part, k) => part + moved[k] - found[k]);
     const rest = length(left);
-    if (rest <= REFINED * size || (rest > 0.5 * before && rest <= NEARLY * size)) {
+    if (rest <= CARRIED * size || (rest > CARRIED_SHRINKING * before && rest <= NEARLY_CARRIED * size)) {
       follow(coef, y, found, sites, moved);
       for (let k = 0; k < v.length; k++) v[k] += moved[k];
       return allFinite(v);

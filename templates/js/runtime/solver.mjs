@@ -1,3 +1,4 @@
+import { PROBE_STEP } from "./start_policy.mjs";
 import { StepError, finite } from "./errors.mjs";
 import { march } from "./march.mjs";
 import { makeStage } from "./newton.mjs";
@@ -64,9 +65,9 @@ function admitted(given) {
   }
   const [table] = emptyTables();
   // #if GAUGE
-  prepare(params, new Float64Array(GAUGE.length), 1e-100, table);
+  prepare(params, new Float64Array(GAUGE.length), PROBE_STEP, table);
   // #else
-  prepare(params, 1e-100, table);
+  prepare(params, PROBE_STEP, table);
   // #endif
   if (![table].flat().every((row) => row.every(Number.isFinite))) {
     throw new StepError("BAD_ARGUMENT", 0, "no step can be made with these parameters");
@@ -367,22 +368,7 @@ export class Solver {
     const twin = new Solver({ ...this, x0: this.x });
     const { t, steps, evaluations } = this;
     Object.assign(twin, { t, steps, evaluations });
-    twin.carry.set(this.carry);
-    // #if MONITOR
-    twin.tCarry = this.tCarry;
-    // #endif
-    // #if NOISE
-    twin.dw.set(this.dw);
-    // #endif
-    // #if ATTITUDE
-    twin.firstElement = Float64Array.from(this.firstElement);
-    twin.turned = Float64Array.from(this.turned);
-    twin.turnedCarry = Float64Array.from(this.turnedCarry);
-    // #if RATE_OF_GAUGE
-    twin.turningRate = Float64Array.from(this.turningRate);
-    twin.attitudeFrom = this.attitudeFrom;
-    // #endif
-    // #endif
+    // #state copied
     return twin;
   }
 

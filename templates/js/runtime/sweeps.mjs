@@ -1,3 +1,5 @@
+import { DIFFERENCES, LEAST_SIZE, NEARLY_SETTLED, PATIENCE, ROUNDING } from "./lattice_sweep_policy.mjs";
+import { SETTLED, SLOW } from "./lattice_sweep_policy.mjs";
 import { DIM, MOST_SWEEPS, SCHEDULE, increment, relax } from "./model.mjs";
 import { allFinite } from "./sites.mjs";
 import { byNewton } from "./krylov.mjs";
@@ -9,13 +11,6 @@ import { carry } from "./site_tangent.mjs";
 // #endif
 
 // ---- The step of the series: stages, of which each solves an equation on the whole lattice ----
-
-/** Values that guesses are extrapolated from; a change by this part of y may be rounding. */
-const DIFFERENCES = 4;
-const ROUNDING = 2 ** -40;
-/** After so many sweeps, changes that still shrink by less than this factor are left to Newton's method. */
-const PATIENCE = 10;
-const SLOW = 0.6;
 
 /** The largest magnitude among some values. */
 function most(values, from, to) {
@@ -32,7 +27,7 @@ export function usual(y) {
   const count = y.length / DIM;
   const whole = most(y, 0, y.length);
   const largest = (k) => most(y, k * count, (k + 1) * count);
-  return Float64Array.from({ length: DIM }, (_, k) => largest(k) + 1e-3 * whole + 1e-300);
+  return Float64Array.from({ length: DIM }, (_, k) => largest(k) + LEAST_SIZE * whole + 1e-300);
 }
 
 /** How large a change of y is, field by field. */
@@ -46,7 +41,7 @@ export function sizeOf(change, y) {
 
 /** Whether further sweeps would change y by less than rounding does, or their changes shrink no more. */
 export function solved(change, before, first) {
-  if (change * change <= (before - change) * 2 ** -55) return true;
+  if (change * change <= (before - change) * SETTLED) return true;
   return change >= before && change <= ROUNDING && !first;
 }
 
@@ -61,7 +56,7 @@ function bySweeps(coef, x, guess, sites) {
     const change = sizeOf(next.map((v, k) => v - y[k]), next);
     y = next;
     if (solved(change, before, sweeps === 1)) return y;
-    if (sweeps > PATIENCE && change > Math.max(SLOW * before, 2 ** -30)) return null;
+    if (sweeps > PATIENCE && change > Math.max(SLOW * before, NEARLY_SETTLED)) return null;
     before = change;
   }
   return null;

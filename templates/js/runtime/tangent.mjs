@@ -1,6 +1,7 @@
 import { advance } from "./algebra.mjs";
 // #if IMPLICIT
 import { solve } from "./algebra.mjs";
+import { TANGENT_NEARLY_SOLVED, TANGENT_SHRINKING, TANGENT_SOLVED } from "./tangent_policy.mjs";
 // #endif
 import { DIM, FRACTIONS } from "./model.mjs";
 import { differentiateStage } from "./tangent_newton.mjs";
@@ -24,11 +25,6 @@ export function multiplied(a, b) {
 }
 
 // #if IMPLICIT
-/** Corrections of the first size are rounding; below the second, those that shrink by less than the third. */
-const TANGENT_SOLVED = 1e-15;
-const TANGENT_NEARLY_SOLVED = 1e-10;
-const TANGENT_SHRINKING = 0.25;
-
 /** Whether a solve has reached the level of rounding, by its last two corrections. */
 export function tangentSolved(size, previous) {
   return size <= TANGENT_SOLVED || (size < TANGENT_NEARLY_SOLVED && size > TANGENT_SHRINKING * previous);

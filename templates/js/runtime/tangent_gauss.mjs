@@ -1,5 +1,6 @@
 import { collocate, endOf, mixed, stages, startOf } from "./gauss.mjs";
 import { History } from "./gauss.mjs";
+import { TANGENT_NEARLY_SOLVED, TANGENT_SHRINKING, TANGENT_SOLVED } from "./gauss_tangent_policy.mjs";
 import { DIM, MAX_SWEEPS, MIXING, UNKNOWNS, WEIGHTS } from "./model.mjs";
 import { stageChange, stageChangeJacobian, stageSlopeJacobian } from "./model.mjs";
 
@@ -25,8 +26,8 @@ function variedAlong(solver, slopes, j) {
     }
     if (!Number.isFinite(size)) return null;
     mixed(MIXING, moves, z);
-    if (change <= 1e-17 * size) return moves;
-    if (change <= 1e-13 * size && change > 0.4 * previous) return moves;
+    if (change <= TANGENT_SOLVED * size) return moves;
+    if (change <= TANGENT_NEARLY_SOLVED * size && change > TANGENT_SHRINKING * previous) return moves;
     previous = change;
   }
   return null;

@@ -1,13 +1,11 @@
 import { TINY, solve } from "./algebra.mjs";
-import { DIM, LONGEST_PATH, MAX_ITERATIONS, TANGENT_FIXED, TANGENT_SERIES, TERMS } from "./model.mjs";
+import { LONGEST_PATH } from "./path_policy.mjs";
+import { TANGENT_NEGLIGIBLE, TANGENT_ROUNDED_SLOPE } from "./path_tangent_policy.mjs";
+import { DIM, MAX_ITERATIONS, TANGENT_FIXED, TANGENT_SERIES, TERMS } from "./model.mjs";
 import { curvature, tangentBegin, tangentField, tangentOrder } from "./model.mjs";
 import { identity, multiplied, solvedForAll, tangentSolved } from "./tangent.mjs";
 
 // ---- The derivative of a stage along paths ----
-
-/** Terms that rounding hides in their sum, and rounding of slopes, to which variations add. */
-const TANGENT_NEGLIGIBLE = 1e-18;
-const TANGENT_ROUNDED_SLOPE = 1e-13;
 
 /** Whether the path and its variation satisfy their equation at a point m, where they have this slope. */
 function tangentHolds(coef, p, f, m, slope) {

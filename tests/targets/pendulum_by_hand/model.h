@@ -27,11 +27,11 @@ static const double phi_travels[PHI_STAGES][PHI_KNOTS] = {
 #if PHI_GAUSS
 enum { PHI_PLAIN = 2, PHI_POINT = 2, PHI_MAX_SWEEPS = 100 };
 
-/* The vector field at the stage x + z. */
-static void phi_stage_field(const double *coef, const double x[2], const double z[2], double out[2])
+/* w times the vector field at the stage x + z. */
+static void phi_stage_field(const double *coef, const double x[2], const double z[2], const double w[1], double out[2])
 {
-    out[0] = x[1] + z[1];
-    out[1] = -coef[1] / coef[0] * sin(x[0] + z[0]);
+    out[0] = w[0] * (x[1] + z[1]);
+    out[1] = -w[0] * coef[1] / coef[0] * sin(x[0] + z[0]);
 }
 
 static void phi_stage_change(const double *coef, const double x[2], const double z[2], double out[2])

@@ -11,17 +11,14 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.staging import TABLE
 from phigen.scheme.steps import BACK, Gather, Partners, Sweep, Sweeps
-from phigen.scheme.sweep_inverse import can_be_undone, transposes
+from phigen.scheme.sweep_inverse import can_be_undone, once, transposes
 from phigen.symbolic.expression import symbols_of
 from phigen.symbolic.symbols import AROUND, Symbol
 from phigen.targets import lattice
 from phigen.targets.c.kernels import members
 
-#: Differences that guesses are extrapolated from, of one stage and of all: more gain little and are arrays over sites.
-MOST_DIFFERENCES, MOST_REMEMBERED = 4, 14
-
-#: Directions of a Krylov space, which are arrays over sites.
-DIRECTIONS = 24
+#: Differences that predictions of all stages are extrapolated from: more gain little and are arrays over sites.
+MOST_REMEMBERED = 14
 
 #: Diagonals of a matrix beside its own that elimination is for.
 MOST_BAND = 64
@@ -199,6 +196,7 @@ def waves(program: Program, step: Sweeps) -> bool:
     return split and len(step.schedule.flows) > 1 and program.noise is None and program.profile == "fast"
 
 
+@once
 def hands(program: Program, step: Sweeps) -> list[bool]:
     """Of each part of H whether its transpose gives anything to other sites."""
     found: list[bool] = []

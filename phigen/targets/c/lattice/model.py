@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from phigen.ir.lattice import bounds
+from phigen.scheme.policies import LatticeNewtonPolicy, LatticeSweepPolicy
 from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Sweeps
-from phigen.spec.model import Parameter
+from phigen.spec.model import Parameter, Reduction
+from phigen.spec.names import OVER, REDUCTIONS
 from phigen.targets.c.kernels import function, members
 from phigen.targets.c.lattice.layout import (
-    DIRECTIONS,
-    MOST_DIFFERENCES,
     MOST_REMEMBERED,
     Layout,
     layout_of,
     switches,
 )
+from phigen.targets.c.lattice.seen import share
 from phigen.targets.header import plain
 from phigen.targets.rendering import render
 
@@ -33,7 +34,7 @@ def declarations(program: Program, step: Sweeps) -> str:
     if step.equation:
         stages, has = len(program.fractions), switches(program, step, layout)
         sizes += [("STAGES", stages, "of a step")] if stages > 1 else []
-        sizes += [("DIRECTIONS", DIRECTIONS, "of a Krylov space")] if has["KRYLOV"] else []
+        sizes += [("DIRECTIONS", LatticeNewtonPolicy().directions, "of a Krylov space")] if has["KRYLOV"] else []
         sizes += [("DIFFERENCES", _differences(program), "that a guess is extrapolated from")] if has["GUESSES"] else []
     if step.partners:
         sizes.append(("GATHERED", _gathered(layout), "sums over other sites that are held for each site"))
@@ -51,6 +52,10 @@ def declarations(program: Program, step: Sweeps) -> str:
         "sha256": program.about.spec_sha256,
         "coordinates": ", ".join(program.coordinates),
         "casimirs": f" /* {', '.join(program.casimirs)} */" if program.casimirs else "",
+        "observed_count": len(program.observed),
+        "observed": ", ".join(program.observed),
+        "field_count": len(program.observables.fields),
+        "fields": ", ".join(program.observables.fields),
         "noise": program.noise is not None,
         "members": listed or [("char unused;", "this system has no parameters")],
         "sizes": sizes,
@@ -61,13 +66,13 @@ def declarations(program: Program, step: Sweeps) -> str:
 
 def _differences(program: Program) -> int:
     """Differences of the y of a stage that its guess is extrapolated from."""
-    return max(1, min(MOST_DIFFERENCES, MOST_REMEMBERED // len(program.fractions)))
+    return max(1, min(LatticeSweepPolicy().differences, MOST_REMEMBERED // len(program.fractions)))
 
 
 def _gathered(layout: Layout) -> int:
     """Sums over bonds or pairs that are held for each site at once."""
     own, swept = layout.partners, [sweep.gather for sweep in layout.step.sweeps if sweep.gather]
-    seen = () if layout.sums_up else (own.energy, own.field, own.varied)
+    seen = () if layout.sums_up else own.gathers
     return max([1, *(len(g.names) for g in (*swept, *seen))])
 
 
@@ -77,7 +82,7 @@ def _reserved(program: Program, layout: Layout, has: Mapping[str, bool]) -> int:
     if layout.step.equation:
         stage = 2 if layout.slopes else 3  # y before and after a sweep, and varied
         stage += len(program.fractions) * _differences(program) * has["GUESSES"]
-        stage += has["BANDED"] + (DIRECTIONS + 1 + (own + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
+        stage += has["BANDED"] + (LatticeNewtonPolicy().directions + 1 + (own + 1) * has["SITE_BLOCKS"]) * has["KRYLOV"]
         stage = stage * own + has["KRYLOV"]  # one for sums over pieces
     fields = own + 2 * own * has["COMPENSATED"]  # before a step, and what rounding leaves out
     fields += bool(layout.step.sites.seams)  # and the kinds of sites
@@ -130,6 +135,7 @@ def model(program: Program, step: Sweeps) -> str:
         "middles": ", ".join(map(repr, program.midpoints)),
         "fractions": len(program.fractions) > 1,
         "bound": repr(BOUND) if program.noise else "",
+        "reductions": ", ".join(_braced(_reduction(r)) for r in program.observables.reductions),
         "joined": not program.noise,
         "allowed": [*_allowed(program, graph=layout.graph)],
     }
@@ -147,6 +153,8 @@ def _constants(
 ) -> Iterator[tuple[str, int, str]]:
     """Names, values, and what they are."""
     sites, several = step.sites, len(step.sites.axes) > 1
+    if densities := program.observables.named:
+        yield "SHARE", share(densities), "sites whose densities of observables are computed in one go"
     if has["HALO"]:
         yield "HALO", layout.halo, "sites that are copied beside a row"
         yield "LEAD", (layout.halo + 7) // 8 * 8, "doubles before the first site of a row"
@@ -238,6 +246,11 @@ def _allowed(program: Program, *, graph: bool) -> Iterator[str]:
         yield f"for (size_t k = 0; params->{member} != NULL && k < {at}; ++k)"
         yield f"    if ({wrong}) return 0;"
     yield f"return {' && '.join(asked) or '1'};"
+
+
+def _reduction(reduction: Reduction) -> tuple[int, int]:
+    """Return how an observable is reduced, and what a mean is over, as the runtime numbers them."""
+    return REDUCTIONS.index(reduction.kind), OVER.index(reduction.over)
 
 
 def _braced(items: Sequence[object]) -> str:

@@ -19,13 +19,13 @@ from phigen.targets.c.loops import statements
 def partners(program: Program, layout: Layout) -> Iterator[str]:
     """What bonds or pairs add to energies, and to what moves sites, from the parameters."""
     own = layout.partners
-    for gather in () if layout.sums_up else (own.field, own.energy, own.varied):
+    for gather in () if layout.sums_up else (own.field, own.energy, own.varied, own.observed):
         yield from (loop.text(program) for loop in gathering(program, layout, gather, "params"))
 
 
 def gathering(program: Program, layout: Layout, gather: Gather, source: str) -> Iterator[Loop]:
     """What all bonds, or pairs with other sites, add up at some sites, from ``coef`` or ``params``."""
-    seen = source == "params" and gather in (layout.partners.energy, layout.partners.field)
+    seen = source == "params" and gather in (layout.partners.energy, layout.partners.field, layout.partners.observed)
     calls = seen_calls(program) if seen else in_loops(program)
     for number, (ends, opposite) in enumerate(over_ends(gather)):
         more = told_of_bonds(program, layout, ends, opposite) if source == "coef" else {}

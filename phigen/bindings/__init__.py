@@ -1,0 +1,1 @@
+"""Bindings: the generated C as a module of another language, printed from the `Interface` of a solver."""

@@ -1,0 +1,41 @@
+"""``phigen build --binding``: the generated C for other languages."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from phigen.cli.failures import Collector
+from phigen.cli.generation import Options, generate
+
+if TYPE_CHECKING:
+    from phigen.cli.outputs import Change
+    from phigen.compilation import Compilation
+
+#: Those of `phigen.bindings.emitter`, which the command line knows without importing it.
+LANGUAGES = ("cpp", "fortran", "julia", "matlab", "rust")
+
+
+def with_bindings(
+    planned: Sequence[tuple[Compilation, list[Change]]], options: Options, languages: Sequence[str]
+) -> list[tuple[Compilation, list[Change]]]:
+    """Return what is to be written with the bindings of all systems, and the C that they call.
+
+    Raises `SpecError` for all systems that have none.
+    """
+    from phigen.bindings.emitter import binding
+    from phigen.cli.outputs import Change, read
+
+    collector, result, of_c = Collector(), [], replace(options, single_file=False)
+    for compilation, changes in planned:
+        with collector.collecting():
+            folder = options.directory / compilation.spec.name
+            files = generate(compilation, "c", of_c)
+            for language in dict.fromkeys(languages):
+                files |= binding(compilation, language)
+            paths = {change.path for change in changes}
+            more = [Change(folder / file, read(folder / file), text) for file, text in files.items()]
+            result.append((compilation, [*changes, *(change for change in more if change.path not in paths)]))
+    collector.finish()
+    return result

@@ -1,0 +1,49 @@
+"""``phigen build --fmu``: solvers as functional mock-up units."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from phigen.cli.console import Console
+from phigen.cli.failures import Collector
+from phigen.cli.generation import Options, generate
+
+if TYPE_CHECKING:
+    from phigen.compilation import Compilation
+    from phigen.fmu.archive import Unit
+
+#: The folders of `phigen.fmu.platforms.PLATFORMS`, which the command line knows without importing what makes FMUs.
+_SYSTEMS, _MACHINES = ("linux", "windows", "darwin"), ("x86_64", "aarch64")
+PLATFORMS = tuple(f"{machine}-{system}" for system in _SYSTEMS for machine in _MACHINES)
+
+
+def units_of(compilations: Sequence[Compilation], options: Options) -> dict[str, Unit]:
+    """Return the FMU of each system by its name. Raises `SpecError` for all systems of which there is none."""
+    from phigen.fmu.archive import unit_of
+
+    collector, units, of_c = Collector(), {}, replace(options, single_file=False)
+    for compilation in compilations:
+        with collector.collecting():
+            units[compilation.spec.name] = unit_of(compilation, generate(compilation, "c", of_c))
+    collector.finish()
+    return units
+
+
+def write_unit(console: Console, folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
+    """Compile an FMU and write it to a folder, once for FMI 3.0 and once for 2.0. Raises `ToolchainError`."""
+    from phigen.fmu.archive import archive, binaries
+    from phigen.fmu.platforms import compilers
+    from phigen.writing import write_all
+
+    start, libraries = time.perf_counter(), dict[str, bytes]()
+    for platform in platforms or compilers():
+        console.detail(f"{unit.name}: compiling for {platform}")
+        libraries |= binaries(unit, [platform])
+    paths = {folder / f"{unit.name}.fmu": 3, folder / f"{unit.name}-fmi2.fmu": 2}
+    write_all({path: archive(unit, version, libraries) for path, version in paths.items()})
+    made_for = ", ".join(libraries) or "no machine: there is no C compiler; sources only"
+    console.note(f"wrote {' and '.join(map(str, paths))} in {time.perf_counter() - start:.2f} s, for {made_for}")

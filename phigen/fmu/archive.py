@@ -1,0 +1,93 @@
+"""The files of an FMU: sources, binaries and descriptions, in archives that depend on their contents alone."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import zipfile
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from phigen.errors import ToolchainError
+from phigen.fmu.description import build_description, model_description
+from phigen.fmu.platforms import PLATFORMS, TIMEOUT, compilers
+from phigen.fmu.sources import layer, token_of
+from phigen.fmu.variables import variables_of
+from phigen.runtime import toolchain
+
+if TYPE_CHECKING:
+    from phigen.compilation import Compilation
+
+#: The date of all files in an archive: the first that the format knows.
+_DATE = (1980, 1, 1, 0, 0, 0)
+_FILE, _PROGRAM = 0o100644 << 16, 0o100755 << 16
+
+
+@dataclass(frozen=True)
+class Unit:
+    """An FMU: texts of its ``sources``, ``descriptions`` by version of FMI, and the ``build`` description of 3.0."""
+
+    name: str
+    sources: Mapping[str, str]
+    descriptions: Mapping[int, str]
+    build: str
+
+
+def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> Unit:
+    """Return the FMU of a system; ``solver`` are its files of C, a header and a source.
+
+    Raises `SpecError` where there can be none.
+    """
+    name, variables = compilation.spec.name, variables_of(compilation)
+    token = token_of(compilation, dict(solver))
+    sources = {**solver, f"{name}_fmi.c": layer(compilation, variables, token)}
+    compiled = [file for file in sources if file.endswith(".c")]
+    descriptions = {v: model_description(compilation, variables, token, v, compiled) for v in (2, 3)}
+    return Unit(name, sources, descriptions, build_description(name, compiled))
+
+
+def binaries(unit: Unit, platforms: Collection[str] = ()) -> dict[str, bytes]:
+    """Return the library for each platform, for those that are named, else for all that can be compiled for.
+
+    Raises `ToolchainError` where a compiler fails, or there is none for a platform that is named.
+    """
+    available = compilers()
+    missing = sorted(set(platforms) - set(available))
+    if missing:
+        hint = "pip install ziglang compiles for all of them"
+        raise ToolchainError(f"no compiler for {', '.join(missing)}\n  hint: {hint}")
+    libraries = {}
+    with tempfile.TemporaryDirectory(prefix="phigen-") as scratch:
+        folder = Path(scratch)
+        for file, text in unit.sources.items():
+            (folder / file).write_text(text, encoding="utf-8")
+        compiled = [folder / file for file in unit.sources if file.endswith(".c")]
+        for platform in platforms or available:
+            output = folder / f"{platform}{PLATFORMS[platform].suffix}"
+            toolchain.compile_library(compiled, output, available[platform], TIMEOUT)
+            libraries[platform] = output.read_bytes()
+    return libraries
+
+
+def archive(unit: Unit, version: int, libraries: Mapping[str, bytes]) -> bytes:
+    """Return the bytes of the FMU for FMI 2 or 3."""
+    contents: dict[str, bytes] = {"modelDescription.xml": unit.descriptions[version].encode()}
+    for platform, library in libraries.items():
+        known = PLATFORMS[platform]
+        folder = known.folder if version == 3 else known.folder_2
+        if folder:
+            contents[f"binaries/{folder}/{unit.name}{known.suffix}"] = library
+    contents |= {f"sources/{file}": text.encode() for file, text in unit.sources.items()}
+    if version == 3:
+        contents["sources/buildDescription.xml"] = unit.build.encode()
+    written = io.BytesIO()
+    with zipfile.ZipFile(written, "w", zipfile.ZIP_DEFLATED) as file:
+        for path, data in contents.items():
+            entry = zipfile.ZipInfo(path, _DATE)
+            entry.create_system = 3  # so that permissions hold, whatever machine writes it
+            entry.external_attr = _PROGRAM if path.startswith("binaries/") else _FILE
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            file.writestr(entry, data)
+    return written.getvalue()

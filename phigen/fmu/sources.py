@@ -1,0 +1,74 @@
+"""The C of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 around it.
+
+These lie in ``templates/c/runtime/fmu*.c``; what depends on the system is printed here.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from phigen.fmu.variables import Variable, first_numbers, started
+from phigen.targets.c.amalgamation import Amalgam
+from phigen.targets.c.emitter import runtime_of
+from phigen.targets.c.kernels import members
+from phigen.targets.c.layout import fitted
+from phigen.targets.c.single import literal
+from phigen.targets.header import sealed
+from phigen.targets.rendering import render
+
+if TYPE_CHECKING:
+    from phigen.compilation import Compilation
+
+
+def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
+    """Return the text of ``NAME_fmi.c``, which includes ``NAME.h``."""
+    program = compilation.program
+    has = runtime_of(program)[0].switches
+    amalgam = Amalgam(program.name, has, {"solver.h": "", "fmu_model.h": _model(compilation, variables, token)})
+    text = amalgam.text("fmu.c")
+    body = "\n".join(['#include "' + program.name + '.h"', *sorted(amalgam.headers), "", text])
+    about = [
+        f"{program.name} as a functional mock-up unit for co-simulation, of FMI 2.0 and 3.0.",
+        "DO NOT EDIT: the checksum below notices.",
+        f"SPDX-License-Identifier: {program.about.license}",
+    ]
+    return sealed(about, fitted(body))
+
+
+def token_of(compilation: Compilation, files: dict[str, str]) -> str:
+    """Return the token by which a description and a binary know that they belong together: from the solver's source."""
+    about = "".join(files[name] for name in sorted(files)) + repr(started(compilation.spec))
+    digest = hashlib.sha256(about.encode()).hexdigest()
+    return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
+
+
+def _model(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
+    program, spec = compilation.program, compilation.spec
+    struct = list(members(program).values())
+    written = literal if program.single else repr
+    run, numbers = started(spec), first_numbers(compilation)
+    absent = {} if program.noise else {"SEED": numbers["END"]}  # the number of no variable
+    starts = [v.start for v in variables if v.start is not None]
+    attitude = [v.start or 0.0 for v in variables[numbers["ATTITUDE"] : numbers["POSITION"]]]
+    parameters = [v.start or 0.0 for v in variables[numbers["PARAMETER"] : numbers["STEP"]]]
+    assert len(starts) == numbers["ENERGY"] - 1
+    return render(
+        "c",
+        "fmu_model.h",
+        {
+            "NAME": program.name,
+            "real": "float" if program.single else "double",
+            "token": token,
+            "numbers": list((numbers | absent).items()),
+            "most": max(1, len(program.casimirs), len(program.observed)),
+            "before_last": list(enumerate(struct[:-1])),
+            "last": struct[-1] if struct else "",
+            "parameters": ", ".join(written(v) for v in parameters) or "0",
+            "start": ", ".join(written(float(x)) for x in run.initial),
+            "attitude": ", ".join(written(v) for v in attitude),
+            "step": repr(float(run.step)),
+            "seed": run.seed,
+        },
+    )

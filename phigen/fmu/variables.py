@@ -1,0 +1,151 @@
+"""The variables of an FMU: what its environment reads and sets, by number."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from phigen.errors import SpecError
+
+if TYPE_CHECKING:
+    from phigen.compilation import Compilation
+    from phigen.scheme.program import Program
+    from phigen.spec.model import Run, Spec
+
+QUATERNION = ("w", "x", "y", "z")
+POSITION = ("x", "y", "z")
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A variable as ``modelDescription.xml`` states it.
+
+    ``number`` is its value reference, the same in both versions of FMI. ``start`` is the value that it begins
+    with, None where it is computed. ``whole`` says that it is an integer.
+    """
+
+    name: str
+    causality: str  # independent, input, output, parameter
+    variability: str  # continuous, tunable, fixed
+    start: float | None = None
+    description: str = ""
+    unit: str = ""
+    positive: bool = False
+    whole: bool = False
+    number: int = 0
+
+    @property
+    def initial(self) -> str:
+        """How the value at the start is known; empty where the standard leaves no choice."""
+        if self.causality in ("independent", "input"):
+            return ""
+        return "calculated" if self.start is None else "exact"
+
+
+def started(spec: Spec) -> Run:
+    """Return the run whose initial state, parameters and step an FMU begins with: the first of the spec.
+
+    Raises `SpecError` for lattices, and for a spec without runs.
+    """
+    if spec.lattice:
+        hint = "phigen show --expand SIZES prints a small lattice as an ordinary spec, of which there can be an FMU"
+        raise SpecError(
+            [spec.diagnostic(("lattice",), f"an FMU of {spec.name}: not for lattices in this version", hint)]
+        )
+    if not spec.runs:
+        message = f"an FMU of {spec.name} needs initial values and a step, and the spec has no runs"
+        raise SpecError([spec.diagnostic(("name",), message, "runs: {NAME: {initial: …, step: …, steps: …}}")])
+    return next(iter(spec.runs.values()))
+
+
+def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
+    """Return all variables, numbered as the C counts them."""
+    spec, program = compilation.spec, compilation.program
+    run = started(spec)
+    listed = [_time(spec), *_states(spec, run), *_parameters(spec, run), *_solver(program, run)]
+    listed += [*_attitude(program), *_results(program)]
+    return tuple(replace(variable, number=k) for k, variable in enumerate(listed))
+
+
+def first_numbers(compilation: Compilation) -> dict[str, int]:
+    """Return the number of the first variable of each kind; that of an absent kind is the number of the next kind."""
+    program = compilation.program
+    attitude, element = _sizes_of_attitude(program)
+    counts = {
+        "TIME": 1,
+        "STATE": program.dimension,
+        "PARAMETER": len(program.parameters),
+        "STEP": 1,
+        "SEED": int(program.noise is not None),
+        "ATTITUDE": attitude,
+        "POSITION": element - attitude,
+        "ENERGY": 1,
+        "CASIMIR": len(program.casimirs),
+        "OBSERVABLE": len(program.observed),
+    }
+    numbers, number = {}, 0
+    for kind, count in counts.items():
+        numbers[kind] = number
+        number += count
+    return numbers | {"END": number}
+
+
+def _sizes_of_attitude(program: Program) -> tuple[int, int]:
+    """Numbers of an attitude, and of an attitude with its position."""
+    if not program.attitude:
+        return 0, 0
+    size = math.prod(program.attitude.shape)
+    return size, size + 3 * bool(program.attitude.group.translation)
+
+
+def _time(spec: Spec) -> Variable:
+    taken = {*spec.coordinates, *(p.name for p in spec.parameters)}
+    return Variable("system.time" if "time" in taken else "time", "independent", "continuous", description="the time")
+
+
+def _states(spec: Spec, run: Run) -> Iterator[Variable]:
+    for name, value in zip(spec.coordinates, run.initial, strict=True):
+        yield Variable(name, "output", "continuous", float(value), "coordinate")
+
+
+def _parameters(spec: Spec, run: Run) -> Iterator[Variable]:
+    values = spec.parameters_of(run)
+    for p in spec.parameters:
+        causality, variability = ("input", "continuous") if p.name in spec.inputs else ("parameter", "tunable")
+        yield Variable(p.name, causality, variability, values[p.name], p.description, p.unit, p.positive)
+
+
+def _solver(program: Program, run: Run) -> Iterator[Variable]:
+    of_what = "tau" if program.monitor else "the time"
+    size = f"size of whole steps of {of_what}; communication steps may have any size"
+    size = f"size of whole steps of {of_what}; communication steps are multiples of it" if program.noise else size
+    yield Variable("solver.step", "parameter", "fixed", float(run.step), size, positive=True)
+    if program.noise:
+        seed = "which random numbers are taken"
+        yield Variable("solver.seed", "parameter", "fixed", run.seed, seed, whole=True)
+
+
+def _attitude(program: Program) -> Iterator[Variable]:
+    """The attitude, which begins with the identity, and the position, which begins with 0."""
+    if not program.attitude:
+        return
+    rows = program.attitude.group.rows
+    names = [f"[{i + 1},{j + 1}]" for i in range(rows) for j in range(rows)] or [f".{name}" for name in QUATERNION]
+    shown = "of the matrix of the attitude" if rows else "of the quaternion that turns body into space"
+    for k, name in enumerate(names):
+        one = k % (rows + 1) == 0 if rows else k == 0
+        yield Variable(f"attitude{name}", "output", "continuous", float(one), f"entry {shown}")
+    if program.attitude.group.translation:
+        for name in POSITION:
+            yield Variable(f"position.{name}", "output", "continuous", 0.0, "position of the body in space")
+
+
+def _results(program: Program) -> Iterator[Variable]:
+    yield Variable("system.hamiltonian", "output", "continuous", description="the Hamiltonian")
+    for name in program.casimirs:
+        kept = "" if name in program.pushed else ", constant along trajectories"
+        yield Variable(f"casimirs.{name}", "output", "continuous", description=f"Casimir{kept}")
+    for name in program.observed:
+        yield Variable(f"observables.{name}", "output", "continuous", description="observable")

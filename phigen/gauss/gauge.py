@@ -1,0 +1,65 @@
+"""Multiples of Casimirs that make the velocities of group elements small: then sweeps contract faster.
+
+H and H − Σ λ_c C_c move the coordinates alike, but the group element G by ∇H and by ∇H − Σ λ_c ∇C_c. The second
+derivatives of a quadratic H and of quadratic Casimirs are constant; the λ_c minimise the norm of their difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+
+from phigen.gauss.realisation import Realisation
+from phigen.geometry.system import System
+from phigen.scheme.gauge import Gauge
+from phigen.symbolic.expression import ZERO, Expression, as_expression, gradient, number, symbols_of, total
+
+#: Multiples are rounded to fractions with small denominators: a percent more or less does not matter.
+LARGEST_DENOMINATOR = 1000
+
+
+def slowest(system: System, realisation: Realisation) -> Gauge:
+    """The gauge of the quadratic Casimirs; none where the second derivatives of H are not constant."""
+    indices = [i for group in realisation.groups for i in group.indices]
+    names = [system.coordinates[i] for i in indices]
+    if not names or not realisation.exact or system.driven:
+        return Gauge()
+    second = _hessian(system.hamiltonian, names)
+    if any(s in system.coordinates for s in symbols_of(*second)):
+        return Gauge()
+    hessians = {c: _hessian(e, names) for c, e in system.casimirs.items()}
+    numeric = {c: [e.value for e in h] for c, h in hessians.items() if all(e.is_number for e in h)}
+    multiples = _projected(second, list(numeric.values()))
+    return Gauge(fixed={c: m for c, m in zip(numeric, multiples, strict=True) if not m.is_zero})
+
+
+def _hessian(e: Expression, names: Sequence[str]) -> list[Expression]:
+    return [second for first in gradient(e, names) for second in gradient(first, names)]
+
+
+def _projected(vector: Sequence[Expression], basis: Sequence[Sequence[Fraction]]) -> list[Expression]:
+    """The coefficients of the element of the span of a basis that is nearest to a vector."""
+    orthogonal: list[list[Fraction]] = []
+    transform: list[list[Fraction]] = []  # of the orthogonal vectors, by those of the basis
+    for k, b in enumerate(basis):
+        rest, row = list(b), [Fraction(int(i == k)) for i in range(len(basis))]
+        for o, t in zip(orthogonal, transform, strict=True):
+            factor = _dot(o, b) / _dot(o, o)
+            rest = [r - factor * v for r, v in zip(rest, o, strict=True)]
+            row = [r - factor * v for r, v in zip(row, t, strict=True)]
+        if any(rest):
+            orthogonal.append(rest)
+            transform.append(row)
+    sums = [ZERO] * len(basis)
+    for o, t in zip(orthogonal, transform, strict=True):
+        along = total(number(a / _dot(o, o)) * v for a, v in zip(o, vector, strict=True) if a)
+        sums = [s + number(f) * along for s, f in zip(sums, t, strict=True)]
+    return [_rounded(s) for s in sums]
+
+
+def _dot(a: Sequence[Fraction], b: Sequence[Fraction]) -> Fraction:
+    return sum((x * y for x, y in zip(a, b, strict=True)), Fraction(0))
+
+
+def _rounded(e: Expression) -> Expression:
+    return as_expression(Fraction(e.value).limit_denominator(LARGEST_DENOMINATOR)) if e.is_number else e

@@ -1,0 +1,80 @@
+"""Kernels of what is observed of a lattice: energy, Casimirs, vector field, and the observables of the spec.
+
+An observable that is one number has a density at sites, which targets add up, or take the extremes of. Of terms that
+reach beyond an open end a sum takes none, as H does; an extreme leaves out the sites where any term does.
+"""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+
+from phigen.lattice.cell import PAIRS, Cell
+from phigen.lattice.graphs import field_with_sums
+from phigen.lattice.kernels import site_kernel
+from phigen.lattice.parts import BondSum, present, summands_of
+from phigen.scheme.program import Observables
+from phigen.spec.names import ADDITIVE
+from phigen.symbolic.expression import ONE, Expression, call, number, symbol, total
+from phigen.symbolic.symbols import GATHERED, Symbol
+
+#: The share of a pair at each of its sites, for which it is summed up.
+_SHARE = number(Fraction(1, 2))
+
+
+def observables(cell: Cell, *, single: bool = False) -> Observables:
+    """Return the kernels of all that is observed, for code in ``single`` or in double precision."""
+    origin = [0] * len(cell.axes)
+    density = total(present(cell, s.low, s.high, origin) * s.expression for s in summands_of(cell) if not s.bond)
+    casimirs = [density for density, _ in cell.casimirs.values()]
+    fields = {name: e for name, e in cell.observables.items() if name not in cell.reductions}
+    densities = [_density(cell, name, single=single) for name in cell.reductions]
+    at_sites = [_within(cell, e) for e in fields.values()]
+    return Observables(
+        site_kernel(cell, "energy", "the density of the Hamiltonian", [density], "out"),
+        site_kernel(cell, "casimirs", "the densities of the Casimirs", casimirs, "out"),
+        site_kernel(cell, "vector_field", "pi grad H", field_with_sums(cell), "out"),
+        site_kernel(cell, "observables", "the densities of the observables", densities, "out") if densities else None,
+        tuple(cell.reductions.values()),
+        site_kernel(cell, "observed_fields", "the observables of sites", at_sites, "out") if fields else None,
+        tuple(fields),
+    )
+
+
+def observed_sums(cell: Cell) -> tuple[BondSum, ...]:
+    """Return the sums of observables of bonds, at the sites where these begin, or of pairs, in both orders."""
+    names = [name for name, reduction in cell.reductions.items() if reduction.over != "sites"]
+    sums: dict[str, Expression] = {Symbol(GATHERED, name): cell.observables[name] for name in names}
+    return (BondSum(sums, "" if cell.relation == PAIRS else "a"),) if sums else ()
+
+
+def _density(cell: Cell, name: str, *, single: bool) -> Expression:
+    """Return the density of an observable at a site, with symbols for sums over bonds and pairs.
+
+    Where it reaches beyond an open end, it is a number that is not the largest, or the least, of any two.
+    """
+    reduction = cell.reductions[name]
+    match reduction.over:
+        case "bonds":
+            return symbol(Symbol(GATHERED, name))
+        case "pairs":
+            return _SHARE * symbol(Symbol(GATHERED, name))
+    value = cell.observables[name]
+    if reduction.kind in ADDITIVE:
+        return _within(cell, value)
+    there = _present(cell, value)
+    if there == ONE:
+        return value
+    largest = Fraction(float(np.finfo(np.float32 if single else np.float64).max))
+    return call("choose", there, value, number(-largest if reduction.kind == "max" else largest))
+
+
+def _within(cell: Cell, density: Expression) -> Expression:
+    """Return the density without its terms that reach beyond open ends."""
+    return total(_present(cell, term) * term for term in cell.additive_terms(density))
+
+
+def _present(cell: Cell, term: Expression) -> Expression:
+    """Return 1 where all sites of a term are on the lattice, else 0."""
+    return present(cell, *cell.extent(term), [0] * len(cell.axes)) if cell.axes else ONE

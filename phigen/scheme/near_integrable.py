@@ -1,0 +1,136 @@
+"""Splitting methods for near-integrable systems, H = A + εB with exact flows of A and of B.
+
+A step is e^{a_1 hA} e^{b_1 hεB} … e^{b_s hεB} e^{a_{s+1} hA}, symmetric. Its error is a sum of terms ε^k h^m; a method
+of generalised order (8, 6, 4) has none below εh^8, ε²h^6 and ε³h^4, per unit of time. With c_i = a_1 + … + a_i, and B
+moved along A to c_i, whose Taylor coefficients are free in a Lie algebra, the conditions are
+
+- of order ε: Σ b_i c_i^k = 1/(k + 1), those of a quadrature;
+- of order ε²: Σ_{i<j} b_i b_j (c_i^k c_j^l − c_i^l c_j^k) = (1/(k + 1) − 1/(l + 1))/(k + l + 2) for k < l, at
+  h^{k+l+2}.
+
+J. Laskar, P. Robutel, High order symplectic integrators for perturbed Hamiltonian systems, Celestial Mechanics and
+Dynamical Astronomy 80 (2001): Gauss's quadrature, (2s, 2). R. I. McLachlan, Composition methods in the presence of
+small parameters, BIT 35 (1995): (8, 4). S. Blanes, F. Casas, A. Farrés, J. Laskar, J. Makazaga, A. Murua, New families
+of symplectic splitting methods for numerical integration in dynamical astronomy, Applied Numerical Mathematics 68
+(2013): (8, 6, 4) and (10, 6, 4).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import pairwise
+
+from phigen.gauss.tableau import gauss_nodes
+from phigen.scheme.alternation import Alternation
+
+# The first half of a and of b, the middle included, to 60 digits: zeros of the conditions by Newton's method.
+_8_4 = (
+    "0.0753469602698928884165278036834744643726526645540790631409721 "
+    "0.517916854688256782300773978496315644323847447821980915025719 "
+    "-0.0932638149581496707173017821797901086965001123760599781666913",
+    "0.190225939373676619245230762738453897461203619904872644686567 "
+    "0.846524070443526257055080544646775834177113742394682854555924 "
+    "-1.07350001963440575260062261477045946327663472459911099848498",
+)
+_8_6_4 = (
+    "0.0711334264982231177779387300061549964174022959237396066958582 "
+    "0.241153427956640098736487795326289649617814678049335179255881 "
+    "0.521411761772814789212136078067994229991436478850263542789578 "
+    "-0.333698616227678005726562603400438876026653452823338328741317",
+    "0.183083687472197221961703757166430291072624126551597616793627 "
+    "0.310782859898574869507522291054262796375157321116257726841587 "
+    "-0.0265646185119588006972121379164987592663297728525475851924395 "
+    "0.0653961422823734184559721793911134363710",
+)
+_10_6_4 = (
+    "0.0380944974224121954569753223086375653406600603958069701639145 "
+    "0.145298716116913749294020072660663749744308885146126023662728 "
+    "0.207627695725541250716205611324988206515836968446160915076714 "
+    "0.435909703651526159223154862401065184400688796494327254963353 "
+    "-0.65386122583278670938071173739070941200298942096484232773342",
+    "0.095858880837075210610771503771458847769342226040714700327836 "
+    "0.204446153142998780680507783916434477976329958617371067841119 "
+    "0.217070347978991101714338592430633671452975982042108321618577 "
+    "-0.0173753819590650930056178801185269971986481667001940897875319",
+)
+
+
+@dataclass(frozen=True)
+class NearIntegrable(Alternation):
+    """A method for H = A + εB: ``generalised`` has the power of h at which errors in ε, ε², … begin.
+
+    ``a`` and ``b`` are the fractions of the flows of A and of B.
+    """
+
+    generalised: tuple[int, ...] = ()
+    a: tuple[Fraction, ...] = ()
+    b: tuple[Fraction, ...] = ()
+
+    @property
+    def errors(self) -> str:
+        """The leading errors, as text: ε h^8 + ε² h^4."""
+        powers = ("ε", "ε²", "ε³")
+        return " + ".join(f"{power} h^{m}" for power, m in zip(powers, self.generalised, strict=False))
+
+
+def _method(name: str, generalised: tuple[int, ...], a: list[Fraction], b: list[Fraction]) -> NearIntegrable:
+    """The method with these fractions, which sum to 1."""
+    times = [t for pair in zip(a, b, strict=False) for t in pair]
+    alpha = [times[0]]
+    for t in times[1:]:
+        alpha.append(t - alpha[-1])
+    return NearIntegrable(name, generalised[-1], tuple(alpha), generalised, tuple(a), tuple(b))
+
+
+def _listed(name: str, generalised: tuple[int, ...], stages: int, halves: tuple[str, str]) -> NearIntegrable:
+    """The method from the first halves of a and b, whose middles are what is left of 1."""
+    a, b = ([Fraction(v) for v in half.split()] for half in halves)
+    return _method(name, generalised, _mirrored(a, stages + 1), _mirrored(b, stages))
+
+
+def _mirrored(half: list[Fraction], count: int) -> list[Fraction]:
+    """All fractions, of which there are ``count``; the sum of the first half is made exact in its last one."""
+    others, odd = half[:-1], count % 2
+    last = 1 - 2 * sum(others, Fraction(0)) if odd else Fraction(1, 2) - sum(others, Fraction(0))
+    return [*others, last, *([] if odd else [last]), *reversed(others)]
+
+
+def _quadrature(stages: int) -> NearIntegrable:
+    """The method of Laskar and Robutel with so many flows of B: nodes and weights of Gauss."""
+    nodes = [Fraction(0), *gauss_nodes(stages), Fraction(1)]
+    a = [after - before for before, after in pairwise(nodes)]
+    b = [_weight(nodes[1:-1], i) for i in range(stages)]
+    a, b = (_mirrored(f[: (len(f) + 1) // 2], len(f)) for f in (a, b))
+    return _method(f"saba-{2 * stages}-2", (2 * stages, 2), a, b)
+
+
+def _weight(nodes: list[Fraction], i: int) -> Fraction:
+    """The integral over [0, 1] of the polynomial that is 1 at one node and 0 at the others."""
+    p = [Fraction(1)]
+    for c in (c for j, c in enumerate(nodes) if j != i):
+        p = [(x - c * y) / (nodes[i] - c) for x, y in zip([Fraction(0), *p], [*p, Fraction(0)], strict=True)]
+    return sum((x / (k + 1) for k, x in enumerate(p)), Fraction(0))
+
+
+#: All methods, the recommended one of each order first.
+METHODS = (
+    _quadrature(4),
+    _quadrature(2),
+    _quadrature(3),
+    _quadrature(5),
+    _listed("aba-10-6-4", (10, 6, 4), 8, _10_6_4),
+    _listed("aba-8-6-4", (8, 6, 4), 7, _8_6_4),
+    _listed("aba-8-4", (8, 4), 5, _8_4),
+)
+NAMES = tuple(method.name for method in METHODS)
+
+
+def find(name: str, order: int) -> NearIntegrable | None:
+    """The method of that name (``auto``: the recommended one) and order, or None."""
+    return next((m for m in METHODS if m.order == order and name in ("auto", m.name)), None)
+
+
+def orders(name: str) -> list[int]:
+    """The orders that a name offers."""
+    return sorted({m.order for m in METHODS if m.name == name})

@@ -1,0 +1,73 @@
+"""The observables of a spec: expressions; of lattices fields at sites, and sums, means and extremes of densities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+from phigen.spec.declarations import Declarations
+from phigen.spec.grammar import Scope
+from phigen.spec.model import Reduction
+from phigen.spec.names import ADDITIVE, REDUCTIONS
+from phigen.spec.yaml_source import Scalar
+from phigen.symbolic.expression import Expression
+
+#: Names of what output holds beside the observables.
+RECORDED = ("t", "tau", "x", "energy", "state", "attitude", "position")
+#: The relation of sites that densities of bonds and pairs need, and how a spec declares it.
+_RELATIONS = {"bonds": ("graph", "lattice: {graph: NAME}"), "pairs": ("pairs", "lattice: {pairs: all}")}
+
+
+def observables(
+    raw: Mapping[str, tuple[Scalar, Any]], declared: Declarations, casimirs: Iterable[str]
+) -> tuple[dict[str, Expression], dict[str, Reduction]]:
+    """Return the expressions of ``observables``, and how densities of lattices are reduced to one number.
+
+    Names are those of columns of the output beside coordinates and Casimirs.
+    """
+    used_names = dict.fromkeys(declared.coordinates, "a coordinate") | dict.fromkeys(casimirs, "a Casimir")
+    used_names |= {name: "a column of every output" for name in (*RECORDED, declared.time) if name}
+    values: dict[str, Expression] = {}
+    reductions: dict[str, Reduction] = {}
+    for name, (key, entry) in raw.items():
+        if name in used_names:
+            message = f"observables: {name!r} is the name of {used_names[name]}"
+            declared.reader.error(key, message, "choose another name")
+        reduction = _reduction(name, entry, declared) if isinstance(entry, dict) else None
+        node = entry.get(reduction.kind) if reduction else entry
+        value = declared.formula(node, _scope(reduction, declared)) if isinstance(node, Scalar) else None
+        if value is not None:
+            values[name] = value
+            reductions |= {name: reduction} if reduction else {}
+    return values, reductions
+
+
+def _scope(reduction: Reduction | None, declared: Declarations) -> Scope:
+    """Return the names that an observable may use."""
+    of_bonds = reduction is not None and reduction.over != "sites"
+    scope = declared.bond_scope(dated=True) if of_bonds else declared.dated_scope()
+    return replace(scope, piecewise=True)
+
+
+def _reduction(name: str, entry: Mapping[str, Any], declared: Declarations) -> Reduction | None:
+    """Return how a density is reduced; None after errors."""
+    kind = next((k for k in REDUCTIONS if entry.get(k) is not None), None)
+    if kind is None:
+        return None
+    over, add = entry.get("over", "sites"), declared.reader.problems.add
+    place = declared.reader.locations["observables", name, kind]
+    if declared.lattice is None:
+        add(f"observables: {kind} is over the sites of a lattice", place, "give the formula alone")
+        return None
+    relation, declaration = _RELATIONS.get(over, (declared.relation, ""))
+    if relation != declared.relation:
+        place = declared.reader.locations["observables", name, "over"]
+        hint = "x[i+1] is a neighbour on a grid" if declared.relation == "grid" else ""
+        add(f"observables: over: {over} needs {declaration}", place, hint)
+        return None
+    if over != "sites" and kind not in ADDITIVE:
+        message = f"observables: {kind} is over sites only; of {over} there are sums and means"
+        add(message, place, f"{{{ADDITIVE[0]}: …, over: {over}}}")
+        return None
+    return Reduction(kind, over)

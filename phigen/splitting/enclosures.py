@@ -1,0 +1,49 @@
+"""The numbers of a matrix exponential beside rigorous enclosures of the exact values, by ball arithmetic."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from flint import arb, arb_mat, ctx
+from numpy.typing import NDArray
+
+from phigen.splitting.matrices import MatrixExponential, exponential_less_one
+from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.verdict import CHECKED, REFUTED, UNDECIDED, Statement
+
+#: Times at which the numbers are compared, as multiples of 1/‖A‖.
+TIMES = (1e-3, 1.0, 30.0)
+
+#: Allowed errors, in units of rounding, relative to the norm of the matrix: for each row, and for each unit of ‖tA‖.
+UNITS = 8.0
+
+#: Bits of the enclosures.
+BITS = 200
+
+
+def enclosed(name: str, exponential: MatrixExponential, values: Mapping[str, float]) -> Statement:
+    """Whether exp(tA) − 1 is exact but for rounding, with these values of parameters."""
+    try:
+        rates = np.array(evaluate(list(exponential.rates), values)).reshape(exponential.size, -1)
+    except (DomainError, KeyError):
+        return Statement(name, UNDECIDED, "A has no value with the default parameters")
+    norm = float(np.abs(rates).sum(axis=1).max())
+    errors = [_error(rates * (t / (norm or 1.0))) / (exponential.size + t) for t in TIMES]
+    worst = max(errors) / np.finfo(float).eps
+    return Statement(name, CHECKED if worst <= UNITS else REFUTED, f"‖tA‖ up to {TIMES[-1]:g}, by ball arithmetic")
+
+
+def _error(a: NDArray[np.float64]) -> float:
+    """The error of exp(a) − 1 relative to its norm."""
+    computed, before = exponential_less_one(a), ctx.prec
+    try:
+        ctx.prec = BITS
+        exact = arb_mat([[arb(float(e)) for e in row] for row in a]).exp()
+        n = len(a)
+        differences = [abs(exact[i, j] - int(i == j) - arb(float(computed[i, j]))) for i in range(n) for j in range(n)]
+        largest = max(float(d.mid() + d.rad()) for d in differences)
+    finally:
+        ctx.prec = before
+    scale = float(np.abs(computed).sum(axis=1).max())
+    return largest / scale if scale else largest

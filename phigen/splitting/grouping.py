@@ -1,0 +1,107 @@
+"""Sums of terms of H that have a simpler flow together than each has by itself, such as rotations about a vector.
+
+*Cancelling terms.* Of m·N on se(3)*, each m_i N_i moves m and N by products of both, and their sum moves neither: what
+is left turns other vectors about N. Terms are taken together if monomials of their vector fields cancel.
+
+*Linear terms.* Σ v_i m_i, where all v commute with each other and with all m, is a rotation about v, or a shear, or any
+other motion of a Lie algebra: v stands still, and m obeys linear equations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import Any
+
+from phigen.splitting.flow import Flow, Term, joint_flow
+from phigen.splitting.ring import Monomial, Ring
+from phigen.splitting.terms import monomial_terms
+from phigen.symbolic.expression import total
+from phigen.symbolic.tower import Poly
+
+#: A coordinate of the field, and a monomial.
+_Place = tuple[int, Monomial]
+
+
+def groupings(ring: Ring, terms: Sequence[Term]) -> Iterator[list[Term]]:
+    """The terms with such sums taken together: cancelling ones, linear ones, and both; none where π is constant."""
+    if not _algebra(ring):
+        return
+    cancelling = _with_cancelling(ring, terms)
+    for candidate in (cancelling, _with_linear(ring, terms), cancelling and _with_linear(ring, cancelling)):
+        if candidate:
+            yield candidate
+
+
+def _with_cancelling(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
+    """The terms with those summed up whose fields have monomials that cancel, if the sum has a flow."""
+    fields = [_field_monomials(ring, t) for t in terms]
+    users: dict[_Place, list[int]] = {}
+    for k, field in enumerate(fields):
+        for place in field:
+            users.setdefault(place, []).append(k)
+    label = list(range(len(terms)))
+    for place, sharing in users.items():
+        for n, a in enumerate(sharing):
+            for b in sharing[:n]:
+                if label[a] != label[b] and fields[a][place] + fields[b][place] == 0:
+                    label = [label[b] if old == label[a] else old for old in label]
+    classes = [[t for t, k in zip(terms, label, strict=True) if k == chosen] for chosen in dict.fromkeys(label)]
+    sums = [t for group in classes for t in (_sum_with_flow(ring, group) or group)]
+    return sums if len(sums) < len(terms) else None
+
+
+def _sum_with_flow(ring: Ring, group: Sequence[Term]) -> list[Term] | None:
+    """The sum of several terms as one, if it has a flow."""
+    if len(group) == 1:
+        return None
+    together = Term(total(t.expression for t in group), ring.tower.combine(t.element for t in group))
+    return [together] if isinstance(joint_flow(ring, [together], numeric=True), Flow) else None
+
+
+def _field_monomials(ring: Ring, term: Term) -> dict[_Place, Any]:
+    """The coefficients of π∇G by coordinate and monomial of all variables of the ring."""
+    return {
+        (i, tuple(map(int, m))): c
+        for i, rate in enumerate(ring.field(term.element))
+        if rate != 0
+        for m, c in rate.to_dict().items()
+    }
+
+
+def _with_linear(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
+    """The terms with those summed up that are linear in the coordinates of an algebra, if not all of these commute."""
+    algebra = _algebra(ring)
+    linear: list[Term] = []
+    others: list[Term] = []
+    for term in terms:
+        pieces = monomial_terms(ring, term.element)
+        inside = [p for p in pieces if _is_linear(ring, p.element, algebra)]
+        linear += inside
+        if len(inside) < len(pieces):
+            rest = ring.tower.combine([term.element, *(-p.element for p in inside)])
+            others.append(Term(ring.expression(rest), rest) if inside else term)
+    if all(ring.commute(a.element, b.element) for n, a in enumerate(linear) for b in linear[:n]):
+        return None
+    together = _sum_with_flow(ring, linear)
+    return [*others, *together] if together else None
+
+
+def _algebra(ring: Ring) -> frozenset[int]:
+    """The coordinates that have a bracket which is not constant."""
+    n = range(len(ring.coordinates))
+    return frozenset(i for i in n if any(ring.support(ring.poisson[i][j]) for j in ring.brackets_of[i]))
+
+
+def _is_linear(ring: Ring, element: Poly, algebra: Collection[int]) -> bool:
+    """Whether a monomial is one coordinate of the algebra times what commutes with all of it."""
+    names = [ring.coordinates[i] for i in algebra]
+    ((monomial, _),) = ring.terms(element, ring.state).items()
+    reading = [
+        (v, exponent)
+        for v, exponent in enumerate(monomial)
+        if exponent and ring.tower.depends_on(ring.tower.gens[v], names)
+    ]
+    if [exponent for _, exponent in reading] != [1] or ring.tower.names[reading[0][0]] not in names:
+        return False
+    factors = [i for i in ring.support(element) if i not in algebra]
+    return all((i, j) in ring.zero_pairs for i in factors for j in (*factors, *algebra))

@@ -1,0 +1,149 @@
+"""Linear parts whose matrix is known before the steps: exp(tA) − 1 as numbers, for any A up to `MOST_ROWS` rows.
+
+The entries of A are functions of parameters. Where the coefficients of a linear motion hold values that stand still
+along the flow but change from step to step, as a coupling to a coordinate of another part, products of such values with
+what moves are unknowns of their own: q̇ = p, ṗ = −q + f is linear in q, p and f, with f as the third unknown.
+
+Scaling and squaring: with ‖A/2^s‖ ≤ 1/2 the Padé approximant of order 6 is F = 2(V − U)⁻¹U, with the even part V and
+the odd part U of its numerator, and F ↦ 2F + F² takes exp(A) − 1 to exp(2A) − 1, which keeps all digits of a small A.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from hashlib import blake2b
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phigen.splitting.closure import LinearMotion
+from phigen.splitting.ring import TIME, Monomial, Ring
+from phigen.symbolic.expression import Expression, symbol, total
+from phigen.symbolic.symbols import EXPONENTIAL, Symbol
+from phigen.symbolic.tower import Poly
+
+#: Most rows of a matrix, and most factors of an unknown.
+MOST_ROWS, MOST_DEGREE = 64, 8
+
+#: The numerator of the Padé approximant of order 6, error 2·10⁻¹⁷ up to this norm.
+PADE = tuple(Fraction(1, n) * m for m, n in ((1, 1), (1, 2), (5, 44), (1, 66), (1, 792), (1, 15840), (1, 665280)))
+REACH = 0.5
+
+
+@dataclass(frozen=True)
+class MatrixExponential:
+    """exp(tA) − 1, computed before the steps; ``rates`` are the entries of A, row by row."""
+
+    rates: tuple[Expression, ...]
+
+    @property
+    def size(self) -> int:
+        """The number of rows."""
+        return next(n for n in range(1, 1 + len(self.rates)) if n * n == len(self.rates))
+
+    @property
+    def exponents(self) -> list[Expression]:
+        """The entries of tA."""
+        return [symbol(TIME) * e for e in self.rates]
+
+    @property
+    def symbols(self) -> list[Symbol]:
+        """The symbols of the entries of exp(tA) − 1, row by row; equal matrices have equal ones."""
+        key = blake2b(b"|".join(e.digest for e in self.rates), digest_size=8).hexdigest()
+        return [Symbol(EXPONENTIAL, key, k) for k in range(len(self.rates))]
+
+    @cached_property
+    def reached(self) -> list[set[int]]:
+        """For each row the columns where exp(tA) − 1 may not vanish, by the zeros of A."""
+        n = range(self.size)
+        found = [{j for j in n if not self.rates[i * self.size + j].is_zero} for i in n]
+        while True:
+            wider = [set.union(near, *(found[k] for k in near)) for near in found]
+            if wider == found:
+                return found
+            found = wider
+
+    def slopes(self) -> dict[str, Expression]:
+        """The derivatives of the entries along the time: A exp(tA)."""
+        n, entries = self.size, self.symbols
+        rates: dict[str, Expression] = {}
+        for k, name in enumerate(entries):
+            i, j = divmod(k, n)
+            terms = [self.rates[i * n + m] * symbol(entries[m * n + j]) for m in range(n) if j in self.reached[m]]
+            rates[name] = total([self.rates[k], *(e for e in terms if not e.is_zero)])
+        return rates
+
+
+@dataclass(frozen=True)
+class StaticSolution:
+    """The increments of the coordinates of a linear motion in the entries of a matrix exponential."""
+
+    increments: tuple[Expression, ...]
+    exponential: MatrixExponential
+
+
+def solve(ring: Ring, motion: LinearMotion) -> StaticSolution | None:
+    """exp(tA)w − w with a matrix of static entries; None if there is none."""
+    rows = _static_rows(ring, motion)
+    if rows is None:
+        return None
+    first = motion.basis[: len(motion.coordinates)]
+    basis = [*first, *(m for m in rows if m not in first)]
+    zero = ring.tower.zero
+    exponential = MatrixExponential(tuple(ring.expression(rows[m].get(k, zero)) for m in basis for k in basis))
+    n, names, reached = len(basis), exponential.symbols, exponential.reached
+    w = [ring.expression(ring.monomial(m)) for m in basis]
+    increments = [
+        total(symbol(names[i * n + j]) * w[j] for j in range(n) if j in reached[i])
+        for i in range(len(motion.coordinates))
+    ]
+    return StaticSolution(tuple(increments), exponential)
+
+
+def _static_rows(ring: Ring, motion: LinearMotion) -> dict[Monomial, dict[Monomial, Poly]] | None:
+    """The equations of products of the unknowns with values that stand still, until they close."""
+    matrix = {
+        m: {k: c for k, c in zip(motion.basis, row, strict=True) if c != 0}
+        for m, row in zip(motion.basis, motion.matrix, strict=True)
+    }
+    one = (0,) * len(motion.basis[0])
+    pending = [(one, m) for m in reversed(motion.basis[: len(motion.coordinates)])]
+    rows: dict[Monomial, dict[Monomial, Poly]] = {}
+    while pending:
+        factor, m = pending.pop()
+        unknown = _times(factor, m)
+        if unknown in rows:
+            continue
+        if len(rows) == MOST_ROWS or sum(unknown) > MOST_DEGREE:
+            return None
+        row: dict[Monomial, list[Poly]] = {}
+        for k, coefficient in matrix[m].items():
+            for still, c in ring.terms(coefficient, ring.changing).items():
+                row.setdefault(_times(_times(factor, still), k), []).append(c)
+                pending.append((_times(factor, still), k))
+        rows[unknown] = {k: ring.tower.combine(c) for k, c in row.items()}
+    return rows
+
+
+def _times(a: Monomial, b: Monomial) -> Monomial:
+    return tuple(x + y for x, y in zip(a, b, strict=True))
+
+
+def exponential_less_one(a: NDArray[np.float64]) -> NDArray[np.float64]:
+    """exp(a) − 1 as the generated code computes it."""
+    n, norm = len(a), float(np.abs(a).sum(axis=1).max())
+    if not np.isfinite(norm):
+        return np.full_like(a, np.nan)
+    squarings = 0
+    while norm > REACH:
+        norm, squarings = norm / 2, squarings + 1
+    c, a, one = [float(v) for v in PADE], a * 0.5**squarings, np.eye(n)
+    b = a @ a
+    even = ((c[6] * b + c[4] * one) @ b + c[2] * one) @ b + one
+    odd = a @ ((c[5] * b + c[3] * one) @ b + c[1] * one)
+    f = np.linalg.solve(even - odd, 2 * odd)
+    for _ in range(squarings):
+        f = 2 * f + f @ f
+    return np.asarray(f)

@@ -1,0 +1,138 @@
+"""Kepler motions among the terms of H: p²/2m and −k/|q| of one body, which do not commute, taken together.
+
+A body is two or three coordinates q with 1/|q| in H, and their conjugate momenta. What is left of the terms are
+perturbations; where these are small beside the motions, H = A + εB is near-integrable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import inf
+
+from phigen.geometry.system import System
+from phigen.splitting.flow import Term
+from phigen.splitting.kepler import KeplerMotion
+from phigen.splitting.ring import Ring
+from phigen.splitting.terms import joined, monomial_terms
+from phigen.symbolic.numeric import DomainError, evaluate
+from phigen.symbolic.tower import Generator, Poly
+
+#: Dimensions of the space in which a body moves.
+_DIMENSIONS = (2, 3)
+
+#: Largest ratio of the coefficients of a perturbation to those of the motions for which methods of a near-integrable
+#: system are taken: below, errors of ε² h^6 and ε³ h^4 are less than those of general methods of order 4.
+SMALL = 0.02
+
+
+def with_motions(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
+    """The terms with Kepler motions taken together, these first; None if there are no such motions.
+
+    Only terms of one body by itself belong to its motion: (p_1 + p_2)² stays whole, and commutes with what depends on
+    q_1 − q_2.
+    """
+    motions = list(_motions(ring, terms))
+    if not motions:
+        return None
+    taken = [Term(motion.hamiltonian(ring.coordinates), element, motion) for motion, element in motions]
+    return [*taken, *_remaining(ring, terms, taken)]
+
+
+def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> int | None:
+    """The index of the part εB of a near-integrable H = A + εB, None if H is no such sum of two parts.
+
+    Small is what has a factor that is declared to be small. Without such a declaration it is what stands beside Kepler
+    motions, if its coefficients are small.
+    """
+    if len(parts) != 2:
+        return None
+    declared = [ring.tower.names.index(p.name) for p in system.parameters if p.small and p.name in ring.tower.names]
+    if declared:
+        small = [all(_vanishes_with(ring, term, declared) for term in part) for part in parts]
+        return small.index(True) if sum(small) == 1 else None
+    beside = [k for k, part in enumerate(parts) if not any(term.motion for term in part)]
+    if len(beside) != 1:
+        return None
+    other, motions = [parts[k] for k in (beside[0], 1 - beside[0])]
+    return beside[0] if size_of(system, ring, other) < SMALL * size_of(system, ring, motions) else None
+
+
+def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
+    """Whether every monomial of a term has one of these variables as a factor."""
+    return all(any(exponents[v] for v in variables) for exponents in term.element.to_dict())
+
+
+def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:
+    """The sum of the magnitudes of the coefficients of terms that move something, parameters at their defaults."""
+    values = {p.name: float(p.value) for p in system.parameters}
+    sizes = []
+    for term in terms:
+        if all(e == 0 for e in ring.field(term.element)):
+            continue
+        sizes += [ring.expression(c) for c in ring.terms(term.element, ring.state).values()]
+    try:
+        return sum(abs(v) for v in evaluate(sizes, values))
+    except (DomainError, KeyError):
+        return inf
+
+
+def _remaining(ring: Ring, terms: Sequence[Term], motions: Sequence[Term]) -> list[Term]:
+    """The terms without the monomials of the motions; those that have none of them as they were written."""
+    untouched, rest = [], []
+    for term in terms:
+        inside = {m for motion in motions for m in ring.terms(motion.element, ring.state) if _is_of(ring, term, motion)}
+        monomials = ring.terms(term.element, ring.state)
+        if inside.isdisjoint(monomials):
+            untouched.append(term)
+        else:
+            rest += [c * ring.monomial(m) for m, c in monomials.items() if m not in inside]
+    split = [t for e in rest for t in monomial_terms(ring, e)]
+    return [*untouched, *joined(ring, split)]
+
+
+def _is_of(ring: Ring, term: Term, motion: Term) -> bool:
+    """Whether a term depends on the coordinates of one motion only."""
+    return {*ring.support(term.element)} <= {*ring.support(motion.element)}
+
+
+def _motions(ring: Ring, terms: Sequence[Term]) -> Iterator[tuple[KeplerMotion, Poly]]:
+    """The Kepler motions in H with what they are in the ring."""
+    size = len(ring.tower.gens)
+    supports = [{*ring.support(t.element)} for t in terms]
+    for generator in ring.tower.generators:
+        positions = _distance_from(ring, generator.arguments) if _is_inverse_distance(generator) else ()
+        momenta = [j for i in positions if (j := _conjugate(ring, i)) is not None]
+        if not positions or len(momenta) < len(positions):
+            continue
+        alone = [t.element for t, inside in zip(terms, supports, strict=True) if inside <= {*positions, *momenta}]
+        coefficients = ring.terms(ring.tower.combine(alone), ring.state)
+        pull = coefficients.get(_exponents(size, ring.tower.names.index(generator.name), 1))
+        places = [ring.tower.names.index(ring.coordinates[j]) for j in momenta]
+        squares: list[Poly] = [coefficients.get(_exponents(size, place, 2), ring.tower.zero) for place in places]
+        if pull is None or squares[0] == 0 or any(square != squares[0] for square in squares):
+            continue
+        motion = KeplerMotion(positions, tuple(momenta), ring.expression(2 * squares[0]), ring.expression(-pull))
+        kinetic = [squares[0] * ring.tower.gens[place] ** 2 for place in places]
+        yield motion, ring.tower.combine([*kinetic, pull * ring.tower.variable(generator.name)])
+
+
+def _is_inverse_distance(generator: Generator) -> bool:
+    return generator.kind == "root" and generator.degree == 2 and generator.inverse
+
+
+def _distance_from(ring: Ring, arguments: Sequence[Poly]) -> tuple[int, ...]:
+    """The coordinates whose squares sum to the argument of a root; none if it is another."""
+    inside = ring.support(arguments[0])
+    squares = ring.tower.combine(ring.tower.variable(ring.coordinates[i]) ** 2 for i in inside)
+    return inside if len(inside) in _DIMENSIONS and arguments[0] == squares else ()
+
+
+def _conjugate(ring: Ring, i: int) -> int | None:
+    """The coordinate p with {q, p} = 1, if neither has a bracket with another."""
+    partners = ring.brackets_of[i]
+    alone = len(partners) == 1 and ring.brackets_of[partners[0]] == [i]
+    return partners[0] if alone and ring.poisson[i][partners[0]] == 1 else None
+
+
+def _exponents(size: int, variable: int, exponent: int) -> tuple[int, ...]:
+    return tuple(exponent * (k == variable) for k in range(size))

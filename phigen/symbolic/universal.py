@@ -1,0 +1,114 @@
+"""The universal anomaly of a Kepler motion: s with ds = dt/r, for ellipses, parabolas, hyperbolas and radial motions.
+
+Along q̈ = −μq/r³, with r and η = q·q̇ at the start and β = 2μ/r − q̇², s is the solution of
+
+    r G1 + η G2 + μ G3 = t,    G1 = s sinroot(βs²),  G2 = s² sinroot(βs²/4)²/2,  G3 = s³ arcroot(βs²)
+
+(E. Stiefel, G. Scheifele, Linear and Regular Celestial Mechanics, 1971). The G_n are those of Stumpff: G0' = −βG1 and
+G_n' = G_{n−1} with G0 = cosroot(βs²). The left-hand side grows with the slope r(s) = r G0 + η G1 + μ G2, the distance,
+so there is one solution; its derivatives follow from that of the equation, and none divides by β.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+#: The name of the function; its arguments are t, r, η, β, μ and |q × q̇|².
+ANOMALY = "anomaly"
+
+#: Steps of the iteration after which there is no value: halving a bracket takes 53, and growing one up to 1,000.
+MOST_ITERATIONS = 100
+
+#: A motion is radial where |q × q̇|² is below this part of η² + |μ|r: the products have ten units of rounding.
+RADIAL = 1e-30
+
+
+def slopes(
+    call: Callable[..., Any], s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any
+) -> tuple[Any, ...]:
+    """The partial derivatives along t, r, η, β and μ; |q × q̇|² only tells whether there is a value."""
+    square = s**2
+    z = beta * square
+    half, slope = call("sinroot", z / 4), call("sinroot1", z / 4)
+    g1, g2, g3 = s * call("sinroot", z), square * half**2 / 2, square * s * call("arcroot", z)
+    inverse = 1 / (r * call("cosroot", z) + eta * g1 + mu * g2)
+    # sinroot(z/4)²/2 has the derivative sinroot(z/4) sinroot1(z/4)/4 along z.
+    along = r * call("sinroot1", z) + eta * s * (half * slope / 4) + mu * square * call("arcroot1", z)
+    return inverse, -(g1 * inverse), -(g2 * inverse), -(square * s * along * inverse), -(g3 * inverse), 0
+
+
+def value(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any, spin: Any) -> Any:
+    """The value, in double precision if the library is `math`, else to that of an mpmath context.
+
+    `ValueError` where there is none: at r = 0, and beyond a collision of a radial motion.
+    """
+    if not r > 0:
+        raise ValueError("the distance of a Kepler motion is not positive")
+    if t == 0:
+        return t * 0
+    sign = 1 if t > 0 else -1
+    s = _solution(library, sign * t, r, sign * eta, beta, mu)
+    if spin <= RADIAL * (eta**2 + abs(mu) * r) and _collides(library, s, r, sign * eta, beta):
+        raise ValueError("a radial Kepler motion ends in a collision")
+    return sign * s
+
+
+def _solution(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
+    """The solution for t > 0, by Laguerre's method between bounds, until the residual is rounding."""
+    rounding = 2.3e-16 if library is math else library.eps
+    low, high, s = 0 * t, None, _guess(library, t, r, eta, beta, mu)
+    for k in range(MOST_ITERATIONS + (0 if library is math else 10 * library.dps)):
+        residual, scale, slope, bend = _equation(library, s, t, r, eta, beta, mu)
+        if residual <= 0:
+            low = s
+        else:
+            high = s
+        step = 5 * residual / (slope + library.sqrt(abs(16 * slope**2 - 20 * residual * bend)))
+        if abs(residual) <= rounding * scale or abs(step) <= rounding * s:
+            return s - step
+        s -= step
+        if high is None:
+            s = s if low < s < 2 * low else 2 * low
+        elif not low < s < high or k % 4 == 3:
+            s = (low + high) / 2
+    raise ValueError("the iteration for a Kepler motion does not end")
+
+
+def _guess(library: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> Any:
+    """The series of the solution where the motion is a small part of an orbit; else that of the mean motion, or a unit
+    of a hyperbola, which is doubled if it is too small."""
+    u = t / r
+    if abs(beta) * u**2 > 1:
+        return beta * t / mu if beta > 0 else 1 / library.sqrt(-beta)
+    first, second = eta * u / (2 * r), (mu - beta * r) * u**2 / (6 * r)
+    if abs(first) + abs(second) > 0.25:
+        return u
+    return u * (1 - first + 2 * first**2 - second)
+
+
+def _equation(library: Any, s: Any, t: Any, r: Any, eta: Any, beta: Any, mu: Any) -> tuple[Any, Any, Any, Any]:
+    """The residual, the size of its terms, and its first two derivatives."""
+    from phigen.symbolic import entire
+
+    z = beta * s**2
+    half, c3 = entire.value(library, "sinroot", z / 4), entire.value(library, "arcroot", z)
+    g1, g2, g3 = s * (1 - z * c3), s**2 * half**2 / 2, s**3 * c3
+    g0 = 1 - beta * g2
+    scale = t + abs(r * g1) + abs(eta * g2) + abs(mu * g3)
+    return (
+        r * g1 + eta * g2 + mu * g3 - t,
+        scale,
+        r * g0 + eta * g1 + mu * g2,
+        eta * g0 + (mu - beta * r) * g1,
+    )
+
+
+def _collides(library: Any, s: Any, r: Any, eta: Any, beta: Any) -> bool:
+    """Whether a radial motion has met r = 0 before s: √r moves like a pendulum of small amplitude along s."""
+    from phigen.symbolic import entire
+
+    z = beta * s**2 / 4
+    root = r * entire.value(library, "cosroot", z) + eta * s / 2 * entire.value(library, "sinroot", z)
+    return bool(root <= 0 or z >= math.pi**2)

@@ -1,0 +1,67 @@
+"""Policies of a program (`phigen.scheme.policies`) as named constants of C, JavaScript and Python."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+
+from phigen.scheme.policies import POLICIES, Constant, MeasurePolicy, Policy
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Implicit
+
+#: Powers of two below this exponent are written as such: they are bounds on rounding.
+_LEAST_EXPONENT = -20
+
+
+def policies_of(program: Program) -> dict[str, Policy]:
+    """The policies by the names of their files; coordinates that keep their sign are measured each by itself."""
+    if isinstance(program.step, Implicit) and program.step.inner.relative:
+        return {**POLICIES, "measure_policy": MeasurePolicy(floor=0.0)}
+    return POLICIES
+
+
+@dataclass(frozen=True)
+class Spelling:
+    """How a language writes a power of two of a negative exponent, and the constants of a policy."""
+
+    power: str
+    written: Callable[[list[tuple[Constant, str]]], str]
+
+    def value(self, value: float) -> str:
+        """A number."""
+        part, exponent = math.frexp(value)
+        if part == 0.5 and exponent - 1 < _LEAST_EXPONENT:
+            return self.power.format(exponent - 1)
+        return repr(value).replace("e-0", "e-")
+
+    def text(self, policy: Policy, omitted: Collection[str] = ()) -> str:
+        """The constants of a policy without those of the ``omitted`` names, which are declared elsewhere."""
+        constants = [c for c in policy.constants() if c.name not in omitted]
+        return self.written([(c, self.value(c.value)) for c in constants])
+
+
+def _c(constants: list[tuple[Constant, str]]) -> str:
+    """Real numbers as macros, so that `single` sees thresholds; whole numbers as enumerators, without a type."""
+    whole = [(f"PHI_{c.name} = {value},", c.about) for c, value in constants if isinstance(c.value, int)]
+    real = [(f"#define PHI_{c.name} {value}", c.about) for c, value in constants if isinstance(c.value, float)]
+    lines = ["enum {", *(f"    {line}" for line in _aligned(whole)), "};"] if whole else []
+    return "\n".join([*lines, *_aligned(real)])
+
+
+def _aligned(lines: list[tuple[str, str]]) -> list[str]:
+    width = max((len(text) for text, _ in lines), default=0)
+    return [f"{text:{width}} /* {about} */" for text, about in lines]
+
+
+def _js(constants: list[tuple[Constant, str]]) -> str:
+    return "\n".join(f"/** {c.about[:1].upper()}{c.about[1:]} */\nconst {c.name} = {value};" for c, value in constants)
+
+
+def _python(constants: list[tuple[Constant, str]]) -> str:
+    return "\n".join(f"{c.name} = {value}  # {c.about}" for c, value in constants)
+
+
+C = Spelling("0x1p{}", _c)
+JAVASCRIPT = Spelling("2 ** {}", _js)
+PYTHON = Spelling("2.0**{}", _python)

@@ -1,0 +1,221 @@
+"""The state of a solver, block by block: what it consists of, and what copies, rollback and a new step size do to it.
+
+A block belongs to the solvers for whose switches its condition holds. From the blocks follow, in C, the members of the
+struct, the copies that a step of several stages makes and takes back where a stage fails, and what begins anew with
+another step size; in JavaScript, what a copy of a solver takes over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from phigen.targets.c.files import holds
+
+
+@dataclass(frozen=True)
+class StateBlock:
+    """Members of the state that belong together; ``when`` is a condition on switches, empty for all solvers.
+
+    ``members`` are declarations in C, with comments for users. ``saved`` are the arrays, each with its size, or the
+    numbers (without one) that a failing step restores. ``reset`` are statements for another step size; ``copied`` are
+    those of a copy, in JavaScript.
+    """
+
+    name: str
+    when: str = ""
+    members: tuple[str, ...] = ()
+    saved: tuple[tuple[str, str], ...] = ()
+    reset: tuple[str, ...] = ()
+    copied: tuple[str, ...] = ()
+
+    def save(self) -> Iterator[str]:
+        """Copies of what a step changes."""
+        arrays = [f"{member}[{size}]" for member, size in self.saved if size]
+        numbers = [f"{member} = s->{member}" for member, size in self.saved if not size]
+        yield from [f"double {', '.join(arrays)};"] if arrays else []
+        yield from [f"const double {', '.join(numbers)};"] if numbers else []
+        yield from (f"memcpy({member}, s->{member}, sizeof {member});" for member, size in self.saved if size)
+
+    def restore(self) -> Iterator[str]:
+        """The state from its copies."""
+        for member, size in self.saved:
+            yield f"memcpy(s->{member}, {member}, sizeof {member});" if size else f"s->{member} = {member};"
+
+
+_COEFFICIENTS = "double PHI_OF(coef, PHI_STAGES)[PHI_COEFFICIENTS];"
+
+#: In the order of the members of the struct.
+STATE = (
+    StateBlock(
+        "x",
+        members=(
+            "double x[PHI_DIM];     /* the state; read it freely, change it only through functions */",
+            "double carry[PHI_DIM]; /* what rounding took from x: the state proper is x + carry */",
+            "size_t steps;          /* good steps since phi_init */",
+        ),
+        saved=(("x", "PHI_DIM"), ("carry", "PHI_DIM")),
+        copied=("twin.carry.set(this.carry);",),
+    ),
+    StateBlock("evaluations", "GAUSS", ("size_t evaluations;    /* sweeps over the stages, for statistics */",)),
+    StateBlock("evaluations", "!GAUSS", ("size_t evaluations;    /* of the generating function, for statistics */",)),
+    StateBlock(
+        "t",
+        "MONITOR",
+        ("double t, t_carry;     /* physical time since phi_init, t + t_carry: steps are equal in tau, not in it */",),
+        saved=(("t", ""), ("t_carry", "")),
+        copied=("twin.tCarry = this.tCarry;",),
+    ),
+    StateBlock("t", "TIMED && !MONITOR", ("double t;              /* the time of x */",)),
+    StateBlock("t", "!TIMED && !MONITOR", ("double t;              /* time since phi_init */",)),
+    StateBlock(
+        "noise",
+        "NOISE",
+        (
+            "uint64_t seed, first_step; /* which random numbers are taken, see phi_set_noise */",
+            "uint32_t member;",
+            "double dw[PHI_DRAWS];  /* the increments of the noise in the last step */",
+        ),
+        copied=("twin.dw.set(this.dw);",),
+    ),
+    StateBlock(
+        "h",
+        members=("double h;              /* the last step size; NaN before the first step */", "phi_params params;"),
+        reset=("s->h = h;",),
+    ),
+    StateBlock(
+        "gauge",
+        "GAUGE && MONITOR",
+        ("double gauge[PHI_GAUGES]; /* e = -H(x0): K = monitor (H + e) is 0 along the trajectory */",),
+    ),
+    StateBlock(
+        "gauge",
+        "GAUGE && !MONITOR",
+        ("double gauge[PHI_GAUGES]; /* multiples of Casimirs that are taken from H, in their order */",),
+    ),
+    StateBlock(
+        "coef",
+        "NOISE",
+        (f"{_COEFFICIENTS} /* what depends on params and h only, then on dw and the time as well */",),
+    ),
+    StateBlock(
+        "coef",
+        "RENEWED && !NOISE",
+        (f"{_COEFFICIENTS} /* what depends on params and h only, then on the time of the step as well */",),
+    ),
+    StateBlock("coef", "!RENEWED && !NOISE", (f"{_COEFFICIENTS} /* all that depends on params and h only */",)),
+    StateBlock(
+        "attitude",
+        "ATTITUDE && MATRICES",
+        ("double attitude[PHI_ATTITUDE_SIZE]; /* a matrix, row by row; change it only through phi_set_attitude */",),
+    ),
+    StateBlock(
+        "attitude",
+        "ATTITUDE && !MATRICES",
+        (
+            "double attitude[PHI_ATTITUDE_SIZE];"
+            " /* the quaternion (w, x, y, z) that turns body into space; see phi_set_attitude */",
+        ),
+    ),
+    StateBlock("position", "ATTITUDE && POSITION", ("double position[3]; /* of the body, in space */",)),
+    StateBlock("first", "ATTITUDE && MATRICES", ("double first[PHI_ELEMENT]; /* where the attitude began */",)),
+    StateBlock(
+        "turned",
+        "ATTITUDE",
+        (
+            "double turned[PHI_ELEMENT], turned_carry[PHI_ELEMENT];"
+            " /* the product of what steps turned by; what rounding took */",
+        ),
+        saved=(("turned", "PHI_ELEMENT"), ("turned_carry", "PHI_ELEMENT")),
+        copied=(
+            "twin.firstElement = Float64Array.from(this.firstElement);",
+            "twin.turned = Float64Array.from(this.turned);",
+            "twin.turnedCarry = Float64Array.from(this.turnedCarry);",
+        ),
+    ),
+    StateBlock(
+        "rate",
+        "RATE_OF_GAUGE",
+        (
+            "double rate[PHI_RATE];"
+            " /* the gradient of the Casimirs that are taken from H: the body turns by them too */",
+            "double aside[PHI_ELEMENT]; /* what it turns by so in a step, less 1 */",
+        ),
+        reset=("phi_set_aside(s);",),
+        copied=(
+            "twin.turningRate = Float64Array.from(this.turningRate);",
+            "twin.attitudeFrom = this.attitudeFrom;",
+        ),
+    ),
+    StateBlock(
+        "aside_of_block",
+        "RATE_OF_GAUGE && BLOCKS",
+        ("double aside_of_block[PHI_ELEMENT]; /* the same in a block of steps */",),
+    ),
+    StateBlock(
+        "before_h",
+        "!MONITOR",
+        (
+            "size_t steps_before_h; /* steps and t when h was set: t is counted from there, so no error adds up */",
+            "double t_before_h;",
+        ),
+        reset=("s->t_before_h = s->t;", "s->steps_before_h = s->steps;"),
+    ),
+    StateBlock(
+        "history",
+        "GUESSED",
+        ("phi_history PHI_OF(history, PHI_STAGES); /* for starting guesses */",),
+        reset=("memset(&s->history, 0, sizeof s->history);",),
+    ),
+    StateBlock(
+        "recurrence",
+        "RECURRENCES",
+        reset=("PHI_EACH_STAGE PHI_OF(s->history, stage).slow_steps_allowed = PHI_REPAY;",),
+    ),
+    StateBlock(
+        "blocks",
+        "BLOCKS",
+        ("phi_learnt blocks;",),
+        reset=(
+            "memset(&s->blocks, 0, sizeof s->blocks);",
+            "s->blocks.single_steps = 2 * PHI_AHEAD;",
+            "s->blocks.passes_without_recurrences = INT_MAX;",
+        ),
+    ),
+)
+
+Lines = Callable[[StateBlock], Iterator[str]]
+
+#: What the runtime in C includes, by file: how deep it is indented there, and the lines of a block.
+PARTS: dict[str, tuple[int, Lines]] = {
+    "state_members.h": (4, lambda block: iter(block.members)),
+    "state_saved.h": (4, StateBlock.save),
+    "state_restored.h": (8, StateBlock.restore),
+    "state_reset.h": (8, lambda block: iter(block.reset)),
+}
+
+
+def part(file: str, switches: Mapping[str, bool]) -> list[str]:
+    """The lines of one of `PARTS` for a solver."""
+    indent, lines = PARTS[file]
+    return [" " * indent + line for block in STATE if _belongs(block, switches) for line in lines(block)]
+
+
+def header(file: str) -> str:
+    """The same for all solvers, with conditions, for a compiler that reads the runtime as it lies there."""
+    indent, lines = PARTS[file]
+    found = []
+    for block in STATE:
+        text = [" " * indent + line for line in lines(block)]
+        condition = " ".join(f"PHI_{w}" if w.isupper() else w for w in block.when.replace("!", "! ").split())
+        found += [f"#if {condition}", *text, "#endif"] if text and condition else text
+    return "\n".join(found)
+
+
+def copied(switches: Mapping[str, bool]) -> list[str]:
+    """The statements in JavaScript by which a copy of a solver takes over its state."""
+    return [line for block in STATE if block.copied and _belongs(block, switches) for line in block.copied]
+
+
+def _belongs(block: StateBlock, switches: Mapping[str, bool]) -> bool:
+    return not block.when or holds(block.when, switches)

@@ -1,0 +1,20 @@
+#ifndef PHI_FILE_GAUGE_FORMULA
+#define PHI_FILE_GAUGE_FORMULA
+#include <float.h>
+#include <math.h>
+#include <string.h>
+
+#include "model.h"
+
+/* For each Casimir C the multiple by which grad H less it times grad C is smallest at the start; zero where that gives
+   nothing finite. */
+static void phi_choose_gauge(const phi_params *params, const double x[PHI_DIM], double gauge[PHI_GAUGES])
+{
+    double out[1 + 2 * PHI_GAUGES];
+    phi_products(params, x, out);
+    for (int c = 0; c < PHI_GAUGES; ++c) {
+        const double multiple = out[1 + 2 * c] / out[2 + 2 * c];
+        gauge[c] = isfinite(multiple) ? multiple : 0.0;
+    }
+}
+#endif

@@ -1,0 +1,14 @@
+/* What the gateways need of MATLAB's header, declared for a check of types. */
+#include <stddef.h>
+typedef struct mxArray mxArray;
+typedef enum { mxREAL, mxCOMPLEX } mxComplexity;
+int mxIsDouble(const mxArray *a);
+int mxIsComplex(const mxArray *a);
+int mxIsStruct(const mxArray *a);
+size_t mxGetNumberOfElements(const mxArray *a);
+double mxGetScalar(const mxArray *a);
+double *mxGetPr(const mxArray *a);
+mxArray *mxGetField(const mxArray *a, size_t index, const char *name);
+mxArray *mxCreateDoubleMatrix(size_t rows, size_t columns, mxComplexity complexity);
+void mexErrMsgIdAndTxt(const char *id, const char *format, ...);
+void mexFunction(int out_count, mxArray *out[], int in_count, const mxArray *in[]);

@@ -1,0 +1,151 @@
+"""Bindings: the programs of docs/bindings.md, and systems with all that a binding may have."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+from tools import run, tool
+
+from phigen import resources
+from phigen import spec as specs
+from phigen.bindings.emitter import LANGUAGES, binding
+from phigen.cli import bindings, group
+from phigen.compiler import compile_proved, emit
+
+ROOT = Path(__file__).parents[2]
+MEX = Path(__file__).parent
+
+#: Names that languages keep for themselves, or cannot tell apart; a time, observables, kicks; no Casimirs.
+AWKWARD = """phigen: 1
+name: awkward
+title: "a title, */ and <b>"
+time: t
+coordinates: [q, p]
+parameters: {fn: 1, end: {value: 2, description: "*/ fn main() {}"}, a: 0.5, A: 0.25, _b: 1}
+poisson: {canonical: {q: [q], p: [p]}}
+hamiltonian: fn*p**2/2 + end*q**2/2 + a*A*q*sin(t)*_b
+observables: {speed: p}
+profile: small
+"""
+
+
+@pytest.fixture(scope="module")
+def tumbler(tmp_path_factory):
+    """A folder with all bindings of the README's body."""
+    folder = tmp_path_factory.mktemp("tumbler")
+    text = (ROOT / "README.md").read_text(encoding="utf-8").split("```yaml\n")[1].split("```")[0]
+    (folder / "tumbler.yaml").write_text(text, encoding="utf-8")
+    words = [word for language in bindings.LANGUAGES for word in ("--binding", language)]
+    place = ["-o", str(folder / "generated"), "-t", "numpy", "--profile", "small"]
+    command = ["build", str(folder / "tumbler.yaml"), *place, *words]
+    result = CliRunner().invoke(group, command)
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def example(language):
+    """The program of the page in a language."""
+    return (ROOT / "docs/bindings.md").read_text(encoding="utf-8").split(f"```{language}\n")[1].split("```")[0]
+
+
+def commands(after):
+    """The commands under the program."""
+    text = (ROOT / "docs/bindings.md").read_text(encoding="utf-8").split(f"```{after}\n")[1]
+    return [line.split() for line in text.split("```sh\n")[1].split("```")[0].splitlines()]
+
+
+def expected(folder):
+    """What the NumPy beside it gives."""
+    code = "import tumbler as b; x = b.integrate([0.01, 1, 0.01], 0.1, 300)[-1]"
+    code += "; print(f'{x[0]:.6f} {b.casimirs(x)[0]:.12f}')"
+    return run([sys.executable, "-c", code], folder / "generated/tumbler")
+
+
+@pytest.mark.parametrize(
+    ("language", "file", "compiler"), [("cpp", "main.cpp", "g++"), ("fortran", "main.f90", "gfortran")]
+)
+def test_program_of_the_page_runs(language, file, compiler, tumbler):
+    tool(compiler)
+    (tumbler / file).write_text(example(language), encoding="utf-8")
+    for command in commands(language):
+        run(command, tumbler)
+    assert re.sub(r"^\.", "0.", run([tumbler / "main"], tumbler).strip()) == expected(tumbler).strip()
+
+
+@pytest.mark.slow
+def test_program_in_rust_runs(tumbler):
+    cargo, folder = tool("cargo"), tumbler / "program"
+    (folder / "src").mkdir(parents=True)
+    (folder / "src/main.rs").write_text(example("rust"), encoding="utf-8")
+    manifest = '[package]\nname = "program"\nversion = "0.1.0"\nedition = "2021"\n[dependencies]\n'
+    (folder / "Cargo.toml").write_text(
+        f'{manifest}tumbler = {{ path = "../generated/tumbler/rust" }}\n', encoding="utf-8"
+    )
+    assert run([cargo, "run", "--quiet", "--offline"], folder, RUSTFLAGS="-Dwarnings") == expected(tumbler)
+
+
+MORE = [pytest.param(name, marks=pytest.mark.slow) for name in ("satellite", "thermal_spin", "kepler_eccentric")]
+
+
+@pytest.mark.parametrize("source", [AWKWARD, *MORE])
+def test_bindings_compile_for_systems_of_all_kinds(source, tmp_path):
+    spec = specs.loads(source) if "\n" in source else specs.load(resources.file_of(source))
+    compilation = compile_proved(spec, profile="small")
+    name = spec.name
+    for file, text in emit(compilation.program, "c", "x").items():
+        (tmp_path / file).write_text(text, encoding="utf-8")
+    for language in LANGUAGES:
+        for file, text in binding(compilation, language).items():
+            (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / file).write_text(text, encoding="utf-8")
+    warnings = ["-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
+    run([tool("g++"), "-std=c++11", "-x", "c++", *warnings, f"{name}.hpp"], tmp_path)
+    run([tool("gcc"), "-std=c99", *warnings, f"-I{MEX}", f"{name}_mex.c"], tmp_path)
+    run(
+        [tool("rustc"), "--edition=2021", "--crate-type=rlib", "--emit=metadata", "-Dwarnings", "rust/src/lib.rs"],
+        tmp_path,
+    )
+    run(
+        [
+            tool("gfortran"),
+            "-std=f2018",
+            "-Wall",
+            "-Werror",
+            "-Wno-unused-dummy-argument",
+            "-fsyntax-only",
+            f"{name}.f90",
+        ],
+        tmp_path,
+    )
+    julia = (tmp_path / f"{name}.jl").read_text(encoding="utf-8")
+    symbols = set(re.findall(rf":({name}_\w+), library", julia))
+    assert symbols <= set(re.findall(rf"\b{name}_\w+", (tmp_path / f"{name}.h").read_text(encoding="utf-8")))
+
+
+def test_hand_edits_stay_and_lattices_are_refused(tumbler):
+    path = tumbler / "generated/tumbler/tumbler.hpp"
+    text = path.read_text(encoding="utf-8")
+    path.write_text(text + "// mine\n", encoding="utf-8")
+    words = [
+        "build",
+        str(tumbler / "tumbler.yaml"),
+        "-o",
+        str(tumbler / "generated"),
+        "-t",
+        "numpy",
+        "--profile",
+        "small",
+    ]
+    result = CliRunner().invoke(group, [*words, "--binding", "cpp"])
+    path.write_text(text, encoding="utf-8")
+    assert result.exit_code == 5
+    assert "edited by hand" in result.output
+    refused = CliRunner().invoke(group, ["build", "toda", "-o", str(tumbler), "-t", "numpy", "--binding", "rust"])
+    assert refused.exit_code == 1
+    assert "not for lattices" in refused.output
+
+
+def test_command_line_knows_all_languages():
+    assert set(bindings.LANGUAGES) == set(LANGUAGES)

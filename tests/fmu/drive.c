@@ -1,0 +1,81 @@
+/* An environment that uses an FMU in one program with it, for sanitizers: argument 1 is the header of the standard or
+   "none", which is decided when this is compiled. */
+#include <stdio.h>
+#include UNIT
+
+static int reports;
+
+static void hear(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
+{
+    (void)environment;
+    (void)status;
+    if (category != NULL && message != NULL) ++reports;
+}
+
+static void update(fmi3InstanceEnvironment environment, fmi3Float64 time, fmi3Boolean set, fmi3Boolean get,
+    fmi3Boolean finished, fmi3Boolean can_return, fmi3Boolean *early, fmi3Float64 *when)
+{
+    (void)environment;
+    (void)set;
+    (void)get;
+    (void)finished;
+    *early = can_return && time > 0.3;
+    *when = time;
+}
+
+#define MUST(condition) \
+    do { \
+        if (!(condition)) { \
+            printf("%d: %s\n", __LINE__, #condition); \
+            return 1; \
+        } \
+    } while (0)
+
+int main(void)
+{
+    bool event, terminate, early;
+    double reached, at[2], x[2];
+    fmi3FMUState copy = NULL, read = NULL;
+    unsigned char bytes[1 << 15];
+    size_t size;
+    const fmi3ValueReference first[2] = { FMU(STATE), FMU(STATE) + 1 }, parameter[1] = { FMU(PARAMETER) };
+    const fmi3ValueReference beyond[1] = { FMU(END) };
+    fmi3Instance unit = PREFIXED(InstantiateCoSimulation)("unit", TOKEN, NULL, false, true, true, true, NULL, 0, NULL,
+        hear, update);
+    MUST(PREFIXED(InstantiateCoSimulation)("u", "other", NULL, false, true, true, true, NULL, 0, NULL, hear, update) == NULL);
+    MUST(reports == 1);
+    MUST(unit != NULL);
+    MUST(PREFIXED(DoStep)(unit, 0.0, 0.1, true, &event, &terminate, &early, &reached) == fmi3Error); /* too early */
+    MUST(PREFIXED(EnterInitializationMode)(unit, false, 0.0, 0.0, false, 0.0) == fmi3OK);
+    MUST(PREFIXED(ExitInitializationMode)(unit) == fmi3OK);
+    MUST(PREFIXED(EnterStepMode)(unit) == fmi3OK);
+    MUST(PREFIXED(DoStep)(unit, 0.0, 1.0, true, &event, &terminate, &early, &reached) == fmi3OK);
+    MUST(early && reached > 0.3 && reached < 0.3 + 2.0 * STEP); /* a whole number of steps */
+    MUST(fabs(reached / STEP - round(reached / STEP)) < 1e-9);
+    MUST(PREFIXED(GetFMUState)(unit, &copy) == fmi3OK && PREFIXED(GetFMUState)(unit, &copy) == fmi3OK);
+    MUST(PREFIXED(SerializedFMUStateSize)(unit, copy, &size) == fmi3OK && size < sizeof bytes);
+    MUST(PREFIXED(SerializeFMUState)(unit, copy, bytes, size) == fmi3OK);
+    MUST(PREFIXED(DoStep)(unit, reached, 0.77 * STEP, true, &event, &terminate, &early, &reached) == fmi3OK);
+    MUST(PREFIXED(GetFloat64)(unit, first, 2, at, 2) == fmi3OK);
+    MUST(PREFIXED(DeserializeFMUState)(unit, bytes, size, &read) == fmi3OK);
+    bytes[size - 1] ^= 1;
+    MUST(PREFIXED(DeserializeFMUState)(unit, bytes, size, &copy) == fmi3Error); /* and copy stays */
+    MUST(PREFIXED(DeserializeFMUState)(unit, bytes, size - 1, &copy) == fmi3Error);
+    MUST(PREFIXED(SetFMUState)(unit, read) == fmi3OK);
+    MUST(PREFIXED(DoStep)(unit, reached - 0.77 * STEP, 0.77 * STEP, true, &event, &terminate, &early, &reached) == fmi3OK);
+    MUST(PREFIXED(GetFloat64)(unit, first, 2, x, 2) == fmi3OK && memcmp(at, x, sizeof x) == 0);
+    MUST(PREFIXED(GetFloat64)(unit, beyond, 1, x, 1) == fmi3Error);
+    MUST(PREFIXED(SetFloat64)(unit, first, 2, at, 2) == fmi3Error); /* states are set before the start only */
+    x[0] = NAN;
+    MUST(PREFIXED(SetFloat64)(unit, parameter, 1, x, 1) == fmi3Error);
+    x[0] = -1.0; /* it has to be positive: refused by the next step, which changes nothing */
+    MUST(PREFIXED(SetFloat64)(unit, parameter, 1, x, 1) == fmi3OK);
+    MUST(PREFIXED(DoStep)(unit, reached, STEP, true, &event, &terminate, &early, &reached) == fmi3Discard);
+    MUST(PREFIXED(GetFloat64)(unit, first, 2, x, 2) == fmi3OK && memcmp(at, x, sizeof x) == 0);
+    MUST(PREFIXED(FreeFMUState)(unit, &copy) == fmi3OK && copy == NULL && PREFIXED(FreeFMUState)(unit, &read) == fmi3OK);
+    MUST(PREFIXED(EnterEventMode)(unit) == fmi3OK && PREFIXED(EnterStepMode)(unit) == fmi3OK);
+    MUST(PREFIXED(Terminate)(unit) == fmi3OK && PREFIXED(Reset)(unit) == fmi3OK);
+    PREFIXED(FreeInstance)(unit);
+    puts("ok");
+    return 0;
+}

@@ -1,0 +1,104 @@
+"""FMUs for tests: compiled by the C compiler of the machine, opened by fmpy."""
+
+from __future__ import annotations
+
+import contextlib
+import zipfile
+from dataclasses import replace
+
+import pytest
+
+from phigen import resources
+from phigen import spec as specs
+from phigen.compiler import compile_proved, emit
+from phigen.fmu.archive import archive, unit_of
+from phigen.fmu.platforms import FLAGS, host
+from phigen.runtime import toolchain
+
+fmpy = pytest.importorskip("fmpy", reason="fmpy is not installed")
+
+
+def unit(source, **options):
+    """The compilation of a spec by its name or text, and its FMU without binaries."""
+    spec = specs.loads(source) if "\n" in source else specs.load(resources.file_of(source))
+    compilation = compile_proved(spec, **options)
+    return compilation, unit_of(compilation, emit(compilation.program, "c", "phigen build"))
+
+
+def compiled(made, folder, flags=("-O1",)):
+    """The bytes of the library of an FMU for this machine."""
+    for file, text in made.sources.items():
+        (folder / file).write_text(text, encoding="utf-8")
+    output = folder / "unit.so"
+    sources = [folder / file for file in made.sources if file.endswith(".c")]
+    compiler = toolchain.find()
+    toolchain.compile_library(sources, output, replace(compiler, tuning=(*FLAGS, *flags)))
+    return output.read_bytes()
+
+
+def written(source, folder, versions=(3, 2), **options):
+    """The compilation, and the paths of the FMU by version."""
+    compilation, made = unit(source, **options)
+    library = {host().folder: compiled(made, folder)}
+    paths = {v: folder / f"fmi{v}.fmu" for v in versions}
+    for version, path in paths.items():
+        path.write_bytes(archive(made, version, library))
+    return compilation, paths
+
+
+class Instance:
+    """An instance of an FMU by fmpy, between its initialisation and its end, with values by name."""
+
+    def __init__(self, path, folder, start=0.0, values=None, update=None, **options):
+        from fmpy.fmi2 import FMU2Slave
+        from fmpy.fmi3 import FMU3Slave
+
+        description = fmpy.read_model_description(path)
+        target = folder / path.stem
+        with zipfile.ZipFile(path) as file:
+            file.extractall(target)
+        self.version = int(description.fmiVersion[0])
+        self.numbers = {v.name: v.valueReference for v in description.modelVariables}
+        kind = FMU3Slave if self.version == 3 else FMU2Slave
+        token = description.instantiationToken if self.version == 3 else description.guid
+        identifier = description.coSimulation.modelIdentifier
+        self.raw = kind(guid=token, unzipDirectory=str(target), modelIdentifier=identifier, instanceName="unit")
+        if self.version == 3:
+            self.raw.instantiate(intermediateUpdate=update, earlyReturnAllowed=update is not None, **options)
+            self.set(values or {})
+            self.raw.enterInitializationMode(startTime=start)
+        else:
+            self.raw.instantiate()
+            self.raw.setupExperiment(startTime=start)
+            self.set(values or {})
+            self.raw.enterInitializationMode()
+        self.raw.exitInitializationMode()
+
+    def get(self, *names):
+        """The values of variables."""
+        get = self.raw.getFloat64 if self.version == 3 else self.raw.getReal
+        return [float(v) for v in get([self.numbers[name] for name in names])]
+
+    def set(self, values):
+        """Set variables by name."""
+        put = self.raw.setFloat64 if self.version == 3 else self.raw.setReal
+        put([self.numbers[name] for name in values], list(values.values()))
+
+    def step(self, at, size):
+        """A communication step; of FMI 3 the outcome."""
+        return self.raw.doStep(currentCommunicationPoint=at, communicationStepSize=size)
+
+    def end(self):
+        """Give the instance back."""
+        self.raw.terminate()
+        self.raw.freeInstance()
+
+
+@contextlib.contextmanager
+def running(*arguments, **options):
+    """An instance, which is freed at the end."""
+    instance = Instance(*arguments, **options)
+    try:
+        yield instance
+    finally:
+        instance.end()

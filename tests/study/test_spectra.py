@@ -1,0 +1,93 @@
+"""Spectra and correlations of lattices."""
+
+import numpy as np
+import pytest
+
+import phigen
+import phigen.spec
+from phigen.study.spectra import spectrum
+
+#: A ferromagnetic chain near its ground state; linear spin-wave theory has ω(q) = B + 2J(1 − cos q).
+FERROMAGNET = """\
+phigen: 1
+name: ferromagnet
+coordinates: [x, y, z]
+parameters: {J: 1, B: 0.1}
+lattice: {axes: [i], boundary: periodic}
+poisson: {lie_algebra: {name: so(3)}}
+hamiltonian: -J*(x*x[i+1] + y*y[i+1] + z*z[i+1]) - B*z
+order: 4
+runs: {r: {initial: {x: 0, y: 0, z: 1}, sizes: [32], step: 0.1, steps: 10}}
+"""
+
+
+def near_the_ground_state(sites: int, size: float) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    x, y = size * rng.normal(size=(2, sites))
+    return np.array([x, y, np.sqrt(1 - x**2 - y**2)])
+
+
+def test_spin_waves_have_the_dispersion_of_linear_theory():
+    solver = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy")
+    run = solver.integrate(near_the_ground_state(16, 1e-3), 0.1, 2560, stride=5)
+    found = run.spectrum(["x", "y"])
+    assert found.values.shape == (16, 513)
+    apart = found.omega[1] - found.omega[0]
+    upper = found.omega > 0
+    for q, values in zip(found.q[0], found.values, strict=True):
+        peak = found.omega[upper][np.argmax(values[upper])]
+        assert peak == pytest.approx(0.1 + 2 * (1 - np.cos(q)), abs=0.6 * apart)
+
+
+def test_a_wave_is_where_it_is_said_to_be():
+    solver = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy")
+    run = solver.integrate(near_the_ground_state(8, 0.1), 0.1, 64)
+    t, r = run.t[:, None], np.arange(8.0)[None]
+    run.x[:, 0] = 0.7 * np.cos(2 * np.pi / 8 * 3 * r - 2.0 * t)
+    found = spectrum(run, "x")
+    k, n = np.unravel_index(np.argmax(found.values), found.values.shape)
+    assert np.sign(found.q[0][k]) == np.sign(found.omega[n])
+    assert abs(found.q[0][k]) == pytest.approx(2 * np.pi / 8 * 3)
+    assert abs(found.omega[n]) == pytest.approx(2.0, abs=np.pi / (65 * 0.1))
+    window = np.hanning(len(run) + 2)[1:-1] ** 2
+    weighted = (run.x[:, 0] ** 2 * (window / window.mean())[:, None]).mean()
+    assert found.values.sum() == pytest.approx(weighted, rel=1e-12)
+
+
+@pytest.mark.parametrize("boundary", ["periodic", "open"])
+def test_correlations_are_those_of_the_definition(boundary):
+    text = FERROMAGNET.replace("boundary: periodic", f"boundary: {boundary}")
+    run = phigen.compile(phigen.spec.loads(text), target="numpy").integrate(near_the_ground_state(6, 0.3), 0.1, 4)
+    found = run.correlation("x", "y", up_to=3, after=0.1)
+    f, g = run.x[1:, 0], run.x[1:, 1]
+    for d in range(4):
+        places = range(6) if boundary == "periodic" else range(6 - d)
+        products = [f[:, r] * g[:, (r + d) % 6] for r in places]
+        assert found[d] == pytest.approx(np.mean(products) - f.mean() * g.mean(), rel=1e-12, abs=1e-15)
+
+
+def test_what_has_no_spectrum_is_told():
+    run = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy").integrate(
+        near_the_ground_state(6, 0.3), 0.1, 4
+    )
+    with pytest.raises(ValueError, match="'w' is no coordinate; there are x, y, z"):
+        run.spectrum(["w"])
+    with pytest.raises(ValueError, match="needs 4 frames that are equal times apart, not 2"):
+        run.spectrum(["x"], after=0.3)
+    with pytest.raises(ValueError, match="up_to must be from 0 to 5"):
+        run.correlation("x", up_to=6)
+    with pytest.raises(ValueError, match="'j' is no axis; there are i"):
+        run.correlation("x", axis="j", up_to=1)
+
+
+def test_a_spectrum_goes_to_zarr_and_pictures(tmp_path):
+    zarr = pytest.importorskip("zarr")
+    run = phigen.compile(phigen.spec.loads(FERROMAGNET), target="numpy").integrate(
+        near_the_ground_state(6, 0.3), 0.1, 9
+    )
+    found = run.spectrum(["x"])
+    found.save(tmp_path / "s.zarr")
+    stored = zarr.open_group(str(tmp_path / "s.zarr"), mode="r")
+    np.testing.assert_array_equal(stored["S"][:], found.values)
+    np.testing.assert_array_equal(stored["q_i"][:], found.q[0])
+    found.plot("chain").savefig(tmp_path / "s.png")

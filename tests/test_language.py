@@ -1,0 +1,63 @@
+"""The language of CONTRIBUTING, as far as a machine sees it: rooms that were brought to it stay so."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+#: Rooms of phigen that keep the rules. A room that is brought to them is added here.
+CLEAN = (
+    "attitude", "cli", "drawing", "geometry", "notation", "paper", "proofs", "realisations", "report", "series",
+    "spec", "study", "sweeping", "symbolic", "tuning",
+)  # fmt: skip
+#: Variables and arguments that name nothing. Fields of records are left to readers.
+EMPTY_NAMES = {"found", "given", "kept", "made", "own", "taken", "told", "wanted"}
+#: First words of docstrings that name their object last, or not at all.
+INVERTED = ("How", "Of", "That", "What", "Whatever")
+
+
+def _stored(node: ast.AST) -> str | None:
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+        return node.id
+    return node.arg if isinstance(node, ast.arg) else None
+
+
+def breaches(source: str) -> list[str]:
+    """Names and docstrings of a module that break the rules, each with its line."""
+    tree = ast.parse(source)
+    fields = {
+        id(line.target)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+        for line in node.body
+        if isinstance(line, ast.AnnAssign)
+    }
+    listed = [
+        f"{node.lineno}: {name}"  # type: ignore[attr-defined]
+        for node in ast.walk(tree)
+        if id(node) not in fields and (name := _stored(node)) in EMPTY_NAMES
+    ]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef):
+            words = (ast.get_docstring(node) or "").split()
+            if words and words[0] in INVERTED:
+                listed.append(f"{getattr(node, 'lineno', 1)}: {' '.join(words[:6])} …")
+    return listed
+
+
+@pytest.mark.parametrize("room", CLEAN)
+def test_a_clean_room_stays_clean(room: str) -> None:
+    files = sorted((ROOT / "phigen" / room).rglob("*.py"))
+    assert files
+    assert {str(f): b for f in files if (b := breaches(f.read_text(encoding="utf-8")))} == {}
+
+
+def test_breaches_are_seen() -> None:
+    source = (
+        '"""What a module has."""\ndef f(given):\n    """Of it."""\n    for found in given:\n        kept = found\n'
+    )
+    source += 'class C:\n    """A record."""\n    made: int\n'
+    listed = breaches(source)
+    assert [line.partition(" ")[2] for line in listed] == ["given", "found", "kept", "What a module has. …", "Of it. …"]

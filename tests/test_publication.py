@@ -1,0 +1,39 @@
+"""What is published states one version, and the dependencies of the package."""
+
+import json
+import re
+import tomllib
+from pathlib import Path
+
+from ruamel.yaml import YAML
+
+from phigen._version import __version__
+
+ROOT = Path(__file__).parents[1]
+
+
+def text(file):
+    return (ROOT / file).read_text(encoding="utf-8")
+
+
+def recipe():
+    """The conda recipe, with its version put in."""
+    body = text("packaging/conda/meta.yaml").split("%}\n", 1)[1]
+    return YAML(typ="safe").load(re.sub(r"\{\{ *(\w+) *\}\}", r"\1", body))
+
+
+def test_all_files_state_the_same_version():
+    assert YAML(typ="safe").load(text("CITATION.cff"))["version"] == __version__
+    assert json.loads(text(".zenodo.json"))["version"] == __version__
+    assert f'{{% set version = "{__version__}" %}}' in text("packaging/conda/meta.yaml")
+
+
+def test_conda_recipe_has_the_dependencies_of_the_package():
+    project = tomllib.loads(text("pyproject.toml"))
+    needs = {d.replace(">=", " >=") for d in project["project"]["dependencies"]}
+    assert set(recipe()["requirements"]["run"]) == needs | {"python " + project["project"]["requires-python"]}
+
+
+def test_paper_cites_what_its_bibliography_has():
+    cited = set(re.findall(r"@(\w+)", text("paper.md").split("---", 2)[2]))
+    assert cited == set(re.findall(r"^@\w+\{(\w+),", text("paper.bib"), re.MULTILINE))

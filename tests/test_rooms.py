@@ -1,0 +1,91 @@
+"""Figures of the architecture that may fall and must not rise: circles of imports, and conditions in the C runtime."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+from phigen import resources
+
+ROOT = Path(__file__).resolve().parents[1]
+
+#: Modules of the largest circle of imports, where those inside functions count; names in tables (`phigen.registry`,
+#: `phigen.display`), which are imported when they are asked for, do not.
+LARGEST_CIRCLE = 10
+
+#: Lines of preprocessor conditions among the non-blank lines of the runtime in C, in percent; the aim is 8.
+CONDITIONS = 17.0
+
+
+def imports() -> dict[str, set[str]]:
+    """The modules of phigen that each module imports, inside functions too, but not for annotations alone."""
+    files = {".".join(p.relative_to(ROOT).with_suffix("").parts): p for p in sorted((ROOT / "phigen").rglob("*.py"))}
+    files = {name.removesuffix(".__init__"): path for name, path in files.items()}
+    graph = {}
+    for name, path in files.items():
+        found = set()
+        for node in executed(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module:
+                members = {f"{node.module}.{alias.name}" for alias in node.names}
+                found |= members & files.keys() or {node.module}
+                found |= {node.module} if members - files.keys() else set()
+        graph[name] = (found & files.keys()) - {name}
+    return graph
+
+
+def executed(tree: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a module without those under ``if TYPE_CHECKING``."""
+    for node in ast.iter_child_nodes(tree):
+        if not (isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)):
+            yield node
+            yield from executed(node)
+
+
+def circles(graph: dict[str, set[str]]) -> list[set[str]]:
+    """The strongly connected components with more than one module, the largest first."""
+    reached = {name: reachable(graph, name) for name in graph}
+    components = {frozenset(o for o in reached[name] if name in reached[o]) for name in graph}
+    return sorted((set(c) for c in components if len(c) > 1), key=len, reverse=True)
+
+
+def reachable(graph: dict[str, set[str]], start: str) -> set[str]:
+    """The modules that a module leads to, itself included."""
+    seen, open_ = {start}, [start]
+    while open_:
+        for other in graph[open_.pop()] - seen:
+            seen.add(other)
+            open_.append(other)
+    return seen
+
+
+def conditions() -> tuple[int, int]:
+    """Lines of conditions in the runtime in C, include guards apart, and all that are not blank."""
+    counted = total = 0
+    for file in (resources.templates() / "c/runtime").glob("*.[ch]"):
+        lines = [line for line in file.read_text(encoding="utf-8").splitlines() if line.strip()]
+        total += len(lines)
+        counted += sum(1 for line in lines if re.match(r"#\s*(if|el|endif)", line))
+        counted -= 2 * sum(1 for line in lines if line.startswith("#ifndef PHI_FILE_"))
+    return counted, total
+
+
+def test_circles_of_imports_do_not_grow():
+    (largest, *_) = circles(imports())
+    assert len(largest) <= LARGEST_CIRCLE, sorted(largest)
+
+
+def test_conditions_in_the_runtime_do_not_grow():
+    counted, total = conditions()
+    assert 100.0 * counted / total <= CONDITIONS
+
+
+def test_circles_are_found():
+    graph = {"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set()}
+    assert circles(graph) == [{"a", "b", "c"}]
+
+
+if __name__ == "__main__":
+    print([len(circle) for circle in circles(imports())], "modules in circles")
+    print("{} of {} lines of the runtime in C are conditions".format(*conditions()))
