@@ -1,7 +1,7 @@
-"""What shows objects of lower rooms to users: formulas and tables of notebooks, and figures.
+"""Registry of displays: the formulas, tables and figures that systems, compilations and trajectories show to users.
 
-Systems, compilations and trajectories can be shown, but know nothing of notation and drawing, which know them. They ask
-for a display by its name here; like a target (`phigen.registry`), it is imported when it is asked for.
+`phigen.notation` and `phigen.drawing` import systems and trajectories, so these cannot import notation and drawing.
+They call `display` with a name instead, and the module of that display is imported on its first use.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any, cast
 
-#: The modules and the functions of displays, by what they show.
+#: Name of a display → module and function that make it.
 DISPLAYS = {
     "formulas of a system": ("phigen.notation.notebook", "system_latex"),
     "page of a system": ("phigen.notation.notebook", "system_html"),
@@ -25,6 +25,6 @@ DISPLAYS = {
 
 
 def display(name: str) -> Callable[..., Any]:
-    """Return the function that makes a display. Raises `MissingPackageError` where it lacks a package."""
+    """Return the function that makes a display. The function raises `MissingPackageError` if a package is missing."""
     module, function = DISPLAYS[name]
     return cast(Callable[..., Any], getattr(import_module(module), function))

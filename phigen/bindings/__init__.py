@@ -1,1 +1,1 @@
-"""Bindings: the generated C as a module of another language, printed from the `Interface` of a solver."""
+"""Bindings: modules of other languages that call the generated C, printed from the `Interface` of a solver."""

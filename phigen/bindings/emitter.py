@@ -1,4 +1,4 @@
-"""The files of a binding, each from one template of ``templates/bindings``."""
+"""The files of a binding, printed from the templates in ``templates/bindings``."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ import let local macro module quote return struct true try using while"""
 
 
 @dataclass(frozen=True)
-class Language:
-    """How a binding is written.
+class BindingLanguage:
+    """Files, comments, number types and reserved words of the bindings for one language.
 
-    ``files`` maps names, in which NAME is that of the solver, to the templates of their parts. ``comment`` begins a
-    line of comment. ``reals`` are its words for double and float. ``words`` cannot be names of fields; ``caseless``
-    says that a and A are the same name.
+    ``files`` maps file names, with NAME in place of the solver's name, to the templates that make up the file.
+    ``comment`` begins a comment line. ``reals`` are the language's types for C's double and float. ``words`` are
+    reserved and cannot name fields. ``caseless`` is true if the language does not distinguish a from A.
     """
 
     files: Mapping[str, tuple[str, ...]]
@@ -39,16 +39,16 @@ class Language:
 
 
 LANGUAGES = {
-    "cpp": Language({"NAME.hpp": ("cpp.hpp",)}, "//", ("double", "float")),
-    "fortran": Language(
+    "cpp": BindingLanguage({"NAME.hpp": ("cpp.hpp",)}, "//", ("double", "float")),
+    "fortran": BindingLanguage(
         {"NAME.f90": ("fortran.f90", "fortran_procedures.f90", "fortran_status.f90")},
         "!",
         ("c_double", "c_float"),
         caseless=True,
     ),
-    "julia": Language({"NAME.jl": ("julia.jl",)}, "#", ("Cdouble", "Cfloat"), frozenset(_JULIA.split())),
-    "matlab": Language({"NAME_mex.c": ("matlab.c",)}, "//", ("double", "float")),
-    "rust": Language(
+    "julia": BindingLanguage({"NAME.jl": ("julia.jl",)}, "#", ("Cdouble", "Cfloat"), frozenset(_JULIA.split())),
+    "matlab": BindingLanguage({"NAME_mex.c": ("matlab.c",)}, "//", ("double", "float")),
+    "rust": BindingLanguage(
         {
             "rust/src/lib.rs": ("rust.rs", "rust_solver.rs"),
             "rust/build.rs": ("rust_build.rs",),
@@ -62,16 +62,17 @@ LANGUAGES = {
 
 
 def binding(compilation: Compilation, language: str) -> dict[str, str]:
-    """Return the files of a binding by their names. Raises `SpecError` for lattices."""
+    """Return the text of each file of a binding, by file name. Raises `SpecError` for lattices."""
     spec, name = compilation.spec, compilation.spec.name
     if spec.lattice:
         message = f"a binding of {name}: not for lattices in this version"
         hint = "the header of the C declares what can be called; phigen show --expand SIZES writes an ordinary spec"
         raise SpecError([spec.diagnostic(("lattice",), message, hint)])
-    made, values = LANGUAGES[language], _values(compilation, LANGUAGES[language])
+    target = LANGUAGES[language]
+    values = _values(compilation, target)
     files = {}
-    for file, templates in made.files.items():
-        comment = "#" if file.endswith(".toml") else made.comment
+    for file, templates in target.files.items():
+        comment = "#" if file.endswith(".toml") else target.comment
         notice = f"{name} for {language}. DO NOT EDIT: the checksum below notices."
         about = [notice, f"SPDX-License-Identifier: {spec.license}"]
         body = "".join(render("bindings", template, values) for template in templates)
@@ -79,8 +80,8 @@ def binding(compilation: Compilation, language: str) -> dict[str, str]:
     return files
 
 
-def _values(compilation: Compilation, language: Language) -> dict[str, object]:
-    """What the templates are printed from."""
+def _values(compilation: Compilation, language: BindingLanguage) -> dict[str, object]:
+    """Return the variables of the templates: names, counts and features of the solver."""
     spec, program = compilation.spec, compilation.program
     about = interface_of(program)
     struct = list(members(program).values())
@@ -117,20 +118,24 @@ def _values(compilation: Compilation, language: Language) -> dict[str, object]:
 
 
 def _described(description: str, unit: str) -> str:
-    """A comment of one line on a parameter."""
+    """Return a comment of one line on a parameter, with its unit in brackets."""
     return (plain(description) or "parameter") + f" [{plain(unit)}]" * bool(unit)
 
 
-def _fields(names: Iterable[str], language: Language) -> list[str]:
-    """Names of fields in the order of ``names``: what a language cannot have is changed until it can."""
+def _fields(names: Iterable[str], language: BindingLanguage) -> list[str]:
+    """Return names of fields in the order of ``names``.
+
+    A name that is reserved, or that a field before it has, gets underscores at its end. Where case is not
+    distinguished, which Fortran does not, a name that begins with an underscore gets the prefix "p".
+    """
     fields: list[str] = []
     for name in names:
         field = f"p{name}" if language.caseless and name.startswith("_") else name
-        while field in language.words or _taken(field, fields, language.caseless):
+        while field in language.words or _occurs(field, fields, language.caseless):
             field += "_"
         fields.append(field)
     return fields
 
 
-def _taken(field: str, fields: Iterable[str], caseless: bool) -> bool:
+def _occurs(field: str, fields: Iterable[str], caseless: bool) -> bool:
     return any(field == other or (caseless and field.lower() == other.lower()) for other in fields)

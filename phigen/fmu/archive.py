@@ -1,4 +1,4 @@
-"""The files of an FMU: sources, binaries and descriptions, in archives that depend on their contents alone."""
+"""The files of an FMU: sources, binaries and descriptions, in archives whose bytes depend on their contents alone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from phigen.runtime import toolchain
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
 
-#: The date of all files in an archive: the first that the format knows.
+#: Date of all files in an archive, so that the same contents give the same bytes: the earliest date of the zip format.
 _DATE = (1980, 1, 1, 0, 0, 0)
 _FILE, _PROGRAM = 0o100644 << 16, 0o100755 << 16
 
@@ -36,9 +36,9 @@ class Unit:
 
 
 def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> Unit:
-    """Return the FMU of a system; ``solver`` are its files of C, a header and a source.
+    """Return the FMU of a system; ``solver`` maps the names of its C header and source to their texts.
 
-    Raises `SpecError` where there can be none.
+    Raises `SpecError` for lattices, and for a spec without runs.
     """
     name, variables = compilation.spec.name, variables_of(compilation)
     token = token_of(compilation, dict(solver))
@@ -49,9 +49,9 @@ def unit_of(compilation: Compilation, solver: Mapping[str, str]) -> Unit:
 
 
 def binaries(unit: Unit, platforms: Collection[str] = ()) -> dict[str, bytes]:
-    """Return the library for each platform, for those that are named, else for all that can be compiled for.
+    """Return the bytes of the shared library for each platform in ``platforms``; if empty, for each with a compiler.
 
-    Raises `ToolchainError` where a compiler fails, or there is none for a platform that is named.
+    Raises `ToolchainError` if a compilation fails, or if a platform in ``platforms`` has no compiler.
     """
     available = compilers()
     missing = sorted(set(platforms) - set(available))
@@ -82,12 +82,12 @@ def archive(unit: Unit, version: int, libraries: Mapping[str, bytes]) -> bytes:
     contents |= {f"sources/{file}": text.encode() for file, text in unit.sources.items()}
     if version == 3:
         contents["sources/buildDescription.xml"] = unit.build.encode()
-    written = io.BytesIO()
-    with zipfile.ZipFile(written, "w", zipfile.ZIP_DEFLATED) as file:
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as file:
         for path, data in contents.items():
             entry = zipfile.ZipInfo(path, _DATE)
             entry.create_system = 3  # so that permissions hold, whatever machine writes it
             entry.external_attr = _PROGRAM if path.startswith("binaries/") else _FILE
             entry.compress_type = zipfile.ZIP_DEFLATED
             file.writestr(entry, data)
-    return written.getvalue()
+    return content.getvalue()

@@ -11,16 +11,16 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from phigen._version import __version__
-from phigen.fmu.variables import Variable, started
+from phigen.fmu.variables import Variable, first_run
 
 if TYPE_CHECKING:
     from phigen.compilation import Compilation
 
-#: Annotations of phigen go by this name.
+#: Vendor name under which the annotations of phigen stand.
 VENDOR = "phigen"
 
 _HEAD = '<?xml version="1.0" encoding="UTF-8"?>\n'
-#: What the solver can do, with the spelling of this attribute in each version.
+#: Capabilities of the solver that are stated as true, as attributes of each version of FMI.
 _ABILITIES = {
     2: ("canHandleVariableCommunicationStepSize", "canGetAndSetFMUstate", "canSerializeFMUstate"),
     3: (
@@ -80,7 +80,7 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
     of_steps = ET.SubElement(root, "CoSimulation", modelIdentifier=compilation.spec.name)
     for ability in _ABILITIES[version]:
         of_steps.set(ability, "true")
-    if compilation.program.noise:  # a step of noise is not cut in parts
+    if compilation.program.noise:  # a step with noise cannot be divided: the parts would draw other random numbers
         of_steps.set("canHandleVariableCommunicationStepSize", "false")
     if version == 2:
         of_steps.set("canNotUseMemoryManagementFunctions", "true")
@@ -90,8 +90,11 @@ def _co_simulation(root: ET.Element, compilation: Compilation, version: int, sou
 
 
 def _experiment(root: ET.Element, compilation: Compilation) -> None:
-    """The run that the FMU begins with; where steps are equal in τ, only its start is known in time."""
-    run = started(compilation.spec)
+    """Add the default experiment: the first run of the spec.
+
+    With a monitor steps are equal in τ. The physical time of the end is then unknown, and only the start is stated.
+    """
+    run = first_run(compilation.spec)
     experiment = ET.SubElement(root, "DefaultExperiment", startTime=repr(float(run.start)))
     if compilation.program.monitor is None:
         experiment.set("stopTime", repr(float(run.start + run.step * run.steps)))
@@ -99,7 +102,7 @@ def _experiment(root: ET.Element, compilation: Compilation) -> None:
 
 
 def _annotations(root: ET.Element, compilation: Compilation, version: int) -> None:
-    """What does not change while the FMU runs: the method, and the spec by its checksum."""
+    """Add annotations that identify the solver: its method, and the checksum of its spec."""
     spec, facts = compilation.spec, ET.Element("method")
     facts.set("order", str(compilation.order.order))
     facts.set("scheme", str(compilation.described["scheme"]))
@@ -154,7 +157,7 @@ def _structure(root: ET.Element, variables: Sequence[Variable], version: int) ->
 
 
 def _plain(text: str) -> str:
-    """Text without characters that XML does not allow; line breaks become blanks."""
+    """Return the text with spaces in place of line breaks and of characters that XML forbids."""
     return " ".join(
         "".join(" " if unicodedata.category(c) in ("Cc", "Cs", "Cn", "Zl", "Zp") else c for c in text).split()
     )

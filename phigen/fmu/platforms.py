@@ -1,4 +1,4 @@
-"""The machines that binaries of an FMU are made for, and the compilers that make them."""
+"""The platforms for which binaries of an FMU are compiled, and the compilers for them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from phigen.runtime.toolchain import Compiler
 
 @dataclass(frozen=True)
 class Platform:
-    """A machine by its folder in FMI 3.0 and in 2.0 (empty: 2.0 has none), and the target of zig."""
+    """A platform: its folder in FMI 3.0 and in 2.0 ("" if 2.0 defines none), its target for zig, its file suffix."""
 
     folder: str
     folder_2: str
@@ -21,7 +21,8 @@ class Platform:
     suffix: str
 
 
-#: Those that zig compiles for out of the box. Of glibc an old version, so that older machines load the binaries too.
+#: Platforms that zig compiles for without further packages. The version of glibc is old, so that the binaries also load
+#: on older machines.
 PLATFORMS = {
     p.folder: p
     for p in (
@@ -34,11 +35,11 @@ PLATFORMS = {
     )
 }
 
-#: Products are not fused, so that all platforms give the same bits, but for functions of their libraries; nothing is
-#: visible but the functions of FMI; nothing for debuggers.
+#: No fused multiply-add: then results differ between platforms only by their libm. Only the functions of FMI are
+#: exported, and symbols for debuggers are stripped.
 FLAGS = ("-ffp-contract=off", "-fvisibility=hidden", "-s")
 
-#: Seconds that a compilation may take: the first for a platform builds the runtime of that too.
+#: Limit of a compilation in seconds. The first one for a platform also builds zig's runtime libraries for it.
 TIMEOUT = 1200.0
 
 _PACKAGE = "ziglang"
@@ -46,15 +47,15 @@ _MACHINES = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 def host() -> Platform | None:
-    """Return the platform of this machine, None where FMI has no name for it that phigen knows."""
+    """Return the platform of this machine, or None if it is not one of `PLATFORMS`."""
     machine = platform.machine().lower()
     return PLATFORMS.get(f"{_MACHINES.get(machine, machine)}-{platform.system().lower()}")
 
 
 def compilers() -> dict[str, Compiler]:
-    """Return a compiler for each platform that can be compiled for: by zig for all, else for this machine only.
+    """Return the compilers by platform: zig for all platforms if it is installed, else the C compiler of this machine.
 
-    Raises `ToolchainError` if a compiler is named in CC that does not work.
+    Raises `ToolchainError` if CC names a compiler that does not work.
     """
     if find_spec(_PACKAGE):
         zig = (sys.executable, "-m", _PACKAGE, "cc")

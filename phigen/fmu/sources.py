@@ -1,6 +1,6 @@
-"""The C of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 around it.
+"""The C of an FMU: the solver as ``phigen build`` writes it, and the functions of FMI 2.0 and 3.0 that call it.
 
-These lie in ``templates/c/runtime/fmu*.c``; what depends on the system is printed here.
+The functions of FMI lie in ``templates/c/runtime/fmu*.c``. This module prints the constants that they need of a system.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import hashlib
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from phigen.fmu.variables import Variable, first_numbers, started
+from phigen.fmu.variables import Variable, first_numbers, first_run
 from phigen.targets.c.amalgamation import Amalgam
 from phigen.targets.c.emitter import runtime_of
 from phigen.targets.c.kernels import members
@@ -38,8 +38,8 @@ def layer(compilation: Compilation, variables: Sequence[Variable], token: str) -
 
 
 def token_of(compilation: Compilation, files: dict[str, str]) -> str:
-    """Return the token by which a description and a binary know that they belong together: from the solver's source."""
-    about = "".join(files[name] for name in sorted(files)) + repr(started(compilation.spec))
+    """Return the token that must agree between ``modelDescription.xml`` and a binary: a hash of the solver's source."""
+    about = "".join(files[name] for name in sorted(files)) + repr(first_run(compilation.spec))
     digest = hashlib.sha256(about.encode()).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
 
@@ -47,9 +47,9 @@ def token_of(compilation: Compilation, files: dict[str, str]) -> str:
 def _model(compilation: Compilation, variables: Sequence[Variable], token: str) -> str:
     program, spec = compilation.program, compilation.spec
     struct = list(members(program).values())
-    written = literal if program.single else repr
-    run, numbers = started(spec), first_numbers(compilation)
-    absent = {} if program.noise else {"SEED": numbers["END"]}  # the number of no variable
+    digits = literal if program.single else repr
+    run, numbers = first_run(spec), first_numbers(compilation)
+    absent = {} if program.noise else {"SEED": numbers["END"]}  # a number that no variable has
     starts = [v.start for v in variables if v.start is not None]
     attitude = [v.start or 0.0 for v in variables[numbers["ATTITUDE"] : numbers["POSITION"]]]
     parameters = [v.start or 0.0 for v in variables[numbers["PARAMETER"] : numbers["STEP"]]]
@@ -65,9 +65,9 @@ def _model(compilation: Compilation, variables: Sequence[Variable], token: str) 
             "most": max(1, len(program.casimirs), len(program.observed)),
             "before_last": list(enumerate(struct[:-1])),
             "last": struct[-1] if struct else "",
-            "parameters": ", ".join(written(v) for v in parameters) or "0",
-            "start": ", ".join(written(float(x)) for x in run.initial),
-            "attitude": ", ".join(written(v) for v in attitude),
+            "parameters": ", ".join(digits(v) for v in parameters) or "0",
+            "start": ", ".join(digits(float(x)) for x in run.initial),
+            "attitude": ", ".join(digits(v) for v in attitude),
             "step": repr(float(run.step)),
             "seed": run.seed,
         },

@@ -1,4 +1,4 @@
-"""The variables of an FMU: what its environment reads and sets, by number."""
+"""The variables of an FMU, which the importing simulator reads and sets by their numbers."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ POSITION = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable as ``modelDescription.xml`` states it.
+    """A variable of ``modelDescription.xml``.
 
-    ``number`` is its value reference, the same in both versions of FMI. ``start`` is the value that it begins
-    with, None where it is computed. ``whole`` says that it is an integer.
+    ``number`` is its value reference, the same in FMI 2.0 and 3.0. ``start`` is its initial value, None if the solver
+    computes it. ``whole`` is true for an integer, ``positive`` for a lower bound of 0.
     """
 
     name: str
@@ -38,14 +38,14 @@ class Variable:
 
     @property
     def initial(self) -> str:
-        """How the value at the start is known; empty where the standard leaves no choice."""
+        """Return the attribute ``initial``, exact or calculated; empty for causalities that may not have it."""
         if self.causality in ("independent", "input"):
             return ""
         return "calculated" if self.start is None else "exact"
 
 
-def started(spec: Spec) -> Run:
-    """Return the run whose initial state, parameters and step an FMU begins with: the first of the spec.
+def first_run(spec: Spec) -> Run:
+    """Return the run that supplies the initial state, parameters and step of an FMU: the first of the spec.
 
     Raises `SpecError` for lattices, and for a spec without runs.
     """
@@ -61,16 +61,16 @@ def started(spec: Spec) -> Run:
 
 
 def variables_of(compilation: Compilation) -> tuple[Variable, ...]:
-    """Return all variables, numbered as the C counts them."""
+    """Return all variables in the order of their numbers, as in `first_numbers`."""
     spec, program = compilation.spec, compilation.program
-    run = started(spec)
+    run = first_run(spec)
     listed = [_time(spec), *_states(spec, run), *_parameters(spec, run), *_solver(program, run)]
     listed += [*_attitude(program), *_results(program)]
     return tuple(replace(variable, number=k) for k, variable in enumerate(listed))
 
 
 def first_numbers(compilation: Compilation) -> dict[str, int]:
-    """Return the number of the first variable of each kind; that of an absent kind is the number of the next kind."""
+    """Return the number of the first variable of each kind. An absent kind has the number of the kind after it."""
     program = compilation.program
     attitude, element = _sizes_of_attitude(program)
     counts = {
@@ -93,7 +93,7 @@ def first_numbers(compilation: Compilation) -> dict[str, int]:
 
 
 def _sizes_of_attitude(program: Program) -> tuple[int, int]:
-    """Numbers of an attitude, and of an attitude with its position."""
+    """Return the number of entries of the attitude, and of attitude and position together; 0 and 0 without attitude."""
     if not program.attitude:
         return 0, 0
     size = math.prod(program.attitude.shape)
@@ -101,8 +101,8 @@ def _sizes_of_attitude(program: Program) -> tuple[int, int]:
 
 
 def _time(spec: Spec) -> Variable:
-    taken = {*spec.coordinates, *(p.name for p in spec.parameters)}
-    return Variable("system.time" if "time" in taken else "time", "independent", "continuous", description="the time")
+    names = {*spec.coordinates, *(p.name for p in spec.parameters)}
+    return Variable("system.time" if "time" in names else "time", "independent", "continuous", description="the time")
 
 
 def _states(spec: Spec, run: Run) -> Iterator[Variable]:
@@ -118,22 +118,22 @@ def _parameters(spec: Spec, run: Run) -> Iterator[Variable]:
 
 
 def _solver(program: Program, run: Run) -> Iterator[Variable]:
-    of_what = "tau" if program.monitor else "the time"
-    size = f"size of whole steps of {of_what}; communication steps may have any size"
-    size = f"size of whole steps of {of_what}; communication steps are multiples of it" if program.noise else size
+    variable = "tau" if program.monitor else "time"
+    size = f"size of a whole step in {variable}; communication steps may have any size"
+    size = f"size of a whole step in {variable}; communication steps must be multiples of it" if program.noise else size
     yield Variable("solver.step", "parameter", "fixed", float(run.step), size, positive=True)
     if program.noise:
-        seed = "which random numbers are taken"
+        seed = "seed of the random numbers"
         yield Variable("solver.seed", "parameter", "fixed", run.seed, seed, whole=True)
 
 
 def _attitude(program: Program) -> Iterator[Variable]:
-    """The attitude, which begins with the identity, and the position, which begins with 0."""
+    """Yield the entries of the attitude, which starts as the identity, and of the position, which starts at 0."""
     if not program.attitude:
         return
     rows = program.attitude.group.rows
     names = [f"[{i + 1},{j + 1}]" for i in range(rows) for j in range(rows)] or [f".{name}" for name in QUATERNION]
-    shown = "of the matrix of the attitude" if rows else "of the quaternion that turns body into space"
+    shown = "of the attitude matrix" if rows else "of the quaternion that rotates body into space coordinates"
     for k, name in enumerate(names):
         one = k % (rows + 1) == 0 if rows else k == 0
         yield Variable(f"attitude{name}", "output", "continuous", float(one), f"entry {shown}")
@@ -145,7 +145,7 @@ def _attitude(program: Program) -> Iterator[Variable]:
 def _results(program: Program) -> Iterator[Variable]:
     yield Variable("system.hamiltonian", "output", "continuous", description="the Hamiltonian")
     for name in program.casimirs:
-        kept = "" if name in program.pushed else ", constant along trajectories"
-        yield Variable(f"casimirs.{name}", "output", "continuous", description=f"Casimir{kept}")
+        constancy = "" if name in program.pushed else ", constant along trajectories"
+        yield Variable(f"casimirs.{name}", "output", "continuous", description=f"Casimir{constancy}")
     for name in program.observed:
         yield Variable(f"observables.{name}", "output", "continuous", description="observable")

@@ -354,19 +354,19 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         run = LatticeRun(self, at, marks, frames, Path(checkpoints) if checkpoints else None)
         run.expect_place(resume=resume)
         try:
-            count = run.made(progress)
+            count = run.complete(progress)
         except BackendError as error:
             run.discard()
             run.record()
-            kept = np.array([*frames.kept(run.count), error.states[-1]])
+            states = np.array([*frames.first(run.count), error.states[-1]])
             t = np.array([at.t0 + at.h * mark for mark in [*marks[: run.count], error.step]], dtype=np.float64)
-            found = self._trajectory(t, kept, run, error.step, at)
-            raise self.failure(error, at.h, found, at.values) from error
+            trajectory = self._trajectory(t, states, run, error.step, at)
+            raise self.failure(error, at.h, trajectory, at.values) from error
         t = np.asarray(at.t0 + at.h * marks[:count], dtype=np.float64)
-        found = self._trajectory(t, frames.array, run, steps, at)
-        frames.finish(found)
+        trajectory = self._trajectory(t, frames.array, run, steps, at)
+        frames.finish(trajectory)
         run.forget()
-        return found
+        return trajectory
 
     def run(
         self,
@@ -439,19 +439,19 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         names, known = tuple(("energy", *self.interface.observables) if of is None else of), recordable(self.interface)
         if strange := [name for name in names if name not in known]:
             raise ValueError(f"cannot record {strange[0]!r}; there are {', '.join(known)}")
-        target, kept = expect_table(output) if output else None, Path(checkpoints) if checkpoints else None
-        if kept and (refused := checkpoint.objection(kept, target, resume=resume, how="resume=True")):
+        target, resumable = expect_table(output) if output else None, Path(checkpoints) if checkpoints else None
+        if resumable and (refused := checkpoint.objection(resumable, target, resume=resume, how="resume=True")):
             raise ValueError(refused)
-        run = SeriesRun(self, at, row_steps(steps, stride), names, kept)
+        run = SeriesRun(self, at, row_steps(steps, stride), names, resumable)
         try:
-            made = run.made(progress)
+            recorded = run.complete(progress)
         except BackendError as error:
             raise self.failure(error, at.h, run.series(error.step), at.values) from error
         if target:
-            made.save(target)
-        if kept:
-            kept.unlink(missing_ok=True)
-        return made
+            recorded.save(target)
+        if resumable:
+            resumable.unlink(missing_ok=True)
+        return recorded
 
     def ends_of(self, series: LatticeSeries) -> LatticeTrajectory:
         """Return the trajectory of the first and the last state of a series; see `LatticeSeries.ends`."""
@@ -459,8 +459,8 @@ class LatticeSolver(Named[LatticeBackend, LatticeInterface]):
         t = np.array([series.t[0], series.t[0] + series.steps * series.h])
         when = t.tolist() if about.time else [None, None]
         energy = [self.hamiltonian(state, at, parameters=series.parameters) for state, at in zip(x, when, strict=True)]
-        made = series.steps, series.h, series.parameters
-        return LatticeTrajectory(t, x, np.array(energy), *made, self.coordinates, about.axes, self)
+        settings = series.steps, series.h, series.parameters
+        return LatticeTrajectory(t, x, np.array(energy), *settings, self.coordinates, about.axes, self)
 
     def step(
         self,

@@ -41,8 +41,8 @@ class LatticeRun:
     session: Any = None
     saved: Mapping[str, Any] = field(default_factory=dict)  # what a session of a checkpoint goes on from
 
-    def made(self, progress: Progress | None) -> int:
-        """All frames that are left."""
+    def complete(self, progress: Progress | None) -> int:
+        """Compute the remaining frames, from a checkpoint if there is one, and return the number of all frames."""
         first = self._resumed()
         self.session = self.solver.started(replace(self.at, x=first))
         if self.count:
@@ -147,8 +147,8 @@ class Frames:
         """Store frame k."""
         self.array[k] = state
 
-    def kept(self, count: int) -> Iterator[Floats]:
-        """The first frames, still there after `discard`."""
+    def first(self, count: int) -> Iterator[Floats]:
+        """Iterate over the first ``count`` frames; they can be read after `discard` too."""
         return iter(self.array[:count])
 
     def flush(self) -> None:
@@ -181,13 +181,13 @@ class Frames:
             self._array = np.array(self._array)
             self._part.unlink(missing_ok=True)
 
-    def finish(self, found: LatticeTrajectory) -> None:
-        """Give the file its name, and what else belongs into it."""
+    def finish(self, trajectory: LatticeTrajectory) -> None:
+        """Write the file of the frames under its final name; a ``.npz`` holds the rest of the trajectory too."""
         if self.path is None or self._part is None:
             return
         self.flush()
         if self.path.suffix == ".npz":
-            found.save(self.path)
+            trajectory.save(self.path)
             with ExitStack() as last:
                 last.callback(self._part.unlink, missing_ok=True)
         else:

@@ -87,11 +87,13 @@ def recordable(about: LatticeInterface) -> tuple[str, ...]:
     return ("energy", *summed, *about.observables)
 
 
-def series_of(made: LatticeTrajectory) -> LatticeSeries:
+def series_of(trajectory: LatticeTrajectory) -> LatticeSeries:
     """Return the energy and the observables of a trajectory as a series."""
-    columns = {"energy": made.energy}
-    columns |= {name: made.observed[:, k] for k, name in enumerate(made.solver.interface.observables)}
-    return LatticeSeries(made.t, columns, made.x[0], made.x[-1], made.steps, made.h, made.parameters, made.solver)
+    x, solver = trajectory.x, trajectory.solver
+    columns = {"energy": trajectory.energy}
+    columns |= {name: trajectory.observed[:, k] for k, name in enumerate(solver.interface.observables)}
+    settings = trajectory.steps, trajectory.h, trajectory.parameters
+    return LatticeSeries(trajectory.t, columns, x[0], x[-1], *settings, solver)
 
 
 @dataclass
@@ -106,8 +108,8 @@ class SeriesRun:
     rows: list[list[float]] = field(default_factory=list)
     session: Any = None
 
-    def made(self, progress: Progress | None) -> LatticeSeries:
-        """Make all rows that are left, and return the series. Raises `BackendError`."""
+    def complete(self, progress: Progress | None) -> LatticeSeries:
+        """Compute the remaining rows, and return the series. Raises `BackendError`."""
         first, saved = self._resumed()
         self.session, seen = self.solver.started(replace(self.at, x=first)), time.monotonic()
         read = _reader(self.session, self.solver.interface, self.names)
