@@ -1,8 +1,9 @@
 """Golden files: what is generated of the corpus, whole for a few systems, and of the others what these do not have.
 
-Systems that generated/README.md names are in generated/ as users get them. Of each other system tests/golden/NAME.txt
-has its own part: the paragraphs that no whole solver has, mostly the functions printed for the model. So a change of
-the runtime is a change of few files. Which solvers call which functions is in tests/golden/calls.txt.
+The systems that generated/left_out.txt does not list are in generated/ as users get them; `phigen build specs` writes
+these. Of each system that it lists tests/golden/NAME.txt has its own part: the paragraphs that no whole solver has,
+mostly the functions printed for the model. So a change of the runtime is a change of few files. Which solvers call
+which functions is in tests/golden/calls.txt.
 
     python tests/golden.py           writes all of them
     python tests/golden.py --check   says which are out of date
@@ -21,6 +22,7 @@ from solvers import files
 from systems import as_given
 
 from phigen import resources
+from phigen.cli.left_out import names_left_out
 from phigen.targets.header import CHECKSUM
 
 ROOT = resources.bundled_specs().parent
@@ -28,10 +30,10 @@ GENERATED = ROOT / "generated"
 PARTS = ROOT / "tests" / "golden"
 CALLS = PARTS / "calls.txt"
 
-#: The systems of the corpus whose solvers are there as a whole: those that the page of examples has.
-WHOLE = re.findall(r"^\| \[(\w+)\]\(\1\) \|", (GENERATED / "README.md").read_text(encoding="utf-8"), re.M)
-#: Those of which there is the part of their own.
-PARTIAL = sorted({*resources.bundled()} - {*WHOLE})
+#: The systems of the corpus of which there is the part of their own.
+PARTIAL = sorted(names_left_out(GENERATED))
+#: Those whose solvers are there as a whole.
+WHOLE = sorted({*resources.bundled()} - {*PARTIAL})
 
 OMITTED = "..."
 NOBODY = "NAME"

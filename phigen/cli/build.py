@@ -18,6 +18,7 @@ from phigen.cli.console import Console, counted, indented, mend, out, pass_conso
 from phigen.cli.failures import Collector
 from phigen.cli.fmu import PLATFORMS, units_of, write_unit
 from phigen.cli.generation import DIRECTORY, Options, files_of, output_options
+from phigen.cli.left_out import FILE, names_left_out, unknown_names
 from phigen.cli.sources import found, load_all
 from phigen.errors import CheckError
 from phigen.registry import TARGETS
@@ -25,6 +26,7 @@ from phigen.registry import TARGETS
 if TYPE_CHECKING:
     from phigen.cli.outputs import Change
     from phigen.compilation import Compilation
+    from phigen.spec.model import Spec
 
 #: Beyond the flags of every local library: what phigen promises that its C passes.
 STRICT = ("-Wall", "-Wextra", "-Werror")
@@ -87,6 +89,7 @@ def command(
 
     SPEC is a file, a folder that is searched for *.yaml, or the name of a bundled spec. The statements of the spec
     are proved first; nothing is written if any spec has an error. Files that were edited by hand are not overwritten.
+    Of folders, the specs whose names are in DIR/left_out.txt are left out.
     """
     if (checking or diff) and (compiling or certify or fmu or bindings):
         writing = "--compile, --fmu, --binding and --certify write files"
@@ -107,7 +110,7 @@ def command(
         adjoint,
         real,
     )
-    compilations = _compile_all(console, spec_files, options)
+    compilations = _compile_all(console, spec_files, options, checking or diff)
     units = units_of(compilations, options) if fmu else {}
     planned = _plan(console, compilations, options)
     planned = with_bindings(planned, options, bindings) if bindings else planned
@@ -124,9 +127,9 @@ def command(
         _certify(console, compilations, options)
 
 
-def _compile_all(console: Console, spec_files: Sequence[str], options: Options) -> list[Compilation]:
+def _compile_all(console: Console, spec_files: Sequence[str], options: Options, checking: bool) -> list[Compilation]:
     collector, compilations = Collector(), []
-    for spec in load_all(spec_files, collector):
+    for spec in _to_build(console, load_all(spec_files, collector), spec_files, options.directory, checking):
         start = time.perf_counter()
         with collector.collecting():
             compilations.append(options.compiled(spec))
@@ -137,6 +140,25 @@ def _compile_all(console: Console, spec_files: Sequence[str], options: Options) 
         for note in compilation.notes:
             console.note(f"{compilation.spec.name}: {note}")
     return compilations
+
+
+def _to_build(
+    console: Console, specs: Sequence[Spec], spec_files: Sequence[str], directory: Path, checking: bool
+) -> list[Spec]:
+    """Leave out the specs of searched folders that the output folder lists; what the user named is built.
+
+    A check raises CheckError if the list has names that no spec has.
+    """
+    folders = [file for file in spec_files if Path(found(file)).is_dir()]
+    listed = names_left_out(directory) if folders else {}
+    unknown = unknown_names(listed, {spec.name for spec in specs})
+    if checking and unknown:
+        raise CheckError("\n".join([*unknown, "  hint: remove these lines, or check the folder of these specs too"]))
+    named = {found(file) for file in spec_files}
+    built = [spec for spec in specs if spec.name not in listed or spec.file in named]
+    if len(built) < len(specs):
+        console.note(f"{counted(len(specs) - len(built), 'spec')} left out by {directory / FILE}")
+    return built
 
 
 def _plan(
@@ -185,7 +207,7 @@ def _complaint(change: Change) -> str:
     return {
         "missing": "missing",
         "different": "differs from what phigen generates from its spec",
-        "stale": "no spec produces it any more",
+        "stale": "no spec of this build produces it",
     }[change.state]
 
 

@@ -24,7 +24,7 @@ class Change:
 
     @property
     def state(self) -> str:
-        """``unchanged``, ``missing``, ``different``, or ``stale``: no spec produces it any more."""
+        """``unchanged``, ``missing``, ``different``, or ``stale``: no spec of this build produces it."""
         if self.before == self.after:
             return "unchanged"
         if self.after is None:

@@ -56,6 +56,35 @@ def test_check_accepts_what_build_wrote(phigen, write, options):
     assert tree(".") == before
 
 
+def test_listed_specs_are_left_out_of_folders(phigen, write):
+    write("specs/a.yaml")
+    write("specs/b.yaml")
+    write("generated/left_out.txt", "# not committed\n\nb  # too long\n")
+    done = phigen("build", "specs")
+    assert "1 spec left out by generated/left_out.txt" in done.stderr
+    assert sorted(p.name for p in Path("generated").iterdir()) == ["a", "left_out.txt"]
+    assert phigen("build", "specs", "--check").exit_code == 0
+    assert phigen("build", "specs/b.yaml").exit_code == 0, "a spec that is named is built"
+    assert Path("generated/b/b.c").exists()
+    forgotten = phigen("build", "specs", "--check")
+    assert forgotten.exit_code == 5
+    assert "generated/b/b.c: no spec of this build produces it" in forgotten.stderr
+
+
+def test_the_list_of_left_out_specs_is_read_strictly(phigen, write):
+    write("specs/a.yaml")
+    write("generated/left_out.txt", "a\n  b c\na\n")
+    done = phigen("build", "specs")
+    assert done.exit_code == 1
+    assert "generated/left_out.txt:2:3: error: 'b c' is not the name of a spec" in done.stderr
+    assert "generated/left_out.txt:3:1: error: a is in line 1 already" in done.stderr
+    write("generated/left_out.txt", "gone\n")
+    assert phigen("build", "specs").exit_code == 0
+    gone = phigen("build", "specs", "--check")
+    assert gone.exit_code == 5
+    assert "generated/left_out.txt:1:1: no spec has the name gone" in gone.stderr
+
+
 def edited(text):
     return text.replace("{", "{ ", 1)
 
