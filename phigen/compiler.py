@@ -149,9 +149,9 @@ def _tell_of_lattice(spec: Spec) -> None:
     """A warning for a lattice that is typed out, before it takes the time that one of any size would not."""
     if spec.dimension < SITES:
         return
-    from phigen.lattice.recognition import written_out
+    from phigen.lattice.recognition import recognised_lattice
 
-    found = written_out(spec, least=SITES)
+    found = recognised_lattice(spec, least=SITES)
     if found is not None and found.lattice is not None:
         sites = spec.dimension // len(found.coordinates)
         message = f"{spec.name} is a lattice of {sites} like sites, written out"

@@ -9,9 +9,26 @@ ROOT = Path(__file__).resolve().parent.parent
 
 #: Rooms of phigen that keep the rules. A room that is brought to them is added here.
 CLEAN = (
-    "attitude", "bindings", "cli", "display.py", "drawing", "fmu", "geometry", "notation", "paper", "proofs",
-    "realisations", "report", "series", "spec", "study", "sweeping", "symbolic", "tuning",
-)  # fmt: skip
+    "attitude",
+    "bindings",
+    "cli",
+    "display.py",
+    "drawing",
+    "fmu",
+    "geometry",
+    "lattice",
+    "notation",
+    "paper",
+    "proofs",
+    "realisations",
+    "report",
+    "series",
+    "spec",
+    "study",
+    "sweeping",
+    "symbolic",
+    "tuning",
+)
 #: Variables and arguments that name nothing. Fields of records are left to readers.
 EMPTY_NAMES = {"found", "given", "kept", "made", "own", "taken", "told", "wanted"}
 #: First words of docstrings that name their object last, or not at all.

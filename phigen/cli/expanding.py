@@ -41,13 +41,14 @@ def expanded_text(spec: Spec, sizes: str) -> str:
 
 def lattice_text(spec: Spec) -> str:
     """The text of a spec of one site, for an ordinary spec in which like sites are written out."""
-    from phigen.lattice.recognition import LEAST, written_out
+    from phigen.lattice.recognition import MIN_SITES_PER_AXIS, recognised_lattice
     from phigen.spec.yaml_text import spec_text
 
-    lattice_spec = None if spec.lattice else written_out(spec, least=LEAST)
+    lattice_spec = None if spec.lattice else recognised_lattice(spec, least=MIN_SITES_PER_AXIS)
     if lattice_spec is None:
         message = f"{spec.name} is not recognised as a lattice"
-        hint = f"names such as x1, x2, … or x_0_0, … of at least {LEAST} sites along each axis, all with the same terms"
+        least = MIN_SITES_PER_AXIS
+        hint = f"names such as x1, x2, … or x_0_0, … of at least {least} sites along each axis, all with the same terms"
         raise SpecError([spec.diagnostic(("coordinates",), message, hint)])
     return spec_text(lattice_spec)
 

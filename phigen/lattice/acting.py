@@ -1,6 +1,8 @@
-"""Forces and noise at sites as parts of a splitting: the flow of πζ + f, or of pieces of it, and those of the sources.
+"""Flows of forces and of noise at sites, as parts of the splitting of a lattice.
 
-Each source of noise has the flow of Σ ΔW_s σ g(s), the sum over all sites with the increments of a part of a step.
+The force part is the flow of πζ + f or, where that is not elementary, the flows of its summands. Each source of noise
+has the flow of Σ ΔW_s σ g(s), where the sum runs over all sites s, and ΔW_s is the increment at s for a part of a
+step.
 """
 
 from __future__ import annotations
@@ -23,8 +25,8 @@ from phigen.lattice.parts import (
     PartSearch,
     SiteFields,
     SiteMotion,
-    at_every_site,
-    own_ring,
+    bracketless_ring,
+    merged_colours,
 )
 from phigen.scheme.choosing import Host
 from phigen.spec.grammar import names_in
@@ -40,7 +42,10 @@ Rates = Mapping[str, Expression]
 
 
 def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """The flows of the forces; none without any. `SpecError` that names the piece that has none in closed form."""
+    """Return the flows of the forces; none without forces.
+
+    Raises `SpecError`, naming the summand of πζ + f that has no flow in closed form.
+    """
     if not cell.forces:
         return ()
     at = SiteFields(cell, sums_by_field(cell))
@@ -50,17 +55,17 @@ def force_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow,
     if isinstance(whole, CellFlow):
         return (whole,) if whole.motions else ()
     components = [(f"f = {shortened(e)}", {f: e}) for f, e in impulse.items()]
-    found = (*_tangent_flows(cell, colouring, host), *_pieces(cell, colouring, impulse, components, host))
-    return tuple(flow for flow in found if flow.motions)
+    flows = (*_tangent_flows(cell, colouring, host), *_summand_flows(cell, colouring, impulse, components, host))
+    return tuple(flow for flow in flows if flow.motions)
 
 
 def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """The flows of πζ: the whole of it, or of its covectors, or of damping and of the other covectors."""
+    """Return the flows of πζ: one flow, one for each covector, or those of damping and of the other covectors."""
     at = SiteFields(cell, sums_by_field(cell))
     tangent = {f: at.tangent(f, at.push) for f in cell.fields}
     try:
         covectors = [(f"ζ_{f}", _alone(cell, at, f)) for f in cell.fields]
-        return tuple(_pieces(cell, colouring, tangent, covectors, host))
+        return tuple(_summand_flows(cell, colouring, tangent, covectors, host))
     except SpecError:
         if cell.forces.damping is None:
             raise
@@ -71,13 +76,13 @@ def _tangent_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFl
     )
 
 
-def _pieces(
-    cell: Cell, colouring: Colouring, field: Rates, pieces: Sequence[tuple[str, Rates]], host: Host
+def _summand_flows(
+    cell: Cell, colouring: Colouring, field: Rates, summands: Sequence[tuple[str, Rates]], host: Host
 ) -> Iterator[CellFlow]:
-    """The flow of a field, or those of its pieces."""
-    together = _flow(cell, colouring, field)
-    for name, piece in [("", field)] if isinstance(together, CellFlow) else pieces:
-        flow = _flow(cell, colouring, piece)
+    """Yield the flow of a field or, where it is not elementary, the flows of its summands."""
+    whole = _flow(cell, colouring, field)
+    for name, summand in [("", field)] if isinstance(whole, CellFlow) else summands:
+        flow = _flow(cell, colouring, summand)
         if isinstance(flow, str):
             message = f"scheme splitting: the force {name} has no elementary flow on the lattice: {flow}"
             place = next((host.locations[(key,)] for key in ("damping", "forces") if (key,) in host.locations), None)
@@ -86,38 +91,44 @@ def _pieces(
 
 
 def _alone(cell: Cell, at: SiteFields, field: str) -> dict[str, Expression]:
-    """The field of one covector ζ_field."""
+    """Return π of the one covector ζ_field, by field."""
     return {f: at.tangent(f, lambda g, d: at.push(g, d) if g == field else ZERO) for f in cell.fields}
 
 
 def _flow(cell: Cell, colouring: Colouring, rates: Rates) -> CellFlow | str:
-    """The flow of a vector field that moves each site by itself, or why there is none."""
-    moved = {f: e for f, e in rates.items() if not e.is_zero}
-    names = symbols_of(*moved.values())
+    """Return the flow of a vector field in which sites move independently, or the reason why there is none."""
+    nonzero_rates = {f: e for f, e in rates.items() if not e.is_zero}
+    names = symbols_of(*nonzero_rates.values())
     if any(kind_of(n) == GATHERED for n in names):
         return "it depends on what bonds or pairs add up"
-    beside = {base for base, offset in cell.places(*moved.values()).values() if any(offset)}
-    if beside & set(moved):
-        return f"it depends on {min(beside & set(moved))} of neighbours, which moves"
-    ring = own_ring(cell.fields, moved.values())
-    found = solved(ring, ring.tower.convert_all([moved.get(f, ZERO) for f in cell.fields]))
-    if isinstance(found, str):
-        return found
-    increments = {f: e for f, e in zip(cell.fields, found.increments, strict=True) if not e.is_zero}
-    motions = [SiteMotion(c, increments, (), moved, increments, found.manner) for c in range(colouring.count) if moved]
-    settled = at_every_site(motions, colouring.count)
-    return CellFlow(ZERO, tuple(found.increments), found.manner, settled, force=tuple(moved.values()))
+    neighbour_fields = {base for base, offset in cell.places(*nonzero_rates.values()).values() if any(offset)}
+    if neighbour_fields & set(nonzero_rates):
+        return f"it depends on {min(neighbour_fields & set(nonzero_rates))} of neighbours, which moves"
+    ring = bracketless_ring(cell.fields, nonzero_rates.values())
+    solution = solved(ring, ring.tower.convert_all([nonzero_rates.get(f, ZERO) for f in cell.fields]))
+    if isinstance(solution, str):
+        return solution
+    increments = {f: e for f, e in zip(cell.fields, solution.increments, strict=True) if not e.is_zero}
+    motions = [
+        SiteMotion(c, increments, (), nonzero_rates, increments, solution.manner)
+        for c in range(colouring.count)
+        if nonzero_rates
+    ]
+    shared_motions = merged_colours(motions, colouring.count)
+    return CellFlow(
+        ZERO, tuple(solution.increments), solution.manner, shared_motions, force=tuple(nonzero_rates.values())
+    )
 
 
 def noise_flows(
     cell: Cell, colouring: Colouring, search: Callable[[Cell, Colouring], PartSearch], host: Host
 ) -> Iterator[CellFlow]:
-    """The flow of each source. `SpecError` for one whose flow is not elementary."""
+    """Yield the flow of each source of noise. Raises `SpecError` for a source whose flow is not elementary."""
     for dw, (name, source) in zip(cell.increments, cell.noise.items(), strict=True):
         energy = symbol(dw) * source.amplitude * source.hamiltonian
-        alone = replace(cell, hamiltonian=energy, bond_hamiltonian=ZERO, pair_hamiltonian=ZERO, forces=NO_FORCES)
+        noise_cell = replace(cell, hamiltonian=energy, bond_hamiltonian=ZERO, pair_hamiltonian=ZERO, forces=NO_FORCES)
         try:
-            flows = search(alone, colouring).splitting().flows
+            flows = search(noise_cell, colouring).splitting().flows
         except NoPartError:
             flows = ()
         if len(flows) != 1 or flows[0].by_colour:
@@ -127,45 +138,48 @@ def noise_flows(
 
 
 def _of_unit_time(flow: CellFlow) -> CellFlow:
-    def at_one(listed: Rates) -> dict[str, Expression]:
+    def at_unit_time(listed: Rates) -> dict[str, Expression]:
         return dict(zip(listed, substitute(list(listed.values()), {TIME: ONE}), strict=True))
 
-    motions = tuple(replace(m, increments=at_one(m.increments)) for m in flow.motions)
+    motions = tuple(replace(m, increments=at_unit_time(m.increments)) for m in flow.motions)
     return replace(flow, increment=tuple(substitute(flow.increment, {TIME: ONE})), motions=motions)
 
 
 def casimir_rate(cell: Cell, name: str) -> Expression:
-    """A density of what the vector force adds to the rate of a Casimir, which πζ does not change."""
+    """Return a density of dC/dt under the vector force f; πζ does not change a Casimir."""
     density, kind = cell.casimirs[name]
-    vector, found = cell.forces.vector, []
+    vector, terms = cell.forces.vector, []
     named = {n: p for n, p in cell.places(density).items() if p[0] in vector}
     for (base, offset), slope in zip(named.values(), gradient(density, list(named)), strict=True):
-        there = cell.shifted(vector[base], offset) if cell.axes else vector[base]
-        found.append(slope / density * there if kind == "product" else slope * there)
-    return total(found)
+        force = cell.shifted(vector[base], offset) if cell.axes else vector[base]
+        terms.append(slope / density * force if kind == "product" else slope * force)
+    return total(terms)
 
 
 def pushed_casimirs(cell: Cell) -> tuple[str, ...]:
-    """The names of the Casimirs that forces change."""
+    """Return the names of the Casimirs that forces change."""
     return tuple(name for name in cell.casimirs if not casimir_rate(cell, name).is_zero)
 
 
 def force_statements(cell: Cell) -> Iterator[Statement]:
-    """How forces change Casimirs, and that damping takes energy as it should; π is known to be skew."""
+    """Yield how forces change the Casimirs, and that damping dissipates energy; π is known to be skew."""
     if not cell.forces:
         return
     positive = tuple(p.name for p in cell.parameters if p.positive)
     for name in cell.casimirs:
         rate = casimir_rate(cell, name)
-        kept = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], positive, "for all sizes")
-        said = f"the vector force changes {name}, a site adds {shortened(rate)} to its rate"
-        yield kept if kept.holds else Statement(said, PROVED)
+        conserved = decide_zero(f"the forces keep {name}", [(f"d{name}/dt", rate)], positive, "for all sizes")
+        changed = f"the vector force changes {name}, a site adds {shortened(rate)} to its rate"
+        yield conserved if conserved.holds else Statement(changed, PROVED)
     if cell.forces.damping is not None:
         yield Statement("the damping changes H at the rate −Σ λ |π∇H|²", PROVED, "since π is skew, for all sizes")
 
 
 def noise_statements(cell: Cell) -> Iterator[Statement]:
-    """Whether the sources commute, and what density is stationary: at one site, with any slope of H there."""
+    """Yield whether the sources commute, and which density is stationary.
+
+    Local noise is examined at one site, with any slope of H there; else a small periodic box, or a small graph, is.
+    """
     if not cell.noise:
         return
     local = cell.is_local and not any(any(offset) for _, offset in cell.places(*_acting(cell)).values())
@@ -188,8 +202,8 @@ def noise_statements(cell: Cell) -> Iterator[Statement]:
     varying = [p.name for p in cell.parameters if p.at == "sites"]
     for statement in checks.noise_statements(system):
         theta = statement.name.partition("θ = ")[2]
-        alike = "where θ is the same at all sites" if any(n in names_in(theta) for n in varying) else ""
-        yield replace(statement, detail="; ".join(filter(None, [statement.detail, where, alike])))
+        condition = "where θ is the same at all sites" if any(n in names_in(theta) for n in varying) else ""
+        yield replace(statement, detail="; ".join(filter(None, [statement.detail, where, condition])))
 
 
 def _acting(cell: Cell) -> list[Expression]:

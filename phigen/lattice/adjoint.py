@@ -1,8 +1,11 @@
 """The transpose of a step of a lattice: kernels at a site that pull cotangents back.
 
-A sweep adds to some fields of a site what it reads around: from the cotangents of those a kernel finds, at each site,
-what they give to every value that was read, and targets hand that over to where the value came from. Of the series,
-x' = x + a(y) with y = r(x, y): μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ and x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the kernels of r and a.
+A sweep adds to some fields of a site increments, which read values around the site. The transposed kernel takes the
+cotangents of these fields and returns, for each value that was read, the contribution to the cotangent of that value;
+targets add the contribution at the site that the value came from.
+
+In the series a stage is y = r(x, y), x' = x + a(y). From the cotangent λ of x' follow μ = (∂r/∂y)ᵀμ + (∂a/∂y)ᵀλ and
+x̄ = λ + (∂a/∂x)ᵀλ + (∂r/∂x)ᵀμ, by the transposed kernels of r and a.
 """
 
 from __future__ import annotations
@@ -15,8 +18,8 @@ from phigen.scheme.kernel import Kernel
 from phigen.scheme.staging import TABLE, Coefficients
 from phigen.scheme.steps import BACK, Adjoint, Equation, Partners, Sweep
 
-#: What kernels at sites read, of which cotangents are found.
-_READ = ("site", "start", "gathered", "bonds", "params")
+#: Input arrays of the kernels at sites that have cotangents.
+_DIFFERENTIATED_INPUTS = ("site", "start", "gathered", "bonds", "params")
 
 
 def transposed(
@@ -27,23 +30,23 @@ def transposed(
     coefficients: Coefficients,
     partners: Partners | None,
 ) -> Adjoint:
-    """The transposes of all kernels of a step, each called as its kernel with `BACK`."""
+    """Return the transposes of all kernels of a step; the transpose of a kernel has its name followed by `BACK`."""
     kernels: list[Kernel] = []
     for sweep in (sweep for part in swept for sweep in part):
         kernels += [sweep.kernel, *(sweep.gather.kernels if sweep.gather else ())]
     kernels += [solved.relax, solved.advance] if solved else []
     kernels += partners.field.kernels if solved and partners else ()
-    return completed(coefficients, [_back(kernel, coefficients) for kernel in kernels], prepare, refresh)
+    return completed(coefficients, [_transposed_kernel(kernel, coefficients) for kernel in kernels], prepare, refresh)
 
 
-def _back(kernel: Kernel, coefficients: Coefficients) -> Kernel:
-    table = {} if "params" in kernel.inputs else {TABLE: coefficients.table}
+def _transposed_kernel(kernel: Kernel, coefficients: Coefficients) -> Kernel:
+    table_input = {} if "params" in kernel.inputs else {TABLE: coefficients.table}
     (output,) = kernel.outputs
-    along = {array: kernel.inputs[array] for array in _READ if kernel.inputs.get(array)}
+    variables = {array: kernel.inputs[array] for array in _DIFFERENTIATED_INPUTS if kernel.inputs.get(array)}
     return pulled_back(
-        replace(kernel, inputs={**kernel.inputs, **table}),
+        replace(kernel, inputs={**kernel.inputs, **table_input}),
         kernel.name + BACK,
         {f"{output.name}_bar": output.values},
-        along | table,
+        variables | table_input,
         "cotangents of all that is read, from those of what is found",
     )

@@ -1,8 +1,9 @@
-"""The balance of energy of a lattice that is driven: H − ∫ P dt is constant along the motion, H is not.
+"""The energy balance of a driven lattice: H − ∫ P dt is constant along the motion, whereas H is not.
 
-P = dH/dt is the sum over sites, bonds and pairs of the change of their densities as the state moves, and of their
-derivatives along the time: what the Hamiltonian field itself adds cancels. It is looked at after every step, and
-integrated by the polynomials through eight neighbouring values, so that frames may be any number of steps apart.
+P = dH/dt is a sum over sites, bonds and pairs: the change of each density along the motion, plus its derivative with
+respect to time. The Hamiltonian vector field itself contributes nothing to the sum. P is evaluated after every step,
+and integrated by interpolating polynomials through eight neighbouring values, so frames may be any number of steps
+apart.
 """
 
 from __future__ import annotations
@@ -19,15 +20,15 @@ from phigen.symbolic.expression import Expression, gradient, symbol, symbols_of,
 from phigen.symbolic.neighbours import ENDS, Offset
 from phigen.symbolic.symbols import VARIATION, Symbol, variation
 
-#: Values that a polynomial goes through, and those of a coarser one, which tells how good it is.
-FINE, COARSE = 8, 6
+#: Nodes of the interpolating polynomials, and of coarser ones; the difference of the two integrals estimates the error.
+FINE_NODES, COARSE_NODES = 8, 6
 
 
 class Power:
-    """P of the states of a lattice: ``power(x, rate, parameters)``.
+    """The power P of states of a lattice: ``power(x, rate, parameters)``.
 
-    ``x`` and its ``rate`` of change have the shape (fields, *sizes); ``parameters`` are those of a solver, with the
-    bonds of a graph, and the time by its name.
+    ``x`` and its time derivative ``rate`` have the shape (fields, *sizes). ``parameters`` are those of a solver, with
+    the bonds of a graph, and the time under its name.
     """
 
     def __init__(self, cell: Cell) -> None:
@@ -36,24 +37,24 @@ class Power:
         self._coupled = self._rate(cell.bond_hamiltonian + cell.pair_hamiltonian)
 
     def __call__(self, x: Floats, rate: Floats, parameters: Mapping[str, Any]) -> float:
-        cell, sizes, found = self.cell, x.shape[1:], 0.0
+        cell, sizes, power = self.cell, x.shape[1:], 0.0
         for term, extent in self._terms:
             values = self._values(term, x, rate, parameters, lambda array, offset: shifted(array, offset))
-            found += float(np.broadcast_to(evaluate([term], values)[0], sizes)[there(cell, extent, sizes)].sum())
+            power += float(np.broadcast_to(evaluate([term], values)[0], sizes)[inside_ends(cell, extent, sizes)].sum())
         if not self._coupled.is_zero:
             ends = np.transpose(np.triu_indices(sizes[0], 1)) if cell.relation == PAIRS else parameters["bonds"]
             values = self._values(
                 self._coupled, x, rate, parameters, lambda array, end: array[ends[:, ENDS.index(str(end[0]))]]
             )
-            found += float(np.broadcast_to(evaluate([self._coupled], values)[0], len(ends)).sum())
-        return found
+            power += float(np.broadcast_to(evaluate([self._coupled], values)[0], len(ends)).sum())
+        return power
 
     def _rate(self, density: Expression) -> Expression:
-        """How a density changes, with the rates of what it mentions."""
+        """Return the time derivative of a density, in the fields and their rates."""
         names = [n for n, (base, _) in self.cell.places(density).items() if base in self.cell.fields]
         slopes = gradient(density, [*names, *self.cell.times])
-        moved = total(s * symbol(variation(n)) for s, n in zip(slopes, names, strict=False) if not s.is_zero)
-        return moved + total(slopes[len(names) :])
+        along_motion = total(s * symbol(variation(n)) for s, n in zip(slopes, names, strict=False) if not s.is_zero)
+        return along_motion + total(slopes[len(names) :])
 
     def _values(
         self, term: Expression, x: Floats, rate: Floats, parameters: Mapping[str, Any], at: Any
@@ -75,41 +76,46 @@ def _variations(term: Expression) -> Iterator[Symbol]:
 
 
 def shifted(array: Floats, offset: Offset) -> Floats:
-    """The values of the sites that lie so far away on a grid, as if it were periodic."""
+    """Return for each site the value at the site ``offset`` away; the grid is taken to be periodic."""
     return np.roll(array, [-int(o) for o in offset], tuple(range(array.ndim))) if offset else array
 
 
-def there(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: Sequence[int]) -> NDArray[np.bool_]:
-    """Where a term of a grid that reaches so far is on the lattice (*sizes)."""
-    found = np.ones(tuple(sizes), dtype=bool)
+def inside_ends(cell: Cell, extent: tuple[Sequence[int], Sequence[int]], sizes: Sequence[int]) -> NDArray[np.bool_]:
+    """Return a mask (*sizes) of the sites at which a term with this ``extent`` reaches beyond no open end."""
+    mask = np.ones(tuple(sizes), dtype=bool)
     if cell.relation != GRID:
-        return found
+        return mask
     low, high = extent
     for axis, boundary in enumerate(cell.boundary):
         if boundary != PERIODIC:
             shape = [-1 if a == axis else 1 for a in range(len(sizes))]
             place = np.arange(sizes[axis]).reshape(shape)
-            found = found & (place + low[axis] >= 0) & (place + high[axis] < sizes[axis])
-    return found
+            mask = mask & (place + low[axis] >= 0) & (place + high[axis] < sizes[axis])
+    return mask
 
 
 def integral(values: Floats, h: float) -> tuple[Floats, float]:
-    """∫ from the first of ``values`` (steps + 1,), h apart, to each of them; and how far the last may be off."""
-    fine, coarse = (np.append(0.0, h * np.cumsum(_pieces(values, count))) for count in (FINE, COARSE))
+    """Return the integrals of P from the first time to each, and an estimate of their error.
+
+    ``values`` (steps + 1,) are taken at times ``h`` apart; so are the integrals.
+    """
+    fine, coarse = (
+        np.append(0.0, h * np.cumsum(_interval_integrals(values, count))) for count in (FINE_NODES, COARSE_NODES)
+    )
     return fine, float(np.abs(fine - coarse).max())
 
 
-def _pieces(values: Floats, count: int) -> Floats:
-    """The integrals between neighbours, by polynomials through so many values around each piece."""
+def _interval_integrals(values: Floats, count: int) -> Floats:
+    """Return the integral over each interval, by the polynomial through the ``count`` values around the interval."""
     count = min(count, len(values))
-    pieces = len(values) - 1
-    starts = np.clip(np.arange(pieces) - (count // 2 - 1), 0, len(values) - count)
+    intervals = len(values) - 1
+    starts = np.clip(np.arange(intervals) - (count // 2 - 1), 0, len(values) - count)
     powers = np.arange(count)
     vandermonde = np.arange(count)[None, :] ** powers[:, None]
-    found = np.zeros(pieces)
-    for place in np.unique(np.arange(pieces) - starts).tolist():
+    integrals = np.zeros(intervals)
+    for place in np.unique(np.arange(intervals) - starts).tolist():
         moments = ((place + 1.0) ** (powers + 1) - float(place) ** (powers + 1)) / (powers + 1)
         weights = np.linalg.solve(vandermonde.astype(np.float64), moments)
-        chosen = np.flatnonzero(np.arange(pieces) - starts == place)
-        found[chosen] = sum(w * values[starts[chosen] + k] for k, w in enumerate(weights))
-    return found
+        chosen = np.flatnonzero(np.arange(intervals) - starts == place)
+        integrals[chosen] = sum(w * values[starts[chosen] + k] for k, w in enumerate(weights))
+    return integrals

@@ -15,7 +15,7 @@ from phigen.symbolic.neighbours import Neighbours, minus
 
 @dataclass(frozen=True)
 class Misfit:
-    """A size of a run that is no multiple of the period of the colours along an axis; ``fitting`` is one near it."""
+    """A size of a run that is no multiple of the period of the colouring; ``fitting`` is a multiple near it."""
 
     run: str
     axis: str
@@ -28,15 +28,18 @@ class Misfit:
 
 
 class MisfitError(SpecError):
-    """Sizes of runs are no multiples of the periods of colours; ``since`` says it in one line, as `since_of` does."""
+    """Sizes of runs that are no multiples of the periods of the colouring; ``reason`` says so in one line."""
 
-    def __init__(self, diagnostics: list[Diagnostic], since: str = "") -> None:
+    def __init__(self, diagnostics: list[Diagnostic], reason: str = "") -> None:
         super().__init__(diagnostics)
-        self.since = since
+        self.reason = reason
 
 
 def cell_from_spec(spec: Spec) -> Cell:
-    """The cell of a spec. Raises `SpecError` where a form of π does not fit, or a run is too small for the stencil."""
+    """Return the cell of a spec.
+
+    Raises `SpecError` where a form of π does not fit, or a run is too small for the stencil.
+    """
     lattice = spec.lattice
     if lattice is None:
         raise ValueError(f"{spec.name} is no lattice")
@@ -61,33 +64,33 @@ def cell_from_spec(spec: Spec) -> Cell:
         spec.observables,
         lattice.reductions,
     )
-    problems = [
+    diagnostics = [
         *_not_along_bonds(spec, cell),
         *_noise_beyond(spec, cell),
         *(d for run in spec.runs.values() for d in _too_small(spec, cell, run)),
     ]
-    if problems:
-        raise SpecError(problems)
+    if diagnostics:
+        raise SpecError(diagnostics)
     return cell
 
 
 def least_sizes(cell: Cell) -> tuple[int, ...]:
-    """The sizes that a grid has at least: no site is its own neighbour, and an open one has room for all of H and π.
+    """Return the least size along each axis of a grid.
 
-    There is room for what is observed, too.
+    No site is then its own neighbour, and each term of H, π and the observables fits between open ends.
     """
     reaches = zip(cell.hamiltonian_reach, cell.poisson_reach, cell.observed_reach, strict=True)
     return tuple(1 + max(reach) for reach in reaches)
 
 
 def expect_coloured(spec: Spec, cell: Cell, periods: Sequence[int]) -> None:
-    """Raises `MisfitError` for runs whose sizes are no multiples of the periods of the colours of a splitting."""
-    if found := misfits(spec, cell, periods):
-        raise MisfitError(told_at(spec, found))
+    """Raise `MisfitError` for runs whose sizes are no multiples of the periods of the colouring of a splitting."""
+    if wrong_sizes := misfits(spec, cell, periods):
+        raise MisfitError(misfit_diagnostics(spec, wrong_sizes))
 
 
 def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
-    """The sizes of runs that are no multiples of the periods."""
+    """Return the sizes of runs that are no multiples of the periods."""
     return [
         Misfit(run.name, axis, size, period, max(size // period, -(-least // period)) * period)
         for run in spec.runs.values()
@@ -98,28 +101,28 @@ def misfits(spec: Spec, cell: Cell, periods: Sequence[int]) -> list[Misfit]:
     ]
 
 
-def told_at(spec: Spec, found: Sequence[Misfit]) -> list[Diagnostic]:
-    """What is said of each of them at its place."""
+def misfit_diagnostics(spec: Spec, wrong_sizes: Sequence[Misfit]) -> list[Diagnostic]:
+    """Return an error message for each size that does not fit, at its place in the spec."""
     return [
         spec.diagnostic(
             ("runs", m.run, "sizes"),
             f"sizes: {m}, as the colours of the splitting need",
             f"for example {m.fitting}; scheme: series takes every size",
         )
-        for m in found
+        for m in wrong_sizes
     ]
 
 
-def since_of(found: Sequence[Misfit], colours: int) -> str:
-    """All of them in one line, with sizes for a splitting with so many ``colours``; nothing if there are none."""
-    distinct = {str(m): str(m.fitting) for m in found}
+def misfit_reason(wrong_sizes: Sequence[Misfit], colours: int) -> str:
+    """Return one line on all sizes that do not fit, for a splitting with this number of ``colours``; else ""."""
+    distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     needed = f"as a splitting with {colours} colours needs; {' and '.join(distinct.values())} would do"
-    return f"{' and '.join(distinct)}, {needed}" if found else ""
+    return f"{' and '.join(distinct)}, {needed}" if wrong_sizes else ""
 
 
-def since_seam(found: Sequence[Misfit]) -> str:
-    """All of them in one line, where colours take them by a seam."""
-    distinct = {str(m): str(m.fitting) for m in found}
+def seam_reason(wrong_sizes: Sequence[Misfit]) -> str:
+    """Return one line on all sizes that do not fit, where a boundary seam makes the splitting possible."""
+    distinct = {str(m): str(m.fitting) for m in wrong_sizes}
     return f"{' and '.join(distinct)}; {' and '.join(distinct.values())} would do without"
 
 
@@ -130,7 +133,7 @@ def _local(spec: Spec) -> dict[tuple[str, str], Expression]:
 
 
 def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression]:
-    """The brackets of different sites in both orders."""
+    """Return the brackets between different sites in both orders."""
     at_sites = (p.name for p in spec.parameters if p.at == "sites")
     neighbours = Neighbours((*spec.coordinates, *at_sites), lattice.axes)
     both: dict[tuple[str, str], Expression] = {}
@@ -146,16 +149,19 @@ def _completed(spec: Spec, lattice: Lattice) -> dict[tuple[str, str], Expression
 
 
 def _not_along_bonds(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
-    """What would have to be gathered along the bonds that brackets run along."""
-    given = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
-    for path, there in {**given, ("noise",): bool(spec.noise)}.items():
-        if there and cell.bond_bracket:
+    """Yield an error for forces and noise that a spec with brackets along bonds cannot have.
+
+    π at a site would need sums over bonds of covectors at other sites.
+    """
+    declared = {("damping",): spec.forces.damping is not None, ("forces", "covector"): bool(spec.forces.covector)}
+    for path, is_declared in {**declared, ("noise",): bool(spec.noise)}.items():
+        if is_declared and cell.bond_bracket:
             message = f"{path[-1]}: not with brackets along bonds"
             yield spec.diagnostic(path, message, "forces: {vector: …} moves sites by themselves")
 
 
 def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
-    """Sources of noise that are not those of one site."""
+    """Yield an error for each source of noise whose Hamiltonian names neighbours."""
     for name, source in spec.noise.items():
         if any(offset != cell.origin for _, offset in cell.places(source.hamiltonian).values()):
             message = f"noise: {name} is that of a site, so its Hamiltonian names no neighbours"
@@ -164,7 +170,7 @@ def _noise_beyond(spec: Spec, cell: Cell) -> Iterator[Diagnostic]:
 
 
 def _too_small(spec: Spec, cell: Cell, run: Run) -> Iterator[Diagnostic]:
-    """The sizes of a run that the stencil does not fit in."""
+    """Yield an error for each size of a run that the stencil does not fit in."""
     sizes = run.lattice.sizes if run.lattice else ()
     for axis, size, least in zip(cell.axes, sizes, least_sizes(cell), strict=False):
         if size < least:

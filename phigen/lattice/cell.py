@@ -1,7 +1,7 @@
 """One cell of a lattice: the fields of a site, their brackets with neighbours, and the density of H.
 
-Neighbours are ordinary symbols of the expression engine. On a grid ``x[i+1]`` and ``x[i-1,j+2]`` are x at the site
-that is so far away along the axes i and j; axes come in their order, those of offset 0 are left out, and ``x`` alone is
+Neighbours are ordinary symbols of the expression engine. On a grid ``x[i+1]`` and ``x[i-1,j+2]`` are x at the site with
+these offsets along the axes i and j; axes come in their order, those of offset 0 are left out, and ``x`` alone is
 x at the site itself. On graphs, and for all pairs, ``x[a]`` and ``x[b]`` are x at the two ends. Parameters that have a
 value at every site are written in the same way.
 """
@@ -23,17 +23,17 @@ PERIODIC, OPEN = "periodic", "open"
 
 @dataclass(frozen=True)
 class Cell:
-    """A lattice by its cell.
+    """A lattice, defined by one cell.
 
     ``axes`` name the directions of a grid, the slowest first; ``boundary`` is `PERIODIC` or `OPEN` along each. Graphs
-    and pairs have neither. ``bracket`` maps (f, g at some offset), as symbols, to {f, g}: all that are not 0, in
-    both orders. ``hamiltonian`` is the density of a site, ``bond_hamiltonian`` and ``pair_hamiltonian`` those of a
-    bond from a to b and of a pair; ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their bracket along
-    a bond. H is the sum of the densities; at open ends without those of their `terms` that reach beyond.
-    ``casimirs`` maps names to a density and ``sites`` (one for each site), ``sum`` or ``product``; ``invariants`` are
-    sums over sites. ``time`` is the symbol of t, which H and the invariants may contain; empty if there is none.
-    ``forces`` and the sources of ``noise`` are those at a site; each site has noise of its own. ``observables`` are
-    densities, of which ``reductions`` make numbers, and fields.
+    and pairs have neither. ``bracket`` maps (f, g at some offset), as symbols, to {f, g}: all brackets that are not 0,
+    in both orders. ``hamiltonian`` is the density of a site, ``bond_hamiltonian`` that of a bond from a to b, and
+    ``pair_hamiltonian`` that of a pair; ``bond_bracket`` maps ("f[a]", "g[b]") and ("g[b]", "f[a]") to their bracket
+    along a bond. H is the sum of the densities, without the `terms` that reach beyond an open end.
+    ``casimirs`` maps names to a density and ``sites`` (one Casimir for each site), ``sum`` or ``product``;
+    ``invariants`` are sums over sites. ``time`` is the symbol of t, which H and the invariants may contain, or "".
+    ``forces`` and the sources of ``noise`` act at a site, with independent noise at each site. ``observables`` are
+    fields, or densities that ``reductions`` turn into numbers.
     """
 
     name: str
@@ -57,24 +57,24 @@ class Cell:
 
     @property
     def driven(self) -> bool:
-        """Whether H is no invariant: it depends on the time, or forces or noise do work."""
+        """Whether H is no invariant: H depends on the time, or forces or noise do work."""
         return bool(self.time or self.forces or self.noise)
 
     @property
     def increments(self) -> tuple[str, ...]:
-        """The symbols of the increments that the noise of a site has in a step, one for each source."""
+        """The symbols of the noise increments of a site in a step, one for each source."""
         return tuple(increment(k) for k in range(len(self.noise)))
 
     # --- symbols
 
     @property
     def times(self) -> tuple[str, ...]:
-        """The symbol of the time, if there is one."""
+        """The symbol of the time, or nothing."""
         return (self.time,) if self.time else ()
 
     @cached_property
     def neighbours(self) -> Neighbours:
-        """The symbols of what has a value at every site: of fields, then of parameters at sites, then of noise."""
+        """The symbols of all quantities with a value at every site: fields, then parameters at sites, then noise."""
         at_sites = (p.name for p in self.parameters if p.at == "sites")
         return Neighbours((*self.fields, *at_sites, *self.increments), self.axes)
 
@@ -84,34 +84,34 @@ class Cell:
         return self.neighbours.origin
 
     def at(self, name: str, offset: Offset) -> str:
-        """The symbol of a field, or of a parameter at sites, at an offset."""
+        """Return the symbol of a field, or of a parameter at sites, at an offset."""
         return self.neighbours.at(name, offset)
 
     def place(self, name: str) -> Place:
-        """The field, or parameter at sites, of a symbol, and its offset. `KeyError` for any other symbol."""
+        """Return the field, or parameter at sites, of a symbol, and its offset. `KeyError` for any other symbol."""
         return self.neighbours.place(name)
 
     def places(self, *expressions: Expression) -> dict[str, Place]:
-        """All symbols of expressions that have a value at sites, with their places."""
+        """Return all symbols of the expressions that have a value at every site, with their places."""
         return self.neighbours.places(*expressions)
 
     def shifted(self, expression: Expression, offset: Offset) -> Expression:
-        """The expression as it is at the site that lies so far away on the grid."""
+        """Return the expression translated by an offset of the grid."""
         return self.neighbours.shifted([expression], offset)[0]
 
     def on(self, expression: Expression, end: str) -> Expression:
-        """A density of a site as it is at one end of a bond or a pair."""
+        """Return the density of a site at one end of a bond or a pair."""
         return self.neighbours.on(expression, end)
 
     # --- the density of H
 
     @cached_property
     def terms(self) -> tuple[Expression, ...]:
-        """The additive terms of the density of a site, as they are written; open ends leave out single ones."""
+        """The additive terms of the density of a site, as they are written; an open end leaves out single terms."""
         return tuple(self.additive_terms(self.hamiltonian))
 
     def additive_terms(self, density: Expression) -> Iterator[Expression]:
-        """The terms of a sum; a factor that is the same at all sites is multiplied into a sum."""
+        """Yield the terms of a sum; a factor that is the same at all sites is multiplied into each of them."""
         yield from self._terms(density, ())
 
     def _terms(self, density: Expression, factors: tuple[Expression, ...]) -> Iterator[Expression]:
@@ -131,30 +131,30 @@ class Cell:
             yield density
 
     def extent(self, expression: Expression) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """The least and the largest offsets along each axis of what a term of a grid mentions, and of its own site."""
+        """Return the least and the largest offset along each axis among the symbols of a term, and 0."""
         offsets = [steps(self.origin), *(steps(o) for _, o in self.places(expression).values())]
         return tuple(map(min, zip(*offsets, strict=True))), tuple(map(max, zip(*offsets, strict=True)))
 
     @cached_property
     def poisson_reach(self) -> tuple[int, ...]:
-        """How far the brackets reach along each axis: to the other field, and by what they depend on."""
+        """Largest offset along each axis in the brackets: of their second field, and of the symbols of their values."""
         others = [symbol(other) for _, other in self.bracket]
         return self._reach([*others, *self.bracket.values()])
 
     @cached_property
     def hamiltonian_reach(self) -> tuple[int, ...]:
-        """How far apart two sites of one term of H are at most, along each axis."""
+        """Largest distance along each axis between two sites of one term of H."""
         return self._widest(self.terms)
 
     @cached_property
     def observed_reach(self) -> tuple[int, ...]:
-        """How far apart two sites of one observable are at most, along each axis."""
+        """Largest distance along each axis between two sites of one observable."""
         return self._widest(self.observables.values())
 
     def _widest(self, expressions: Iterable[Expression]) -> tuple[int, ...]:
-        """Return how far apart two sites of one of the expressions are at most, along each axis."""
+        """Return the largest distance along each axis between two sites of one of the expressions."""
         grid = expressions if self.axes else ()
-        widths = [[h - low for low, h in zip(*self.extent(e), strict=True)] for e in grid]
+        widths = [[high - low for low, high in zip(*self.extent(e), strict=True)] for e in grid]
         return tuple(max((w[k] for w in widths), default=0) for k in range(len(self.axes)))
 
     def _reach(self, expressions: Iterable[Expression]) -> tuple[int, ...]:
@@ -169,9 +169,10 @@ class Cell:
 
 @dataclass(frozen=True)
 class Contribution:
-    """A term of ∂H/∂f at a site: ``low`` and ``high`` are the offsets that the term of H it comes from reaches.
+    """A term of ∂H/∂f at a site.
 
-    Beside an open end it is there only if all offsets from ``low`` to ``high`` are on the lattice.
+    ``low`` and ``high`` are the extreme offsets of the term of H that it derives from. Beside an open end the
+    contribution exists only if all offsets from ``low`` to ``high`` are on the lattice.
     """
 
     expression: Expression
@@ -180,23 +181,23 @@ class Contribution:
 
 
 def contributions(cell: Cell) -> dict[str, tuple[Contribution, ...]]:
-    """∂H/∂f at a site of a grid, for each field f, term by term of H: of all densities that mention this site."""
-    found: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
+    """Return, for each field f, the terms of ∂H/∂f at a site of a grid, from all densities that mention the site."""
+    terms_by_field: dict[str, list[Contribution]] = {f: [] for f in cell.fields}
     for term in cell.terms:
         named = {name: p for name, p in cell.places(term).items() if p[0] in cell.fields}
         low, high = cell.extent(term)
         slopes = gradient(term, list(named))
         for (base, offset), slope in zip(named.values(), slopes, strict=True):
             if not slope.is_zero:
-                moved, back = cell.shifted(slope, minus(offset)), steps(minus(offset))
-                found[base].append(Contribution(moved, plus(low, back), plus(high, back)))
-    return {f: tuple(listed) for f, listed in found.items()}
+                slope_here, origin = cell.shifted(slope, minus(offset)), steps(minus(offset))
+                terms_by_field[base].append(Contribution(slope_here, plus(low, origin), plus(high, origin)))
+    return {f: tuple(listed) for f, listed in terms_by_field.items()}
 
 
 def forces(cell: Cell) -> dict[str, Expression]:
-    """∂H/∂f at a site, for each field f, from the densities of sites; away from open ends.
+    """Return ∂H/∂f at a site, for each field f, from the densities of sites; away from open ends.
 
-    On graphs and for pairs what bonds and pairs add is in `bond_forces`.
+    On graphs and for pairs, `bond_forces` has the contributions of bonds and pairs.
     """
     if cell.relation != GRID:
         return dict(zip(cell.fields, gradient(cell.hamiltonian, cell.fields), strict=True))
@@ -204,25 +205,27 @@ def forces(cell: Cell) -> dict[str, Expression]:
 
 
 def bond_forces(cell: Cell) -> dict[str, Expression]:
-    """The derivatives of the density of a bond, or a pair, by ``f[a]`` and ``f[b]`` for all fields f, without zeros."""
+    """Return the nonzero derivatives of the density of a bond, or a pair, by ``f[a]`` and ``f[b]`` for all f."""
     density = cell.bond_hamiltonian + cell.pair_hamiltonian
     names = [cell.at(f, (end,)) for end in ENDS for f in cell.fields]
     return {n: slope for n, slope in zip(names, gradient(density, names), strict=True) if not slope.is_zero}
 
 
 def vector_field(cell: Cell) -> dict[str, Expression]:
-    """ḟ at a site of a grid, for each field f, away from open ends, but for noise."""
+    """Return ḟ at a site of a grid, for each field f, without noise and away from open ends."""
     slopes, acting = forces(cell), cell.forces
-    moved = _tangent(cell, slopes)
+    hamiltonian_field = _tangent(cell, slopes)
     if not acting:
-        return moved
+        return hamiltonian_field
     damping = acting.damping or ZERO
-    pushed = {f: slopes[f] + acting.covector.get(f, ZERO) + damping * moved[f] for f in cell.fields}
-    return {f: e + acting.vector.get(f, ZERO) for f, e in _tangent(cell, pushed).items()}
+    slopes_with_forces = {
+        f: slopes[f] + acting.covector.get(f, ZERO) + damping * hamiltonian_field[f] for f in cell.fields
+    }
+    return {f: e + acting.vector.get(f, ZERO) for f, e in _tangent(cell, slopes_with_forces).items()}
 
 
 def _tangent(cell: Cell, covector: Mapping[str, Expression]) -> dict[str, Expression]:
-    """π of a covector field that is given at a site."""
+    """Return π of a covector field, at a site, from the covector at the same site."""
     rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         base, offset = cell.place(other)

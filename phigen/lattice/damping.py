@@ -1,7 +1,8 @@
-"""Damping at sites as parts of a splitting: λππb with b = ∇H, which depends on neighbours that are damped too.
+"""Flows of damping at sites, as parts of the splitting of a lattice: λππb with b = ∇H.
 
-What of b at a site does not depend on the site has a flow while the neighbours stand still: sites of one colour are
-damped at a time, so that no two neighbours are. The rest of b is that of the site alone, and has flows at all sites.
+b depends on neighbours, which are damped too. The terms of b that do not depend on the site itself have a flow while
+the neighbours stand still, so they are applied colour by colour: no two sites of one colour are neighbours. The
+other terms of b depend on the site alone, and have flows at all sites.
 """
 
 from __future__ import annotations
@@ -12,7 +13,16 @@ from dataclasses import replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.cell import GRAPH, PAIRS, Cell
 from phigen.lattice.graphs import site_sums, sums_by_field
-from phigen.lattice.parts import FORCE, BondSum, CellFlow, Colouring, SiteFields, SiteMotion, at_every_site, own_ring
+from phigen.lattice.parts import (
+    FORCE,
+    BondSum,
+    CellFlow,
+    Colouring,
+    SiteFields,
+    SiteMotion,
+    bracketless_ring,
+    merged_colours,
+)
 from phigen.scheme.choosing import Host
 from phigen.splitting.flow import solved
 from phigen.symbolic.expression import ONE, ZERO, Expression, substitute, symbol, symbols_of, total
@@ -24,7 +34,11 @@ _HINT = "that of a spin has one where H is linear or quadratic along an axis in 
 
 
 def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlow, ...]:
-    """The flows of damping. `SpecError` that says why there are none in closed form; `TogetherError` by the colours."""
+    """Return the flows of damping.
+
+    Raises `SpecError` with the reason where there is none in closed form, `TogetherError` if the colouring is the
+    reason.
+    """
     try:
         return tuple(_flows(cell, colouring))
     except _NoFlowError as error:
@@ -34,15 +48,15 @@ def damping_flows(cell: Cell, colouring: Colouring, host: Host) -> tuple[CellFlo
 
 
 class TogetherError(SpecError):
-    """With these colours neighbours are damped together; with others they may not be."""
+    """The colouring damps neighbours at the same time; another colouring may not."""
 
 
 class _NoFlowError(Exception):
-    """The text says what is in the way."""
+    """There is no elementary flow; the text is the reason."""
 
 
 class _TogetherError(_NoFlowError):
-    """Colours are in the way."""
+    """There is none because of the colouring."""
 
 
 def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
@@ -50,7 +64,7 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
         raise _NoFlowError("brackets couple sites" if not cell.is_local else "every site is a neighbour of all others")
     still, rest = _slopes(cell)
     sums = _sums(cell)
-    _flow(cell, still, [0], sums)  # what has no flow has none by any colours
+    _flow(cell, still, [0], sums)  # raises: without a flow here, no colouring has one
     for colour in _colours(cell, colouring, still):
         flow = _flow(cell, still, [colour], sums)
         if colouring.seams and colour is not None:
@@ -68,10 +82,10 @@ def _flows(cell: Cell, colouring: Colouring) -> Iterator[CellFlow]:
 
 
 def _slopes(cell: Cell) -> tuple[Covector, Covector]:
-    """∂H/∂f at a site: what does not depend on the site, and the rest."""
+    """Return ∂H/∂f at a site, by field: the terms that do not depend on the site itself, and the rest."""
     at = SiteFields(cell, sums_by_field(cell))
     slopes = [at.slope(f) for f in cell.fields]
-    ring = own_ring(cell.fields, slopes)
+    ring = bracketless_ring(cell.fields, slopes)
     still, rest = {}, {}
     for f, element in zip(cell.fields, ring.tower.convert_all(slopes), strict=True):
         parts = ring.terms(element, ring.state)
@@ -81,7 +95,7 @@ def _slopes(cell: Cell) -> tuple[Covector, Covector]:
 
 
 def _sums(cell: Cell) -> tuple[BondSum, ...]:
-    """What bonds add to the slopes at sites of the colour, which does not depend on them."""
+    """Return the sums over bonds in the slopes at sites of the colour; they must not depend on the site itself."""
     sums = site_sums(cell) if cell.relation == GRAPH else ()
     for base, offset in cell.places(*(e for s in sums for e in s.values.values())).values():
         if base in cell.fields and offset == ("a",):
@@ -90,14 +104,14 @@ def _sums(cell: Cell) -> tuple[BondSum, ...]:
 
 
 def _colours(cell: Cell, colouring: Colouring, still: Covector) -> list[int | None]:
-    """The colours that are damped one after the other: one for all sites where these are independent."""
+    """Return the colours that are damped one after the other; a single one where sites are independent."""
     if cell.relation == GRAPH:
         return [0]
     places = cell.places(*still.values(), *([cell.forces.damping] if cell.forces.damping is not None else []))
-    reached = {offset for base, offset in places.values() if base in cell.fields and any(offset)}
-    if not reached:
+    neighbours = {offset for base, offset in places.values() if base in cell.fields and any(offset)}
+    if not neighbours:
         return [None] if colouring.count > 1 else [0]
-    if any(colouring.at(0, offset) == 0 for offset in reached):
+    if any(colouring.at(0, offset) == 0 for offset in neighbours):
         raise _TogetherError("neighbours are damped together, whatever the colours of sites")
     return [*range(colouring.count)]
 
@@ -107,25 +121,29 @@ def _flow(
     covector: Covector,
     colours: list[int | None],
     sums: tuple[BondSum, ...] = (),
-    there: Expression = ONE,
+    weight: Expression = ONE,
 ) -> CellFlow:
-    """The flow of λππb for a covector b at sites of these colours, or where ``there`` is 1."""
+    """Return the flow of λππb for a covector b at sites of these colours, or where ``weight`` is 1."""
     at, n = SiteFields(cell), cell.fields
-    own = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
-    b = {f: e if own or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}
-    factor = at.damping() * (symbol(Symbol(CHOSEN)) if cell.relation == GRAPH and not own else there)
+    fields_in_covector = {f for f, e in covector.items() if set(symbols_of(e)) & set(n)}
+    b = {f: e if fields_in_covector or e.is_zero else symbol(Symbol(FORCE, f)) for f, e in covector.items()}
+    factor = at.damping() * (symbol(Symbol(CHOSEN)) if cell.relation == GRAPH and not fields_in_covector else weight)
     rates = {f: factor * at.tangent(f, lambda g, _: at.tangent(g, lambda h, _: b[h])) for f in n}
-    ring = own_ring(n, rates.values())
-    found = solved(ring, ring.tower.convert_all([rates[f] for f in n]))
-    if isinstance(found, str):
-        raise _NoFlowError(found)
-    components: dict[str, Expression] = {} if own else {Symbol(FORCE, f): e for f, e in covector.items()}
-    moved = {f: e for f, e in zip(n, found.increments, strict=True) if not e.is_zero}
-    increments = dict(zip(moved, substitute(list(moved.values()), components), strict=True))
-    gathered = () if own else sums
+    ring = bracketless_ring(n, rates.values())
+    solution = solved(ring, ring.tower.convert_all([rates[f] for f in n]))
+    if isinstance(solution, str):
+        raise _NoFlowError(solution)
+    components: dict[str, Expression] = {} if fields_in_covector else {Symbol(FORCE, f): e for f, e in covector.items()}
+    solution_increments = {f: e for f, e in zip(n, solution.increments, strict=True) if not e.is_zero}
+    increments = dict(zip(solution_increments, substitute(list(solution_increments.values()), components), strict=True))
+    bond_sums = () if fields_in_covector else sums
     motions = [
-        SiteMotion(c, increments, gathered, rates, moved, found.manner, components) for c in colours if increments
+        SiteMotion(c, increments, bond_sums, rates, solution_increments, solution.manner, components)
+        for c in colours
+        if increments
     ]
     force = tuple(substitute(list(rates.values()), components))
-    flow = CellFlow(ZERO, tuple(increments.values()), found.manner, at_every_site(motions, len(colours)), force=force)
-    return replace(flow, by_colour=cell.relation == GRAPH and not own and bool(gathered))
+    flow = CellFlow(
+        ZERO, tuple(increments.values()), solution.manner, merged_colours(motions, len(colours)), force=force
+    )
+    return replace(flow, by_colour=cell.relation == GRAPH and not fields_in_covector and bool(bond_sums))

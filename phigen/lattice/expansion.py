@@ -1,4 +1,7 @@
-"""A small lattice as an ordinary spec, with a coordinate for each field of each site: the meaning of a cell."""
+"""The expansion of a small lattice as an ordinary spec, with a coordinate for each field of each site.
+
+The expansion defines the meaning of a cell.
+"""
 
 from __future__ import annotations
 
@@ -19,11 +22,12 @@ Site = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Expansion:
-    """A cell at given sizes; graphs with their bonds, pairs and graphs with their number of sites as the one size.
+    """A cell at given sizes.
 
-    ``names`` maps (field or parameter, site) to the coordinate or parameter of the ordinary spec; ``bond_names``
-    (parameter, number of the bond). Coordinates go field by field, the sites of each in order, the last axis fastest: a
-    state of shape (fields, *sizes), flattened, is one of the expansion.
+    Graphs have their bonds; pairs and graphs have the number of sites as the one size. ``names`` maps (field or
+    parameter, site) to the coordinate or parameter of the ordinary spec, ``bond_names`` maps (parameter, number of
+    the bond). Coordinates go field by field, and within a field site by site with the last axis fastest: a state of
+    shape (fields, *sizes), flattened, is a state of the expansion.
     """
 
     cell: Cell
@@ -45,60 +49,60 @@ class Expansion:
     # --- expressions at sites
 
     def neighbour(self, site: Site, offset: Offset) -> Site | None:
-        """The site at an offset; None beyond an open end."""
-        found = plus(site, offset)
-        inside = [0 <= n < size for n, size in zip(found, self.sizes, strict=True)]
+        """Return the site at an offset, or None beyond an open end."""
+        position = plus(site, offset)
+        inside = [0 <= n < size for n, size in zip(position, self.sizes, strict=True)]
         if any(b == OPEN and not i for b, i in zip(self.cell.boundary, inside, strict=True)):
             return None
-        return tuple(n % size for n, size in zip(found, self.sizes, strict=True))
+        return tuple(n % size for n, size in zip(position, self.sizes, strict=True))
 
     def at(self, expression: Expression, site: Site) -> Expression | None:
-        """What a term without ends is at a site; None if it reaches beyond an open end."""
+        """Return an expression of a grid, or of one site, at that site, or None if it reaches beyond an open end."""
         values = {}
         for name, (base, offset) in self.cell.places(expression).items():
-            there = self.neighbour(site, offset) if self.cell.axes else site
-            if there is None:
+            source = self.neighbour(site, offset) if self.cell.axes else site
+            if source is None:
                 return None
-            values[name] = symbol(self.names[base, there])
+            values[name] = symbol(self.names[base, source])
         return substitute([expression], values)[0]
 
     def between(self, expression: Expression, a: Site, b: Site, bond: int | None = None) -> Expression:
-        """What a density of a bond, or of a pair, is between two sites."""
+        """Return a density of a bond, or of a pair, between two sites."""
         where = dict(zip(ENDS, (a, b), strict=True))
         places = self.cell.places(expression)
         values = {n: symbol(self.names[base, where[str(end[0])]]) for n, (base, end) in places.items()}
         if bond is not None:
-            own = (p.name for p in self.cell.parameters if p.at == "bonds")
-            values |= {n: symbol(self.bond_names[n, bond]) for n in own}
+            bond_parameters = (p.name for p in self.cell.parameters if p.at == "bonds")
+            values |= {n: symbol(self.bond_names[n, bond]) for n in bond_parameters}
         return substitute([expression], values)[0]
 
     def summed(self, density: Expression) -> list[Expression]:
-        """The terms of the sum of a density over the sites, without those that reach beyond open ends."""
+        """Return the terms of the sum of a density over the sites, without those that reach beyond open ends."""
         terms = [term for site in self.sites for t in self.cell.additive_terms(density) for term in [self.at(t, site)]]
         return [t for t in terms if t is not None]
 
     # --- the system
 
     def hamiltonian_terms(self) -> list[Expression]:
-        """The terms whose sum is H."""
+        """Return the terms whose sum is H."""
         cell = self.cell
-        found = self.summed(cell.hamiltonian)
+        terms = self.summed(cell.hamiltonian)
         if not cell.bond_hamiltonian.is_zero:
-            found += [self.between(cell.bond_hamiltonian, (a,), (b,), k) for k, (a, b) in enumerate(self.bonds)]
+            terms += [self.between(cell.bond_hamiltonian, (a,), (b,), k) for k, (a, b) in enumerate(self.bonds)]
         if not cell.pair_hamiltonian.is_zero:
-            found += [self.between(cell.pair_hamiltonian, a, b) for a, b in combinations(self.sites, 2)]
-        return found
+            terms += [self.between(cell.pair_hamiltonian, a, b) for a, b in combinations(self.sites, 2)]
+        return terms
 
     def poisson(self) -> dict[tuple[str, str], Expression]:
-        """The brackets of coordinates that are not 0, in both orders."""
+        """Return the brackets of coordinates that are not 0, in both orders."""
         entries: dict[tuple[str, str], list[Expression]] = {}
         for (f, other), value in self.cell.bracket.items():
             g, offset = self.cell.place(other)
             for site in self.sites:
-                there = self.neighbour(site, offset) if self.cell.axes else site
-                if there is not None:
+                partner_site = self.neighbour(site, offset) if self.cell.axes else site
+                if partner_site is not None:
                     terms = [self.at(t, site) for t in self.cell.additive_terms(value)]
-                    entries.setdefault((self.names[f, site], self.names[g, there]), []).extend(
+                    entries.setdefault((self.names[f, site], self.names[g, partner_site]), []).extend(
                         t for t in terms if t is not None
                     )
         for (f_end, g_end), value in self.cell.bond_bracket.items():
@@ -111,31 +115,31 @@ class Expansion:
         return {pair: e for pair, e in sums.items() if not e.is_zero}
 
     def casimirs(self) -> dict[str, Expression]:
-        """Casimirs by name: one for each site, a sum or a product."""
-        found: dict[str, Expression] = {}
-        own = (*(p.name for p in self.cell.parameters), *self.cell.times)
-        taken = {*self.names.values(), *self.bond_names.values(), *own}
+        """Return the Casimirs by name: one for each site, a sum or a product."""
+        casimirs: dict[str, Expression] = {}
+        plain_names = (*(p.name for p in self.cell.parameters), *self.cell.times)
+        used_names = {*self.names.values(), *self.bond_names.values(), *plain_names}
         for name, (density, kind) in self.cell.casimirs.items():
             if kind == "sum":
-                found[name] = total(self.summed(density))
+                casimirs[name] = total(self.summed(density))
             else:
-                each = {site: e for site in self.sites for e in [self.at(density, site)] if e is not None}
+                values = {site: e for site in self.sites for e in [self.at(density, site)] if e is not None}
                 if kind == "product":
-                    found[name] = product_of(each.values())
+                    casimirs[name] = product_of(values.values())
                 else:
-                    found |= {_free(name, site, taken): e for site, e in each.items()}
-        return found
+                    casimirs |= {_free(name, site, used_names): e for site, e in values.items()}
+        return casimirs
 
     def forces(self) -> SpecForces:
-        """The forces. Damping that differs from site to site is a covector there."""
-        given = self.cell.forces
-        if not given:
-            return given
+        """Return the forces. Damping that differs from site to site becomes a covector."""
+        cell_forces = self.cell.forces
+        if not cell_forces:
+            return cell_forces
         covector, vector = (
             {self.names[f, site]: total(self._terms(e, site)) for f, e in listed.items() for site in self.sites}
-            for listed in (given.covector, given.vector)
+            for listed in (cell_forces.covector, cell_forces.vector)
         )
-        damping = given.damping
+        damping = cell_forces.damping
         if damping is not None and self.cell.places(damping):
             field = self._field()
             for (f, site), rate in field.items():
@@ -145,7 +149,7 @@ class Expansion:
         return SpecForces(covector, vector, damping)
 
     def _field(self) -> dict[tuple[str, Site], Expression]:
-        """π∇H, by field and site."""
+        """Return π∇H, by field and site."""
         slopes = dict(zip(self.coordinates, gradient(total(self.hamiltonian_terms()), self.coordinates), strict=True))
         rates: dict[str, list[Expression]] = {c: [] for c in self.coordinates}
         for (a, b), entry in self.poisson().items():
@@ -153,41 +157,42 @@ class Expansion:
         return {(f, site): total(rates[self.names[f, site]]) for f in self.cell.fields for site in self.sites}
 
     def _terms(self, e: Expression, site: Site) -> list[Expression]:
-        """What the terms of an expression are at a site, without those that reach beyond open ends."""
-        return [found for term in self.cell.additive_terms(e) for found in [self.at(term, site)] if found is not None]
+        """Return the terms of an expression at a site, without those that reach beyond open ends."""
+        values = (self.at(term, site) for term in self.cell.additive_terms(e))
+        return [value for value in values if value is not None]
 
     def noise(self) -> dict[str, SpecNoise]:
-        """The sources of noise of all sites, those of a site one after the other."""
-        found: dict[str, SpecNoise] = {}
-        taken = {*self.names.values(), *self.bond_names.values(), *(p.name for p in self.cell.parameters)}
+        """Return the sources of noise of all sites, site by site."""
+        sources: dict[str, SpecNoise] = {}
+        used_names = {*self.names.values(), *self.bond_names.values(), *(p.name for p in self.cell.parameters)}
         for site in self.sites:
             for name, source in self.cell.noise.items():
                 parts = [self.at(e, site) or ZERO for e in (source.hamiltonian, source.amplitude)]
-                found[_free(name, site, taken)] = SpecNoise(*parts)
-        return found
+                sources[_free(name, site, used_names)] = SpecNoise(*parts)
+        return sources
 
     def matrix(self) -> MatrixForm:
-        """π as a matrix."""
+        """Return π as a matrix."""
         entries = self.poisson()
         return MatrixForm(tuple(tuple(entries.get((a, b), ZERO) for b in self.coordinates) for a in self.coordinates))
 
     def spec(self) -> Spec:
-        """The ordinary spec. Parameters at sites and bonds are parameters of it, all of the default of the cell."""
+        """Return the ordinary spec. Parameters at sites and bonds become scalars with the default of the cell."""
         cell = self.cell
-        many: list[Parameter] = []
+        parameters: list[Parameter] = []
         for p in cell.parameters:
             names = {
                 "all": [p.name],
                 "sites": [self.names[p.name, s] for s in self.sites if p.at == "sites"],
                 "bonds": [self.bond_names[p.name, k] for k in range(len(self.bonds)) if p.at == "bonds"],
             }[p.at]
-            many += [replace(p, name=n, at="all", values=None) for n in names]
+            parameters += [replace(p, name=n, at="all", values=None) for n in names]
         return Spec(
             name=_name(cell.name, self.sizes),
             coordinates=self.coordinates,
             poisson=self.matrix(),
             hamiltonian=total(self.hamiltonian_terms()),
-            parameters=tuple(many),
+            parameters=tuple(parameters),
             casimirs=self.casimirs(),
             invariants={name: total(self.summed(d)) for name, d in cell.invariants.items()},
             time=cell.time,
@@ -196,47 +201,48 @@ class Expansion:
         )
 
     def numbers(self, parameters: Mapping[str, Any]) -> dict[str, float]:
-        """The parameters of the ordinary spec, from numbers and arrays of the lattice."""
-        found = {}
+        """Return the parameters of the ordinary spec, from numbers and arrays of the lattice."""
+        numbers = {}
         for p in self.cell.parameters:
             value = parameters[p.name]
             if p.at == "all":
-                found[p.name] = float(value)
+                numbers[p.name] = float(value)
             elif p.at == "sites":
-                found |= {self.names[p.name, s]: float(value[s]) for s in self.sites}
+                numbers |= {self.names[p.name, s]: float(value[s]) for s in self.sites}
             else:
-                found |= {self.bond_names[p.name, k]: float(value[k]) for k in range(len(self.bonds))}
-        return found
+                numbers |= {self.bond_names[p.name, k]: float(value[k]) for k in range(len(self.bonds))}
+        return numbers
 
 
 def expand(cell: Cell, sizes: Sequence[int], bonds: Sequence[Sequence[int]] = ()) -> Expansion:
-    """The lattice at these sizes; for graphs and pairs that is one number, of sites, and graphs need their bonds.
+    """Return the lattice at these sizes.
 
-    Raises `ValueError` for sizes that do not fit.
+    Graphs and pairs have one size, the number of sites; graphs need their bonds. Raises `ValueError` for sizes that
+    do not fit.
     """
     if len(sizes) != (len(cell.axes) or 1) or any(n < 1 for n in sizes):
-        wanted = f"{len(cell.axes)}, along {', '.join(cell.axes)}" if cell.axes else "the number of sites"
-        raise ValueError(f"sizes are {wanted}; not {'x'.join(map(str, sizes))}")
+        required_sizes = f"{len(cell.axes)}, along {', '.join(cell.axes)}" if cell.axes else "the number of sites"
+        raise ValueError(f"sizes are {required_sizes}; not {'x'.join(map(str, sizes))}")
     ends = tuple((int(a), int(b)) for a, b in bonds)
     if any(not (0 <= n < sizes[0]) for pair in ends for n in pair) or any(a == b for a, b in ends):
         raise ValueError(f"bonds are pairs of different sites between 0 and {sizes[0] - 1}")
-    taken = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants, *cell.times}
+    used_names = {p.name for p in cell.parameters if p.at == "all"} | {*cell.casimirs, *cell.invariants, *cell.times}
     sites = list(product(*map(range, sizes)))
     local = (n for n in cell.neighbours.names if n not in cell.increments)
-    names = {(n, s): _free(n, s, taken) for n in local for s in sites}
-    own = [p.name for p in cell.parameters if p.at == "bonds"]
-    bond_names = {(n, k): _free(n, (k,), taken) for n in own for k in range(len(ends))}
+    names = {(n, s): _free(n, s, used_names) for n in local for s in sites}
+    bond_parameters = [p.name for p in cell.parameters if p.at == "bonds"]
+    bond_names = {(n, k): _free(n, (k,), used_names) for n in bond_parameters for k in range(len(ends))}
     return Expansion(cell, tuple(sizes), ends, names, bond_names)
 
 
 def ring(sites: int) -> list[tuple[int, int]]:
-    """The bonds of a ring, and a chord: a small graph for those who do not give one."""
+    """Return the bonds of a ring and a chord: the graph of lattices whose user names none."""
     chord = [(0, sites // 2)] if sites > 3 else []
     return [(k, (k + 1) % sites) for k in range(sites if sites > 2 else sites - 1)] + chord
 
 
 def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, float]) -> Run:
-    """A run of the ordinary spec, from the state and the parameters of one of the lattice."""
+    """Return a run of the ordinary spec, from the state and the parameters of a run of the lattice."""
     return replace(
         run,
         initial=tuple(_decimal(v) for v in state.reshape(-1)),
@@ -246,17 +252,17 @@ def run_of(expansion: Expansion, run: Run, state: Any, numbers: Mapping[str, flo
 
 
 def _decimal(value: float) -> Fraction:
-    """The decimal that a double is written as."""
+    """Return the shortest decimal that reads back as the double."""
     return Fraction(repr(float(value)))
 
 
-def _free(name: str, site: Site, taken: set[str]) -> str:
-    """``x_1_2``; with underscores added where that name is in use already."""
-    found = "_".join([name, *map(str, site)])
-    while found in taken:
-        found += "_"
-    taken.add(found)
-    return found
+def _free(name: str, site: Site, used_names: set[str]) -> str:
+    """Return ``x_1_2``, followed by underscores until the name is unused, and record it in ``used_names``."""
+    candidate = "_".join([name, *map(str, site)])
+    while candidate in used_names:
+        candidate += "_"
+    used_names.add(candidate)
+    return candidate
 
 
 def _name(name: str, sizes: Sequence[int]) -> str:

@@ -1,6 +1,6 @@
 """Arrays and bonds of lattices in files: ``.npy`` arrays, and ``.csv`` tables with or without a line of names.
 
-Everything in a file is used or refused: raises `ValueError`, with the line where there is one, and `OSError`.
+A file is used whole or refused: `ValueError`, with the line where there is one, or `OSError`.
 """
 
 from __future__ import annotations
@@ -26,22 +26,26 @@ ENDS = ("a", "b")
 
 
 @dataclass(frozen=True)
-class Table:
-    """The numbers of a ``.csv`` file, and the names in its first line, if that has names."""
+class CsvTable:
+    """The numbers of a ``.csv`` file, and the column names of its first line, if there are any."""
 
     path: Path
     names: tuple[str, ...]
     rows: Floats
 
     def line(self, row: int) -> str:
-        """The place of a row in messages."""
+        """Return the line number of a row, for messages."""
         with opened_text(self.path) as stream:
-            filled = [number for number, text in enumerate(stream, 1) if text.split("#")[0].strip()]
-        return f"line {filled[row + bool(self.names)]}"
+            line_numbers = [number for number, text in enumerate(stream, 1) if text.split("#")[0].strip()]
+        return f"line {line_numbers[row + bool(self.names)]}"
 
 
 def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
-    """The array of that shape in a ``.npy`` or ``.csv`` file; a column with a name belongs to the field of it."""
+    """Return the array of that shape in a ``.npy`` or ``.csv`` file.
+
+    A table of one column may have the ``name`` of the field or parameter as the column name. Raises `ValueError` for
+    other contents.
+    """
     if path.suffix == ".npy":
         return _array(path, shape)
     table = _table(path)
@@ -55,9 +59,9 @@ def values_in(path: Path, name: str, shape: tuple[int, ...]) -> Floats:
 
 
 def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64], dict[str, Floats]]:
-    """The ends of bonds (bonds, 2) in a ``.csv`` file, and the columns of ``parameters``, by name.
+    """Return the ends of bonds (bonds, 2) in a ``.csv`` file, and the columns of ``parameters``, by name.
 
-    Without names the ends are all there is.
+    Without column names the file holds nothing but the ends.
     """
     table = _table(path)
     names = table.names or ENDS
@@ -75,23 +79,23 @@ def bonds_in(path: Path, parameters: Collection[str]) -> tuple[NDArray[np.int64]
     return ends.astype(np.int64), columns
 
 
-def _expect_columns(table: Table, names: Sequence[str], parameters: Collection[str]) -> None:
+def _expect_columns(table: CsvTable, names: Sequence[str], parameters: Collection[str]) -> None:
     if not table.names and table.rows.shape[1] != len(ENDS):
-        found = counted(table.rows.shape[1], "column")
-        raise ValueError(f"{found} without names; a first line a,b,… names the ends of bonds and their parameters")
+        width = counted(table.rows.shape[1], "column")
+        raise ValueError(f"{width} without names; a first line a,b,… names the ends of bonds and their parameters")
     repeated = [name for k, name in enumerate(names) if name in names[:k]]
     if repeated:
         raise ValueError(f"two columns have the name {shown(repeated[0])}")
     missing = [end for end in ENDS if end not in names]
     if missing:
         raise ValueError(f"there is no column {missing[0]!r}; a and b are the ends of bonds")
-    strange = [name for name in names if name not in (*ENDS, *parameters)]
-    if strange:
-        hint = did_you_mean(strange[0], parameters) or (one_of(parameters) if parameters else "")
-        raise ValueError(f"the column {shown(strange[0])} is no parameter at bonds{hint and '; '}{hint}")
+    unknown = [name for name in names if name not in (*ENDS, *parameters)]
+    if unknown:
+        hint = did_you_mean(unknown[0], parameters) or (one_of(parameters) if parameters else "")
+        raise ValueError(f"the column {shown(unknown[0])} is no parameter at bonds{hint and '; '}{hint}")
 
 
-def _table(path: Path) -> Table:
+def _table(path: Path) -> CsvTable:
     with opened_text(path) as stream:
         lines: Iterator[str] = (line for line in stream if line.split("#")[0].strip())
         first = next(lines, None)
@@ -102,8 +106,8 @@ def _table(path: Path) -> Table:
             names, lines = (), chain([first], lines)
         begin = next(lines, None)
         if begin is None:
-            return Table(path, names, np.zeros((0, len(names))))
-        return Table(path, names, np.loadtxt(chain([begin], lines), delimiter=",", ndmin=2))
+            return CsvTable(path, names, np.zeros((0, len(names))))
+        return CsvTable(path, names, np.loadtxt(chain([begin], lines), delimiter=",", ndmin=2))
 
 
 def _is_number(text: str) -> bool:
@@ -115,14 +119,14 @@ def _is_number(text: str) -> bool:
 
 
 def _array(path: Path, shape: tuple[int, ...]) -> Floats:
-    """The array of a ``.npy`` file; its header is looked at before there is memory for it."""
+    """Return the array of a ``.npy`` file; its header is checked before memory is allocated."""
     with opened(path) as file:
         try:
-            found, dtype = _header(file)
-            _expect_shape(found, shape)
+            file_shape, dtype = _header(file)
+            _expect_shape(file_shape, shape)
             if dtype.kind not in "buif":
-                what = "complex numbers" if dtype.kind == "c" else f"elements of the kind {dtype}"
-                raise ValueError(f"{what}, not real numbers")
+                description = "complex numbers" if dtype.kind == "c" else f"elements of the kind {dtype}"
+                raise ValueError(f"{description}, not real numbers")
             file.seek(0)
             array = np.lib.format.read_array(file, allow_pickle=False)
             if file.read(1):
@@ -137,7 +141,7 @@ def _array(path: Path, shape: tuple[int, ...]) -> Floats:
 
 
 def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
-    """The shape and the kind of elements."""
+    """Return the shape and the kind of elements."""
     version = np.lib.format.read_magic(file)
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
     if version not in readers:
@@ -146,7 +150,7 @@ def _header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype]:
     return shape, dtype
 
 
-def _expect_shape(found: tuple[int, ...], wanted: tuple[int, ...]) -> None:
-    if found != wanted:
-        told, needed = ("×".join(map(str, shape)) or "1" for shape in (found, wanted))
-        raise ValueError(f"{told} values, not {needed}")
+def _expect_shape(file_shape: tuple[int, ...], shape: tuple[int, ...]) -> None:
+    if file_shape != shape:
+        actual, needed = ("×".join(map(str, s)) or "1" for s in (file_shape, shape))
+        raise ValueError(f"{actual} values, not {needed}")

@@ -1,7 +1,8 @@
-"""What makes the splitting of a lattice right, proved for all sizes at once.
+"""Proofs that the splitting of a lattice is correct, for all sizes at once.
 
-Parts sum to H; coordinates of a part commute over all the lattice, so the components of its gradient are constant along
-its flow; and with these as constants, and neighbours that do not move, the motion of a site solves its equation.
+The parts sum to H. The coordinates of a part commute over all the lattice, so the components of its gradient are
+constant along its flow. With these components constant, and neighbours that stand still, the motion of a site solves
+its equation.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
-    """The statements, those on flows in the order of the parts."""
+    """Yield the statements, those on flows in the order of the parts."""
     count, flows = plan.parts.colouring.count, plan.flows
     positive = tuple(p.name for p in cell.parameters if p.positive)
     parts = [number(len(colours)) * s.expression for flow in flows for s, colours in flow.summands]
@@ -32,8 +33,8 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
         yield _forces(cell, flows, count, positive)
     for k, flow in enumerate(flows, 1):
         residuals = [r for motion in flow.every_motion for r in _residuals(motion)]
-        what, rate = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
-        name = f"the flow Φ of {what} at each site: Φ_0 = 1, dΦ_t/dt = {rate}∘Φ_t"
+        part_name, field_name = f"{flow.letter}_{k}", f"F_{k}" if flow.force else f"π∇H_{k}"
+        name = f"the flow Φ of {part_name} at each site: Φ_0 = 1, dΦ_t/dt = {field_name}∘Φ_t"
         yield decide_zero(name, residuals, positive, flow.manner)
     for source, flow in zip(cell.noise, plan.noise, strict=True):
         residuals = [r for motion in flow.motions for r in _residuals(motion)]
@@ -42,23 +43,23 @@ def check(cell: Cell, plan: SplittingPlan) -> Iterator[Statement]:
 
 
 def _forces(cell: Cell, flows: Sequence[CellFlow], count: int, positive: Sequence[str]) -> Statement:
-    """The force parts are πζ + f together."""
+    """Decide that the force parts sum to πζ + f."""
     at = SiteFields(cell, sums_by_field(cell))
-    acting = [flow for flow in flows if flow.force]
+    force_flows = [flow for flow in flows if flow.force]
     residuals = []
     for colour in range(count):
-        moved: dict[str, list[Expression]] = {f: [] for f in cell.fields}
-        for motion in (m for flow in acting for m in flow.motions if m.colour in (None, colour)):
-            known = {**motion.components, Symbol(CHOSEN): ONE}
-            for f, e in zip(motion.rates, substitute(list(motion.rates.values()), known), strict=True):
-                moved[f].append(e)
-        residuals += [(f, at.tangent(f, at.push) + at.impulse(f) - total(listed)) for f, listed in moved.items()]
+        rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
+        for motion in (m for flow in force_flows for m in flow.motions if m.colour in (None, colour)):
+            values = {**motion.components, Symbol(CHOSEN): ONE}
+            for f, e in zip(motion.rates, substitute(list(motion.rates.values()), values), strict=True):
+                rates[f].append(e)
+        residuals += [(f, at.tangent(f, at.push) + at.impulse(f) - total(listed)) for f, listed in rates.items()]
     name = "πζ + f = " + " + ".join(f"F_{k}" for k, flow in enumerate(flows, 1) if flow.force)
     return decide_zero(name, residuals, positive)
 
 
 def _residuals(motion: SiteMotion) -> Iterator[tuple[str, Expression]]:
-    """What must vanish for the motion of a site to be the flow."""
+    """Yield the residuals that vanish if and only if the motion of a site is the flow of its rates."""
     names, increments = list(motion.solution), list(motion.solution.values())
     start = substitute(increments, {TIME: ZERO})
     speeds = derivatives(increments, TIME)

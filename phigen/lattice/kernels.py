@@ -20,7 +20,10 @@ def site_kernel(
     coefficients: Coefficients | None = None,
     role: Role = Role.OTHER,
 ) -> Kernel:
-    """A kernel at a site: inputs are coefficients, or parameters, then what it reads at sites, and the weights."""
+    """Return a kernel at a site.
+
+    Its inputs are coefficients, or parameters, then the values that it reads at sites, and the weights.
+    """
     used = symbols_of(*values)
     places = cell.places(*values)
 

@@ -1,7 +1,7 @@
-"""Which of two parts of a lattice kicks, and its modified potential: see `phigen.splitting.kicks`.
+"""Kick parts of lattices: which of two parts has a modified potential; see `phigen.splitting.kicks`.
 
-The bracket of two sums over sites is one again, {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d), and its density reaches
-as far as those of F and G together.
+The bracket of two sums over sites is a sum over sites, {F, G} = Σ_s Σ ∂F/∂f(s) {f, g}(s) ∂G/∂g(s + d). The range of
+its density is at most that of F and G together.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from phigen.symbolic.tower import Tower
 
 
 def cell_kicks(cell: Cell, splitting: CellSplitting) -> tuple[Kick, ...]:
-    """The parts that can be V, proved by degrees; none unless there are two parts without colours."""
+    """Return the parts that can be V, proved by degrees; none unless there are two parts without colours."""
     coloured = splitting.colouring.count > 1 or any(flow.by_colour for flow in splitting.flows)
     if len(splitting.flows) != 2 or coloured or cell.bond_bracket:
         return ()
-    found = []
+    kicks = []
     for part in (0, 1):
         v, t = splitting.flows[part], splitting.flows[1 - part]
         if _graded(cell, v, t):
-            found.append(Kick(part, _modified(cell, splitting, v, t) if cell.relation == GRID else None))
-    return tuple(found)
+            kicks.append(Kick(part, _modified(cell, splitting, v, t) if cell.relation == GRID else None))
+    return tuple(kicks)
 
 
 def _graded(cell: Cell, v: CellFlow, t: CellFlow) -> bool:
@@ -61,7 +61,7 @@ def _degree(cell: Cell, e: Expression, fields: set[str]) -> float:
 
 
 def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) -> CellFlow | None:
-    """The flow of V + κ{V, {V, T}}."""
+    """Return the flow of V + κ{V, {V, T}}, or None if the bracket is 0 or too long."""
     potential, kinetic = ([s for s, _ in flow.summands] for flow in (v, t))
     twice = list(_bracket(cell, potential, list(_bracket(cell, potential, kinetic))))
     if not twice or len(twice) > MOST_MONOMIALS:
@@ -71,21 +71,21 @@ def _modified(cell: Cell, splitting: CellSplitting, v: CellFlow, t: CellFlow) ->
 
 
 def _bracket(cell: Cell, left: Sequence[Summand], right: Sequence[Summand]) -> Iterator[Summand]:
-    """{Σ left, Σ right} term by term."""
+    """Yield {Σ left, Σ right} term by term."""
     slopes = {f: list(_slopes(cell, left, f)) for f in cell.fields}
-    others = {f: list(_slopes(cell, right, f)) for f in cell.fields}
+    right_slopes = {f: list(_slopes(cell, right, f)) for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         g, d = cell.place(other)
         steps = tuple(int(o) for o in d)
         for a in slopes[f]:
-            for b in others[g]:
+            for b in right_slopes[g]:
                 low = tuple(min(0, x, s, y + s) for x, y, s in zip(a.low, b.low, steps, strict=True))
                 high = tuple(max(0, x, s, y + s) for x, y, s in zip(a.high, b.high, steps, strict=True))
                 yield Summand(a.expression * entry * cell.shifted(b.expression, d), low, high)
 
 
 def _slopes(cell: Cell, summands: Sequence[Summand], field: str) -> Iterator[Summand]:
-    """The derivatives by a field at a site, of all terms that mention it."""
+    """Yield the derivatives by a field at a site, of all terms that mention it."""
     for s in summands:
         places = {n: o for n, (f, o) in cell.places(s.expression).items() if f == field}
         for slope, offset in zip(gradient(s.expression, list(places)), places.values(), strict=True):

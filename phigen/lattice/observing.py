@@ -1,4 +1,4 @@
-"""What is conserved along a run of a lattice: energy, Casimirs, invariants, frame by frame."""
+"""Conserved quantities along a run of a lattice: energy, Casimirs, invariants, frame by frame."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from phigen.errors import StepError
-from phigen.lattice.balance import Power, integral, shifted, there
+from phigen.lattice.balance import Power, inside_ends, integral, shifted
 from phigen.lattice.cell import Cell
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
@@ -18,18 +18,18 @@ from phigen.study.conservation import SITES, Unit, unit_of
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.symbolic.expression import Expression
 
-#: What is said of the energy: that it is conserved, that it is in balance with the work done, or that it changes.
+#: Names of the energy error: of a conserved energy; of energy minus work; of an energy that changes.
 ENERGY, BALANCE, CHANGE = "energy", "energy balance", "change of the energy"
-#: Steps times sites up to which the work is integrated.
-MOST_BALANCED = 20_000_000
+#: Steps times sites up to which the work is integrated: it takes a second run, step by step.
+MAX_BALANCED_SITE_STEPS = 20_000_000
 
 
 def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
-    """The distances of energy, Casimirs and invariants from their initial values, by name, each (frames,).
+    """Return the distances of energy, Casimirs and invariants from their initial values, by name, each (frames,).
 
-    Energy and invariants are in the units of `units_of`; Casimirs of sites are those of the site where they changed
-    most. Where H depends on the time, or forces act, the energy is less the work that was done, in runs that are not
-    too long.
+    Energy and invariants are in the units of `units_of`. A Casimir of sites is reported at the site where it changed
+    most. If H depends on the time, or forces act, the work done is subtracted from the energy, unless the run is too
+    long.
     """
     errors = _of_energy(cell, run) | run.casimir_changes()
     for name, density in cell.invariants.items():
@@ -40,7 +40,7 @@ def errors_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 
 
 def units_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Unit]:
-    """The units of the errors of the energy and the invariants, by name."""
+    """Return the units of the errors of the energy and the invariants, by name."""
     values = {**run.parameters, **{t: float(run.t[0]) for t in cell.times}}
     invariants = {name: summed(cell, density, run.x[0], values) for name, density in cell.invariants.items()}
     units = {name: unit_of(value, terms, SITES) for name, (value, terms) in invariants.items()}
@@ -50,7 +50,7 @@ def units_of(cell: Cell, run: LatticeTrajectory) -> dict[str, Unit]:
 def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
     if not cell.driven:
         return {ENERGY: _relative(run.energy, run.energy_unit)}
-    if not cell.noise and run.steps * run.x[0, 0].size <= MOST_BALANCED:
+    if not cell.noise and run.steps * run.x[0, 0].size <= MAX_BALANCED_SITE_STEPS:
         try:
             work, _ = works(cell, run)
             return {BALANCE: _relative(run.energy - work, run.energy_unit)}
@@ -60,19 +60,22 @@ def _of_energy(cell: Cell, run: LatticeTrajectory) -> dict[str, Floats]:
 
 
 def works(cell: Cell, run: LatticeTrajectory) -> tuple[Floats, float]:
-    """The work done until each frame (frames,), along the steps of a run, made once more; and how far it may be off."""
-    power, solver, begin = Power(cell), run.solver, float(run.t[0])
-    session, found = solver.started(Beginning(run.x[0], run.h, run.parameters, begin)), []
+    """Return the work done until each frame (frames,), and an estimate of its error.
+
+    The run is integrated once more to evaluate the power after every step.
+    """
+    power, solver, start_time = Power(cell), run.solver, float(run.t[0])
+    session, powers = solver.started(Beginning(run.x[0], run.h, run.parameters, start_time)), []
     for step in range(run.steps + 1):
-        now = dict.fromkeys(cell.times, begin + step * run.h)
-        found.append(power(session.state(), session.vector_field(), {**run.parameters, **now}))
+        times = dict.fromkeys(cell.times, start_time + step * run.h)
+        powers.append(power(session.state(), session.vector_field(), {**run.parameters, **times}))
         if step < run.steps:
             try:
                 session.advance(run.h, 1)
             except BackendError as error:
                 raise StepError(str(error), step=step, status=error.status) from error
-    made, off = integral(np.array(found), run.h)
-    return made[np.rint((run.t - begin) / run.h).astype(int)], off
+    integrals, error_estimate = integral(np.array(powers), run.h)
+    return integrals[np.rint((run.t - start_time) / run.h).astype(int)], error_estimate
 
 
 def _relative(values: Floats, unit: Unit) -> Floats:
@@ -80,17 +83,17 @@ def _relative(values: Floats, unit: Unit) -> Floats:
 
 
 def summed(cell: Cell, density: Expression, x: Floats, parameters: Mapping[str, Any]) -> tuple[float, float]:
-    """The sum of a density over the sites, and that of the magnitudes of its terms."""
+    """Return the sum of a density over the sites, and the sum of the magnitudes of its terms."""
     sums = [_term(cell, term, x, parameters) for term in cell.additive_terms(density)]
     return float(sum(values.sum() for values in sums)), float(sum(np.abs(values).sum() for values in sums))
 
 
 def _term(cell: Cell, term: Expression, x: Floats, parameters: Mapping[str, Any]) -> Floats:
-    """A term at all sites, 0 where it reaches beyond an open end."""
+    """Return the values of a term at all sites, 0 where it reaches beyond an open end."""
     sizes = x.shape[1:]
     values: dict[str, Any] = {n: v for n, v in parameters.items() if np.ndim(v) == 0}
     for name, (base, offset) in cell.places(term).items():
-        own = x[cell.fields.index(base)] if base in cell.fields else np.broadcast_to(parameters[base], sizes)
-        values[name] = shifted(own, offset)
-    reached = there(cell, cell.extent(term), sizes)
-    return np.where(reached, np.broadcast_to(evaluate([term], values)[0], sizes), 0.0)
+        array = x[cell.fields.index(base)] if base in cell.fields else np.broadcast_to(parameters[base], sizes)
+        values[name] = shifted(array, offset)
+    inside = inside_ends(cell, cell.extent(term), sizes)
+    return np.where(inside, np.broadcast_to(evaluate([term], values)[0], sizes), 0.0)

@@ -1,13 +1,14 @@
-"""H of a lattice as a sum of parts whose flows move each site by itself.
+"""The Hamiltonian of a lattice as a sum of parts whose flows move each site independently.
 
-A part is a sum over sites of terms whose coordinates commute over all the lattice: its gradient is constant along its
-flow, and each site moves by ẋ = Σ {x, a} ∂V/∂a with the values of its neighbours as constants, an equation of one site.
-Where π couples neighbours, or a term mixes what does not commute, sites get colours: the terms that begin at sites of
-one colour are then taken apart from the others. Terms of one site alone may be parts by their own flow too.
+A part is a sum over sites of terms whose coordinates commute over all the lattice. Its gradient is constant along its
+flow, so each site moves by ẋ = Σ {x, a} ∂V/∂a with the values of its neighbours as constants: an equation of one site.
+Where π couples neighbours, or a term mixes coordinates that do not commute, the sites are coloured, and the terms that
+begin at sites of one colour form a part. Terms of a single site may also be parts because they have a flow.
 
-Where colours do not fit a size, as two of them a ring of odd length, they are counted from site 0 on, and do not match
-where the last site meets it. The terms that begin at the last sites, the *seam*, are then parts of their own: so wide
-that all others see but one end of it. Beside it a site moves by what its neighbours are, which `BEGINS` tells.
+Some sizes are no multiples of the period of the colours, such as an odd ring with two colours. The colours are then
+counted from site 0 on, and the terms that begin at the last sites along an axis, the boundary *seam*, form parts
+themselves. A seam is so wide that no other term reaches both its ends. Near a seam the motion of a site depends on
+where the terms around it begin, by the weights `BEGINS`.
 """
 
 from __future__ import annotations
@@ -37,20 +38,20 @@ from phigen.symbolic.neighbours import Offset, minus, plus, steps
 from phigen.symbolic.symbols import BEGINS, GATHERED, PRESENT, Symbol
 from phigen.symbolic.tower import Tower
 
-#: Most colours of sites.
-MOST_COLOURS = 4
+#: Largest number of colours: colourings to try number its power of the number of axes, and each adds flows to a step.
+MAX_COLOURS = 4
 
 #: The kind of symbols of the components of the gradient of a part.
 FORCE = "force"
 
 Steps = tuple[int, ...]
-#: A field, and the colour of the sites where it is meant.
+#: A field, and the colour of the sites that have it.
 Coordinate = tuple[str, int]
 
 
 @dataclass(frozen=True)
 class Summand:
-    """A term of H: at sites, or of a ``bond`` or a pair. ``low`` and ``high`` are the offsets that it reaches."""
+    """A term of H: at sites, or of a ``bond`` or a pair. ``low`` and ``high`` are its extreme offsets."""
 
     expression: Expression
     low: Steps = ()
@@ -62,7 +63,7 @@ class Summand:
 class Colouring:
     """The colour of a site: Σ weights·position modulo ``count``.
 
-    With ``seams``, one along each axis, it takes every size.
+    With ``seams``, one along each axis, every size is possible.
     """
 
     count: int = 1
@@ -70,13 +71,13 @@ class Colouring:
     seams: tuple[Seam, ...] = ()
 
     def at(self, colour: int, offset: Offset) -> int:
-        """The colour of the site at an offset from one of a given colour."""
+        """Return the colour of the site at an offset from a site of this colour."""
         if self.count == 1:
             return 0
         return (colour + sum(w * o for w, o in zip(self.weights, steps(offset), strict=True))) % self.count
 
     def periods(self, boundary: Sequence[str]) -> Steps:
-        """What sizes must be multiples of, along each axis."""
+        """Return the periods of the colouring along the axes; sizes are multiples of them."""
         if self.seams:
             return (1,) * len(boundary)
         return tuple(
@@ -86,12 +87,12 @@ class Colouring:
 
     @property
     def windows(self) -> tuple[int, ...]:
-        """The seams that a site may lie on, as bits of the axes: 0 is none of them."""
+        """Return the sets of seams that a site may lie on, as bits of the axes; 0 is no seam."""
         axes = sum(1 << a for a, seam in enumerate(self.seams) if seam.period > 1)
         return tuple(w for w in range(axes + 1) if w & axes == w)
 
     def on_seams(self) -> set[int]:
-        """The colours that sites on a seam may have: of a single narrow one not that at the end of a period."""
+        """Return the colours of sites on a seam; a single seam of width 1 lacks the last colour of a period."""
         along = [(s, w) for s, w in zip(self.seams, self.weights, strict=True) if w]
         if len(along) > 1 or along[0][0].wide > 1:
             return set(range(self.count))
@@ -99,17 +100,20 @@ class Colouring:
         return {weight * k % self.count for k in range(seam.period - 1)}
 
     def with_seams(self, cell: Cell) -> Colouring:
-        """The colouring with seams so wide that terms at their two ends commute, and that what reads of what those at
-        one end move is not moved by those at the other."""
+        """Return the colouring with seams so wide that terms at the two ends of a seam commute.
+
+        Nor do terms at one end move values that equations for coordinates at the other end read.
+        """
         return replace(self, seams=tuple(_seam(cell, a, p) for a, p in enumerate(self.periods(cell.boundary))))
 
 
 @dataclass(frozen=True)
 class BondSum:
-    """What bonds or pairs add up at a site: for each symbol an expression in ``x[a]``, here, and ``x[b]``, over there.
+    """Sums over bonds or pairs at a site: for each symbol an expression in ``x[a]``, here, and ``x[b]``, there.
 
-    ``end`` tells at which end of the bond, as it is written, the site is: a, b, or either. Of a part that belongs to
-    one colour, ``chosen`` tells which of the two has it: ``here``, ``there``, or none.
+    x[a] is x at the site itself, x[b] at the other end. ``end`` is the end of the bond, as the user lists it, at
+    which the site is: a, b, or "" for either. In a part of one colour, ``chosen`` says which of the two sites has the
+    colour: ``here``, ``there``, or "" for neither.
     """
 
     values: Mapping[str, Expression]
@@ -119,12 +123,12 @@ class BondSum:
 
 @dataclass(frozen=True)
 class SiteMotion:
-    """How sites of one colour move: increments of the fields, which read the site and neighbours that stand still.
+    """The motion of the sites of one colour, or of all sites if ``colour`` is None.
 
-    Without a colour they are those of all sites.
-    ``gathered`` are the sums over bonds or pairs that the increments read as symbols `GATHERED`.
-    ``solution`` are the increments with a symbol for each component of the gradient, which solve ẋ = ``rates``;
-    ``components`` is what these symbols of a force stand for. ``manner`` says how the fields move.
+    ``increments`` of the fields read the site, neighbours that stand still, and, as symbols `GATHERED`, the sums over
+    bonds or pairs ``gathered``. ``solution`` has the increments with a symbol for each component of the gradient; it
+    solves ẋ = ``rates``. ``components`` has the values of these symbols where a force is not the gradient of a part.
+    ``manner`` describes the motion in words.
     """
 
     colour: int | None
@@ -137,40 +141,40 @@ class SiteMotion:
 
 
 def _seam(cell: Cell, axis: int, period: int) -> Seam:
-    """The seam along an axis.
+    """Return the seam along an axis.
 
-    A term reads sites up to h apart, and moves those up to n from where it begins. What it moves reads at these two
-    alone, unless brackets depend on sites that they do not couple.
+    A term reads sites up to ``reach`` apart, and moves sites up to ``moved`` from where it begins. The equations of
+    motion read only sites at these distances, unless brackets depend on sites that they do not couple.
     """
     if period == 1:
         return Seam()
-    h, p = cell.hamiltonian_reach[axis], cell.poisson_reach[axis]
-    n = h + p
+    reach, poisson_reach = cell.hamiltonian_reach[axis], cell.poisson_reach[axis]
+    moved = reach + poisson_reach
     between = all(
         offset in (cell.origin, cell.place(other)[1])
         for (_, other), entry in cell.bracket.items()
         for _, offset in cell.places(entry).values()
     )
-    wide = h if cell.is_local else h + n if between else 2 * n + p
+    wide = reach if cell.is_local else reach + moved if between else 2 * moved + poisson_reach
     damping = [] if cell.forces.damping is None else cell.places(cell.forces.damping).values()
-    return Seam(period, max([wide, *(h + abs(steps(offset)[axis]) for _, offset in damping)]), n)
+    return Seam(period, max([wide, *(reach + abs(steps(offset)[axis]) for _, offset in damping)]), moved)
 
 
-def at_every_site(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:
-    """One motion for those of all colours where they are the same."""
-    same = (
+def merged_colours(motions: Sequence[SiteMotion], count: int) -> tuple[SiteMotion, ...]:
+    """Return one motion for all colours where the motions of all colours are equal."""
+    equal = (
         count > 1 and len(motions) == count and all(replace(m, colour=motions[0].colour) == motions[0] for m in motions)
     )
-    return (replace(motions[0], colour=None),) if same else tuple(motions)
+    return (replace(motions[0], colour=None),) if equal else tuple(motions)
 
 
 @dataclass(frozen=True)
 class CellFlow(Flow):
-    """The flow of a part of H over the lattice: all ``motions`` may be made in any order, at all sites in any order.
+    """The flow of a part of H over the lattice; ``motions`` may run in any order, and each over sites in any order.
 
-    ``summands`` are the terms of the part with the colours of the sites where they begin. On graphs the part of one
-    colour stands for those of all, if it is ``by_colour``. Where there are seams, ``beside`` is how sites near them
-    move, by the terms that begin on those of the ``window``; on the seams no others do.
+    ``summands`` are the terms of the part with the colours of the sites where they begin. On graphs a part of one
+    colour, ``by_colour``, stands for the parts of all colours. Where there are seams, ``beside`` is the motion of
+    sites near them, by the terms that begin on the seams of ``window``; sites on a seam have no other motion.
     """
 
     motions: tuple[SiteMotion, ...] = ()
@@ -181,20 +185,20 @@ class CellFlow(Flow):
 
     @property
     def every_motion(self) -> tuple[SiteMotion, ...]:
-        """The motions, with that beside seams."""
+        """The motions, followed by the motion near seams."""
         return (*self.motions, *([self.beside] if self.beside else []))
 
 
 @dataclass(frozen=True)
 class CellSplitting:
-    """The flows of the parts of H, with the colours that they need."""
+    """The flows of the parts of H, with their colouring."""
 
     flows: tuple[CellFlow, ...]
     colouring: Colouring
 
 
 class NoPartError(Exception):
-    """A term belongs to no part with a flow; the text says why."""
+    """A term belongs to no part with a flow; the text is the reason."""
 
     def __init__(self, expression: Expression, reason: str) -> None:
         super().__init__(reason)
@@ -204,23 +208,23 @@ class NoPartError(Exception):
 def splittings(
     cell: Cell, place: Location | None = None, search: Callable[[Cell, Colouring], PartSearch] | None = None
 ) -> Iterator[CellSplitting]:
-    """H as sums of parts with elementary flows, by a search for each colouring: few colours first, then few parts.
+    """Yield H as sums of parts with elementary flows, for each colouring: few colours first, then few parts.
 
-    Raises `SpecError`, at ``place``, naming the term in the way, if there are none.
+    Raises `SpecError`, at ``place``, with the term that has no flow, if there is no such sum.
     """
     search = search or PartSearch
     refused: NoPartError | None = None
-    some = False
-    for _, alike in itertools.groupby(colourings(cell), lambda colouring: colouring.count):
-        found: list[CellSplitting] = []
-        for colouring in alike:
+    any_found = False
+    for _, same_count in itertools.groupby(colourings(cell), lambda colouring: colouring.count):
+        splittings_found: list[CellSplitting] = []
+        for colouring in same_count:
             try:
-                found.append(search(cell, colouring).splitting())
+                splittings_found.append(search(cell, colouring).splitting())
             except NoPartError as error:
                 refused = refused or error
-        some = some or bool(found)
-        yield from sorted(found, key=lambda parts: len(parts.flows))
-    if not some:
+        any_found = any_found or bool(splittings_found)
+        yield from sorted(splittings_found, key=lambda parts: len(parts.flows))
+    if not any_found:
         assert refused is not None
         message = f"scheme splitting: the term {refused.expression} has no elementary flow on the lattice"
         hint = "terms in coordinates that commute over the whole lattice split, and terms of one site with a flow"
@@ -228,18 +232,18 @@ def splittings(
 
 
 def colourings(cell: Cell) -> Iterator[Colouring]:
-    """All that are tried, those with the fewest colours first."""
+    """Yield all colourings to try, those with the fewest colours first."""
     yield Colouring(1, (0,) * len(cell.axes))
     if cell.relation != GRID:
         return
-    for count in range(2, MOST_COLOURS + 1):
+    for count in range(2, MAX_COLOURS + 1):
         for weights in itertools.product(range(count), repeat=len(cell.axes)):
             if any(weights):
                 yield Colouring(count, weights)
 
 
 def summands_of(cell: Cell) -> list[Summand]:
-    """The terms of H as they are written; 0 is a term of H = 0, so that there is a flow, in which nothing moves."""
+    """Return the terms of H as they are written; H = 0 has the term 0, so that there is a flow."""
     if cell.relation == GRID:
         return [Summand(term, *cell.extent(term)) for term in cell.terms or (ZERO,)]
     bonds = cell.bond_hamiltonian + cell.pair_hamiltonian
@@ -263,29 +267,29 @@ class PartSearch:
             self._couples.setdefault(f, []).append(self.cell.place(other))
 
     def splitting(self) -> CellSplitting:
-        """All parts."""
-        own: list[Summand] = []
+        """Return all parts."""
+        site_terms: list[Summand] = []
         classes: list[tuple[Summand, int]] = []
         for term in summands_of(self.cell):
-            for piece in self._pieces(term):
-                if found := self._classes(piece):
-                    classes += found
-                elif self._is_own(piece):
-                    own.append(piece)
+            for piece in self._summands(term):
+                if classes_of_piece := self._classes(piece):
+                    classes += classes_of_piece
+                elif self._is_single_site(piece):
+                    site_terms.append(piece)
                 else:
                     reason = "it mixes coordinates that do not commute"
                     raise NoPartError(piece.expression, reason)
         neighbours = [
             {j for j, b in enumerate(classes) if j != i and not self._commute(a, b)} for i, a in enumerate(classes)
         ]
-        numbers: dict[Coordinate, int] = {}
-        supports = [[numbers.setdefault(f, len(numbers)) for f in self._support(c)] for c in classes]
+        numbering: dict[Coordinate, int] = {}
+        supports = [[numbering.setdefault(f, len(numbering)) for f in self._support(c)] for c in classes]
         colours = coloured(neighbours, supports)
         flows = [
             self.flow([c for c, k in zip(classes, colours, strict=True) if k == colour])
             for colour in sorted(set(colours))
         ]
-        return CellSplitting((*flows, *self._own_flows(own)), self.colouring)
+        return CellSplitting((*flows, *self._site_flows(site_terms)), self.colouring)
 
     # --- what commutes
 
@@ -299,25 +303,25 @@ class PartSearch:
         return not any(self._coupled(f, g) for f in self._support(a) for g in self._support(b))
 
     def _coupled(self, a: Coordinate, b: Coordinate) -> bool:
-        """Whether some site of the one colour has a bracket with one of the other."""
+        """Whether some site of one colour has a bracket with a site of the other."""
         return any(g == b[0] and self.colouring.at(a[1], d) == b[1] for g, d in self._couples.get(a[0], ()))
 
     def _classes(self, term: Summand) -> list[tuple[Summand, int]]:
-        """The term at sites of each colour; none if it does not commute with itself."""
-        found = [(term, c) for c in range(self.colouring.count)]
-        return found if all(self._commute(c, c) for c in found) else []
+        """Return the term at sites of each colour, or nothing if it does not commute with itself."""
+        classes = [(term, c) for c in range(self.colouring.count)]
+        return classes if all(self._commute(c, c) for c in classes) else []
 
-    def _is_own(self, term: Summand) -> bool:
-        """Whether it is a function of one site, and π local."""
+    def _is_single_site(self, term: Summand) -> bool:
+        """Whether the term is a function of one site, and π is local."""
         places = self.cell.places(term.expression).values()
         return self.cell.is_local and not term.bond and all(o == self.cell.origin for _, o in places)
 
-    def _pieces(self, term: Summand) -> list[Summand]:
-        """The term, or its monomials where it mixes what does not commute at different sites."""
-        if self._classes(term) or self._is_own(term):
+    def _summands(self, term: Summand) -> list[Summand]:
+        """Return the term or, where it mixes coordinates that do not commute at different sites, its monomials."""
+        if self._classes(term) or self._is_single_site(term):
             return [term]
         names = [n for n, (f, _) in self.cell.places(term.expression).items() if f in self.cell.fields]
-        ring = own_ring(names, [term.expression])
+        ring = bracketless_ring(names, [term.expression])
         element = ring.tower.convert(term.expression)
         monomials = ring.terms(element, ring.state)
         return [replace(term, expression=ring.expression(c * ring.monomial(m))) for m, c in monomials.items()]
@@ -325,24 +329,24 @@ class PartSearch:
     # --- flows
 
     def flow(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]] = ()) -> CellFlow:
-        """The flow of a sum of terms that commute; ``more`` are multiplied by `KICK`."""
+        """Return the flow of a sum of terms that commute; the terms ``more`` are multiplied by `KICK`."""
         motions = [m for m in self._motions(part, more) if m.increments]
         by_term: dict[int, tuple[Summand, list[int]]] = {}
         for summand, colour in (*part, *((replace(s, expression=symbol(KICK) * s.expression), c) for s, c in more)):
             by_term.setdefault(id(summand.expression), (summand, []))[1].append(colour)
         listed = tuple((s, tuple(c)) for s, c in by_term.values())
-        # what one bond or pair adds decides what the flow costs
-        added = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
-        increments = tuple(substitute([e for m in motions for e in m.increments.values()], added))
+        # the expression of one bond or pair determines the cost of the flow
+        bond_terms = {n: e for m in motions for gathered in m.gathered for n, e in gathered.values.items()}
+        increments = tuple(substitute([e for m in motions for e in m.increments.values()], bond_terms))
         hamiltonian = total(s.expression for s, _ in listed)
         manner = "; ".join(dict.fromkeys(m.manner for m in motions))
-        settled = at_every_site(motions, self.colouring.count)
-        return CellFlow(hamiltonian, increments, manner, settled, listed, beside=self._beside(part, more))
+        merged = merged_colours(motions, self.colouring.count)
+        return CellFlow(hamiltonian, increments, manner, merged, listed, beside=self._beside(part, more))
 
     def _beside(self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]]) -> SiteMotion | None:
-        """How sites near seams move; None where no terms are left out, so that there is nothing special about them."""
-        every = {(id(s.expression), c) for s, _ in (*part, *more) for c in range(self.colouring.count)}
-        if not self.colouring.seams or every == {(id(s.expression), c) for s, c in (*part, *more)}:
+        """Return the motion of sites near seams, or None if the part has the terms of all sites."""
+        all_classes = {(id(s.expression), c) for s, _ in (*part, *more) for c in range(self.colouring.count)}
+        if not self.colouring.seams or all_classes == {(id(s.expression), c) for s, c in (*part, *more)}:
             return None
         return self._motion(part, more, None)
 
@@ -360,44 +364,45 @@ class PartSearch:
         shift: Offset = (),
         factor: Expression = ONE,
     ) -> Expression:
-        """∂V/∂field at the site ``shift`` away, which has some colour: from terms at sites, weighted at open ends.
+        """Return ∂V/∂field at the site ``shift`` away, of this colour, from terms at sites.
 
-        Near a seam, without a colour, they are weighted by where they begin.
+        Terms have weights that vanish beyond open ends. Near a seam, without a colour, they are weighted by where
+        they begin.
         """
-        found = []
-        for summand, begins in part:
+        slopes = []
+        for summand, begin in part:
             places = {} if summand.bond else self.cell.places(summand.expression)
             for name, (base, offset) in places.items():
-                if base != field or (colour is not None and self.colouring.at(colour, _back(offset)) != begins):
+                if base != field or (colour is not None and self.colouring.at(colour, _opposite(offset)) != begin):
                     continue
                 (slope,) = gradient(summand.expression, [name])
                 if slope.is_zero:
                     continue
                 if self.cell.relation == GRID:
-                    way = plus(shift or self.cell.origin, minus(offset))
-                    weight = present(self.cell, summand.low, summand.high, [int(o) for o in way])
-                    slope = weight * self.cell.shifted(slope, way)
-                    slope = slope if colour is not None else symbol(Symbol(BEGINS, begins, *way)) * slope
-                found.append(factor * slope)
-        return total(found)
+                    displacement = plus(shift or self.cell.origin, minus(offset))
+                    weight = present(self.cell, summand.low, summand.high, [int(o) for o in displacement])
+                    slope = weight * self.cell.shifted(slope, displacement)
+                    slope = slope if colour is not None else symbol(Symbol(BEGINS, begin, *displacement)) * slope
+                slopes.append(factor * slope)
+        return total(slopes)
 
     def _motion(
         self, part: Sequence[tuple[Summand, int]], more: Sequence[tuple[Summand, int]], colour: int | None
     ) -> SiteMotion:
-        """How sites of a colour move; without one, those near seams."""
+        """Return the motion of sites of a colour, or without a colour that of sites near seams."""
         cell = self.cell
-        moves: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
+        coordinates: set[tuple[str, int | None]] = {c for s in (*part, *more) for c in self._support(s)}
         if colour is None:
-            moves = {(f, None) for f, _ in moves}
+            coordinates = {(f, None) for f, _ in coordinates}
         rates: dict[str, list[Expression]] = {f: [] for f in cell.fields}
         forces: dict[str, Expression] = {}
         gathered: dict[str, Expression] = {}
         for (f, other), entry in cell.bracket.items():
             g, d = cell.place(other)
-            there = None if colour is None else self.colouring.at(colour, d)
-            if (g, there) not in moves:
+            other_colour = None if colour is None else self.colouring.at(colour, d)
+            if (g, other_colour) not in coordinates:
                 continue
-            force = self.force(part, g, there, d) + self.force(more, g, there, d, symbol(KICK))
+            force = self.force(part, g, other_colour, d) + self.force(more, g, other_colour, d, symbol(KICK))
             slope = total(gradient(s.expression, [cell.at(g, ("a",))])[0] for s, _ in part if s.bond)
             if not slope.is_zero:
                 gathered[Symbol(GATHERED, g)] = slope
@@ -408,11 +413,13 @@ class PartSearch:
             forces[name] = force
             rates[f].append(entry * symbol(name))
         field = {f: total(r) for f, r in rates.items() if r}
-        if colour is not None:  # what stands still beside a seam does so elsewhere, since no site sees both its ends
+        if (
+            colour is not None
+        ):  # no term reaches both ends of a seam, so neighbours that stand still elsewhere do so near a seam
             self._expect_still(field, colour, part)
-        return self._moved(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
+        return self._solved_motion(field, forces, [BondSum(gathered)] if gathered else [], colour, part)
 
-    def _moved(
+    def _solved_motion(
         self,
         rates: Mapping[str, Expression],
         forces: Mapping[str, Expression],
@@ -420,25 +427,25 @@ class PartSearch:
         colour: int | None,
         part: Sequence[tuple[Summand, int]],
     ) -> SiteMotion:
-        """The motion with these ``rates``, in which symbols stand for the ``forces``."""
+        """Return the motion with these ``rates``, in which symbols stand for the ``forces``."""
         if not rates:
             return SiteMotion(colour, {})
-        found = self._solved(rates, part)
-        increments = dict(zip(self.cell.fields, substitute(found.increments, forces), strict=True))
-        moved = {f: e for f, e in increments.items() if not e.is_zero}
-        solution = {f: e for f, e in zip(self.cell.fields, found.increments, strict=True) if f in moved}
-        return SiteMotion(colour, moved, tuple(gathered), rates, solution, found.manner)
+        solved_rates = self._solved(rates, part)
+        increments = dict(zip(self.cell.fields, substitute(solved_rates.increments, forces), strict=True))
+        nonzero = {f: e for f, e in increments.items() if not e.is_zero}
+        solution = {f: e for f, e in zip(self.cell.fields, solved_rates.increments, strict=True) if f in nonzero}
+        return SiteMotion(colour, nonzero, tuple(gathered), rates, solution, solved_rates.manner)
 
     def _solved(self, rates: Mapping[str, Expression], part: Sequence[tuple[Summand, int]]) -> Solved:
-        ring = own_ring(self.cell.fields, rates.values())
+        ring = bracketless_ring(self.cell.fields, rates.values())
         field = ring.tower.convert_all([rates.get(f, ZERO) for f in self.cell.fields])
-        found = solved(ring, field)
-        if isinstance(found, str):
-            raise NoPartError(part[0][0].expression, found)
-        return found
+        solution = solved(ring, field)
+        if isinstance(solution, str):
+            raise NoPartError(part[0][0].expression, solution)
+        return solution
 
     def _expect_still(self, rates: Mapping[str, Expression], colour: int, part: Sequence[tuple[Summand, int]]) -> None:
-        """Neighbours that an equation of a site reads must not move themselves."""
+        """Raise `NoPartError` if the equation of a site reads neighbours that move."""
         moving = {f for f, e in rates.items() if not e.is_zero}
         for f, o in self.cell.places(*rates.values()).values():
             if f in moving and any(o) and self._moves(f, self.colouring.at(colour, o), part):
@@ -447,11 +454,11 @@ class PartSearch:
                 )
 
     def _moves(self, field: str, colour: int, part: Sequence[tuple[Summand, int]]) -> bool:
-        moves = {c for s in part for c in self._support(s)}
-        return any((g, self.colouring.at(colour, d)) in moves for g, d in self._couples.get(field, ()))
+        coordinates = {c for s in part for c in self._support(s)}
+        return any((g, self.colouring.at(colour, d)) in coordinates for g, d in self._couples.get(field, ()))
 
-    def _own_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
-        """Flows of functions of one site."""
+    def _site_flows(self, terms: Sequence[Summand]) -> list[CellFlow]:
+        """Return the flows of functions of one site."""
         if not terms:
             return []
         cell = self.cell
@@ -469,24 +476,27 @@ class PartSearch:
         colours = tuple(range(self.colouring.count))
         origin = cell.origin if cell.relation == GRID else ()
         steps = tuple(int(o) for o in origin)
-        found = []
+        site_flows = []
         for flow in flows:
-            moved = {f: e for f, e in zip(cell.fields, flow.increment, strict=True) if not e.is_zero}
+            increments = {f: e for f, e in zip(cell.fields, flow.increment, strict=True) if not e.is_zero}
             slopes = dict(zip(cell.fields, gradient(flow.hamiltonian, cell.fields), strict=True))
-            rates: dict[str, list[Expression]] = {f: [] for f in moved}
+            rates: dict[str, list[Expression]] = {f: [] for f in increments}
             for (f, g), entry in cell.bracket.items():
-                if f in moved:
+                if f in increments:
                     rates[f].append(entry * slopes[g])
             field = {f: total(listed) for f, listed in rates.items()}
-            motions = [SiteMotion(c, moved, (), field, moved, flow.manner) for c in colours if moved]
-            own = ((Summand(flow.hamiltonian, steps, steps), colours),)
-            settled = at_every_site(motions, self.colouring.count)
-            found.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, settled, own))
-        return found
+            motions = [SiteMotion(c, increments, (), field, increments, flow.manner) for c in colours if increments]
+            summands = ((Summand(flow.hamiltonian, steps, steps), colours),)
+            merged = merged_colours(motions, self.colouring.count)
+            site_flows.append(CellFlow(flow.hamiltonian, flow.increment, flow.manner, merged, summands))
+        return site_flows
 
 
 class SiteFields:
-    """Covector and vector fields at sites, weighted at open ends; ``gathered`` is what bonds or pairs add to slopes."""
+    """Covector and vector fields at sites, with weights that vanish beyond open ends.
+
+    ``gathered`` has the symbols of the sums over bonds or pairs in the slopes.
+    """
 
     def __init__(self, cell: Cell, gathered: Mapping[str, Expression] | None = None) -> None:
         self.cell, self.gathered = cell, gathered or {}
@@ -494,27 +504,27 @@ class SiteFields:
         self._every = [(s, 0) for s in summands_of(cell)]
 
     def slope(self, field: str, shift: Offset = ()) -> Expression:
-        """∂H/∂field at the site ``shift`` away."""
+        """Return ∂H/∂field at the site ``shift`` away."""
         return self._search.force(self._every, field, 0, shift) + self.gathered.get(field, ZERO)
 
     def push(self, field: str, shift: Offset = ()) -> Expression:
-        """ζ of the forces, the damping with it, for a field at the site ``shift`` away."""
-        acting = self.cell.forces
-        found = self._shifted(acting.covector.get(field, ZERO), shift)
-        if acting.damping is None:
-            return found
-        return found + self.damping(shift) * self.tangent(field, self.slope, shift)
+        """Return ζ of the forces, including the damping, for a field at the site ``shift`` away."""
+        cell_forces = self.cell.forces
+        covector = self._shifted(cell_forces.covector.get(field, ZERO), shift)
+        if cell_forces.damping is None:
+            return covector
+        return covector + self.damping(shift) * self.tangent(field, self.slope, shift)
 
     def damping(self, shift: Offset = ()) -> Expression:
-        """λ at the site ``shift`` away, 0 without damping."""
+        """Return λ at the site ``shift`` away, 0 without damping."""
         return self._shifted(self.cell.forces.damping or ZERO, shift)
 
     def impulse(self, field: str) -> Expression:
-        """The vector force on a field."""
+        """Return the vector force on a field."""
         return self._shifted(self.cell.forces.vector.get(field, ZERO))
 
     def noise(self, field: str, shift: Offset = ()) -> Expression:
-        """Σ ΔW σ ∂g/∂field at the site ``shift`` away, of the increments there."""
+        """Return Σ ΔW σ ∂g/∂field at the site ``shift`` away, with the increments of that site."""
         slopes = [
             symbol(dw) * s.amplitude * gradient(s.hamiltonian, [field])[0]
             for dw, s in zip(self.cell.increments, self.cell.noise.values(), strict=True)
@@ -522,27 +532,30 @@ class SiteFields:
         return self._shifted(total(slopes), shift)
 
     def tangent(self, field: str, covector: Callable[[str, Offset], Expression], shift: Offset = ()) -> Expression:
-        """π of a covector field, for a field at the site ``shift`` away."""
-        found = []
+        """Return π of a covector field, for a field at the site ``shift`` away."""
+        terms = []
         for (f, other), entry in self.cell.bracket.items():
             if f == field:
                 g, d = self.cell.place(other)
-                there = plus(shift or self.cell.origin, d) if self.cell.relation == GRID else shift
-                found.append((self.cell.shifted(entry, shift) if shift else entry) * covector(g, there))
-        return total(found)
+                other_site = plus(shift or self.cell.origin, d) if self.cell.relation == GRID else shift
+                terms.append((self.cell.shifted(entry, shift) if shift else entry) * covector(g, other_site))
+        return total(terms)
 
     def _shifted(self, e: Expression, shift: Offset = ()) -> Expression:
-        """What is at a site, at another; terms that reach beyond open ends are left out."""
+        """Return an expression at the site ``shift`` away, without terms that reach beyond open ends."""
         cell = self.cell
         if cell.relation != GRID or e.is_zero:
             return e
-        at = [int(o) for o in shift or cell.origin]
+        position = [int(o) for o in shift or cell.origin]
         terms = [(t, cell.extent(t)) for t in cell.additive_terms(e)]
-        return total(present(cell, low, high, at) * cell.shifted(t, tuple(at)) for t, (low, high) in terms)
+        return total(present(cell, low, high, position) * cell.shifted(t, tuple(position)) for t, (low, high) in terms)
 
 
 def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expression, ...]:
-    """ẋ of all fields at a site, but for noise, weighted at open ends; ``gathered`` as `SiteFields` has it."""
+    """Return ẋ of all fields at a site, without noise, with weights at open ends.
+
+    ``gathered`` is as in `SiteFields`.
+    """
     at = SiteFields(cell, gathered)
     if not cell.forces:
         return tuple(at.tangent(f, at.slope) for f in cell.fields)
@@ -550,7 +563,10 @@ def field_at_site(cell: Cell, gathered: Mapping[str, Expression]) -> tuple[Expre
 
 
 def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequence[int]) -> Expression:
-    """1 where a term that reaches from ``low`` to ``high``, both moved by an offset, is on the lattice, else 0."""
+    """Return the weight of a term at a site: 1 if all its sites are on the lattice, else 0.
+
+    The term reaches from ``low`` to ``high``, both shifted by ``offset``.
+    """
     reach = [
         (a + o, b + o) if boundary != PERIODIC else (0, 0)
         for a, b, o, boundary in zip(low, high, offset, cell.boundary, strict=True)
@@ -560,13 +576,13 @@ def present(cell: Cell, low: Sequence[int], high: Sequence[int], offset: Sequenc
     return symbol(Symbol(PRESENT, *(v for pair in reach for v in pair)))
 
 
-def _back(offset: Offset) -> tuple[int, ...]:
-    """The way back from an offset of a grid; at one site otherwise."""
+def _opposite(offset: Offset) -> tuple[int, ...]:
+    """Return the opposite of an offset of a grid; () at a single site."""
     return tuple(-o for o in offset if isinstance(o, int))
 
 
-def own_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
-    """A ring with these coordinates, in which all else is constant, and no bracket."""
+def bracketless_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> Ring:
+    """Return a ring with these coordinates, in which all other symbols are constant, and no bracket."""
     roots = list(expressions)
     others = [n for n in symbols_of(*roots) if n not in coordinates and n != TIME]
     tower = Tower([*coordinates, *others, TIME], roots, coordinates)
@@ -574,7 +590,7 @@ def own_ring(coordinates: Sequence[str], expressions: Iterable[Expression]) -> R
 
 
 def site_ring(cell: Cell, expressions: Sequence[Expression], symbols: Sequence[str] = ()) -> Ring:
-    """The ring of one site with its own bracket."""
+    """Return the ring of one site with its bracket."""
     n = cell.fields
     brackets = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in n) for f in n)
     roots = [*expressions, *(e for row in brackets for e in row)]

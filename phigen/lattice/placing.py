@@ -1,4 +1,4 @@
-"""Places in a plane for the sites of a graph: as far from one another as there are bonds between them, nearly."""
+"""Places in a plane for the sites of a graph: distances are close to the numbers of bonds between sites."""
 
 from __future__ import annotations
 
@@ -7,47 +7,49 @@ from numpy.typing import NDArray
 
 from phigen.symbolic.arrays import Floats
 
-#: Most sites that are placed, and rounds in which they move.
-MOST_PLACED, ROUNDS = 600, 60
+#: Most sites that are placed: time and memory grow with the square of their number, and 600 take some seconds.
+MOST_PLACED = 600
+#: Iterations of the majorisation; each decreases the stress.
+ROUNDS = 60
 
 
 def placed(bonds: NDArray[np.int64], sites: int) -> Floats | None:
-    """Places (sites, 2) in a square from 0 to 1, or None of more than `MOST_PLACED` sites.
+    """Return places (sites, 2) in a square from 0 to 1, or None for more than `MOST_PLACED` sites.
 
-    They begin at the classical scaling of distances along ``bonds`` (bonds, 2), by the two largest eigenvalues, and
-    move by the majorisation of the stress, of which J. de Leeuw, Applications of convex analysis to multidimensional
-    scaling (1977). The same for the same bonds.
+    The start is the classical scaling of distances along ``bonds`` (bonds, 2), by the two largest eigenvalues. Then
+    follow iterations of the majorisation of the stress: J. de Leeuw, Applications of convex analysis to
+    multidimensional scaling (1977). The same bonds give the same places.
     """
     if sites > MOST_PLACED:
         return None
-    apart = _distances(bonds, sites)
-    centred = apart**2 - (apart**2).mean(axis=0)
+    distances = _distances(bonds, sites)
+    centred = distances**2 - (distances**2).mean(axis=0)
     values, vectors = np.linalg.eigh(-(centred - centred.mean(axis=1, keepdims=True)) / 2)
-    found = np.zeros((sites, 2))
+    places = np.zeros((sites, 2))
     for k in range(min(2, sites)):
         axis = vectors[:, -1 - k] * np.sqrt(max(values[-1 - k], 0.0))
-        found[:, k] = axis * (np.sign(axis[np.argmax(np.abs(axis))]) or 1.0)
-    found += 1e-3 * np.random.default_rng(0).normal(size=found.shape)  # so that none lie on one another
+        places[:, k] = axis * (np.sign(axis[np.argmax(np.abs(axis))]) or 1.0)
+    places += 1e-3 * np.random.default_rng(0).normal(size=places.shape)  # so that no two sites coincide
     for _ in range(ROUNDS):
-        now = np.linalg.norm(found[:, None] - found[None], axis=2)
-        pull = apart / np.where(now > 0, now, 1.0)
-        found = (pull.sum(axis=1)[:, None] * found - pull @ found) / sites
-    found -= found.min(axis=0)
-    found /= found.max() or 1.0
-    return np.asarray(found + (1.0 - found.max(axis=0)) / 2)
+        lengths = np.linalg.norm(places[:, None] - places[None], axis=2)
+        weights = distances / np.where(lengths > 0, lengths, 1.0)
+        places = (weights.sum(axis=1)[:, None] * places - weights @ places) / sites
+    places -= places.min(axis=0)
+    places /= places.max() or 1.0
+    return np.asarray(places + (1.0 - places.max(axis=0)) / 2)
 
 
 def _distances(bonds: NDArray[np.int64], sites: int) -> Floats:
-    """How many bonds are between sites (sites, sites); those without a way are farther than all others."""
+    """Return the numbers of bonds between sites (sites, sites); unconnected sites are farther apart than all others."""
     joined = np.eye(sites, dtype=np.float32)
     for a, b in bonds:
         joined[a, b] = joined[b, a] = 1.0
-    reached, found = np.eye(sites, dtype=np.float32), np.full((sites, sites), np.inf)
-    np.fill_diagonal(found, 0.0)
+    reached, distances = np.eye(sites, dtype=np.float32), np.full((sites, sites), np.inf)
+    np.fill_diagonal(distances, 0.0)
     for steps in range(1, sites):
         further = np.minimum(reached @ joined, 1.0)
         if (further == reached).all():
             break
-        found[(further > 0) & (reached == 0)], reached = steps, further
-    known = found[np.isfinite(found)].max()
-    return np.where(np.isfinite(found), found, 1.2 * known + 1.0)
+        distances[(further > 0) & (reached == 0)], reached = steps, further
+    largest = distances[np.isfinite(distances)].max()
+    return np.where(np.isfinite(distances), distances, 1.2 * largest + 1.0)

@@ -1,12 +1,12 @@
 """Statements about lattices of every size at once, by translation: brackets, Jacobi identity, Casimirs, invariants.
 
-On a grid everything is decided on the infinite lattice. A periodic box is its quotient: brackets, sums and telescoping
-densities go over to it, where what meets at a site is added. At open ends the functions of the sites inside are closed
-under brackets, so the Jacobi identity and Casimirs of single sites go over; sums are looked at on a box so large that
-no term reaches both ends.
+On a grid the statements are decided on the infinite lattice. A periodic box is its quotient: brackets, sums and
+telescoping densities descend to the box. At open ends the functions of the sites inside are closed under brackets, so
+the Jacobi identity and Casimirs of single sites remain true; sums are examined on a box so large that no term reaches
+both ends.
 
-On a graph all statements are quadratic in the bonds at most, so they hold for every graph if they hold for those of one
-and of two bonds; for pairs, if they hold for one and for two sites.
+On a graph the statements are at most quadratic in the bonds, so they hold for every graph if they hold for all graphs
+of one or two bonds; for pairs, if they hold for one and for two sites.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from phigen.symbolic.expression import ZERO, Expression, gradient, number, subst
 from phigen.symbolic.neighbours import Offset, minus, plus, steps
 from phigen.symbolic.verdict import PROVED, REFUTED, UNDECIDED, Statement, decide_zero
 
-#: A coordinate of the infinite lattice: a field and where.
+#: A coordinate of the infinite lattice: a field and its offset.
 Point = tuple[str, tuple[int, ...]]
 Labelled = tuple[str, Expression]
 
-#: Graphs that stand for all: those of one bond, and of two that meet.
+#: Graphs that represent all graphs: one bond, and two bonds that meet.
 GRAPHS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((0, 1),),
     ((0, 1), (1, 2)),
@@ -36,36 +36,36 @@ GRAPHS: tuple[tuple[tuple[int, int], ...], ...] = (
     ((0, 1), (0, 1)),
     ((0, 1), (1, 0)),
 )
-#: Coordinates of a box with open ends that are looked at.
-_LARGEST = 160
+#: Most coordinates of a box with open ends; the Jacobi identity has a term for each triple of them.
+_MAX_BOX_COORDINATES = 160
 JACOBI = "Jacobi identity"
 
 
 def tensor(cell: Cell) -> tuple[Statement, ...]:
-    """π is skew, and satisfies the Jacobi identity, which nothing is said of if it is not skew."""
+    """Return that π is skew and satisfies the Jacobi identity; the latter is left out if π is not skew."""
     if cell.relation != GRID:
         return _tensor_of_graphs(cell)
     skew = _decided(cell, "π is skew", _skewness(cell), "for all sizes")
     if skew.verdict == REFUTED:
         return (skew,)
     residuals = list(_jacobi(cell))
-    count = f"{len(residuals)} triple{'s' * (len(residuals) != 1)} up to translation, " if residuals else ""
-    jacobi = _decided(cell, JACOBI, residuals, f"{count}for all sizes")
+    triples = f"{len(residuals)} triple{'s' * (len(residuals) != 1)} up to translation, " if residuals else ""
+    jacobi = _decided(cell, JACOBI, residuals, f"{triples}for all sizes")
     if jacobi.verdict == REFUTED or OPEN not in cell.boundary or _closed(cell):
         return skew, jacobi
     return skew, jacobi, _at_ends(cell, f"{JACOBI} at open ends", jacobi_identity)
 
 
 def casimirs(cell: Cell) -> Iterator[Statement]:
-    """π∇C = 0 for each Casimir: for that of every site, for the sum, or for the product."""
+    """Yield π∇C = 0 for each Casimir: for the Casimirs of every site, for the sum, or for the product."""
     for name, (density, kind) in cell.casimirs.items():
         title = f"{name} is a Casimir"
         where = {"sites": "at every site", "sum": "the sum over all sites", "product": "the product of all sites"}[kind]
         if cell.relation != GRID:
             yield _worst(title, f"{where}, for every {_any(cell)}", _casimir_of_graphs(cell, name))
             continue
-        labelled = _of_site(cell, name, density) if kind == "sites" else _of_sum(cell, name, density, kind == "product")
-        statement = _decided(cell, title, labelled, f"{where}, for all sizes")
+        terms = _of_site(cell, name, density) if kind == "sites" else _of_sum(cell, name, density, kind == "product")
+        statement = _decided(cell, title, terms, f"{where}, for all sizes")
         if statement.verdict != REFUTED and OPEN in cell.boundary and (kind != "sites" or not _closed(cell)):
             ends = _at_ends(cell, title, partial(_casimirs_of_box, name), where)
             statement = ends if ends.verdict != PROVED else statement
@@ -73,7 +73,7 @@ def casimirs(cell: Cell) -> Iterator[Statement]:
 
 
 def invariants(cell: Cell) -> Iterator[Statement]:
-    """{F, H} = 0 for each further first integral, a sum of densities: {F, H} is one whose terms telescope."""
+    """Yield {F, H} = 0 for each further first integral F, a sum of densities: the terms of {F, H} telescope."""
     for name, density in cell.invariants.items():
         title = f"{name} is invariant"
         if cell.relation != GRID:
@@ -81,9 +81,9 @@ def invariants(cell: Cell) -> Iterator[Statement]:
             continue
         rate = rate_of(cell, density)
         label = f"{{{name}, H}}" + f" + ∂{name}/∂{cell.time}" * (cell.time in symbols_of(density))
-        labelled = [(f"δ({label})/δ{n}" if "+" in label else f"δ{label}/δ{n}", e) for n, e in euler(cell, rate).items()]
-        labelled.append((f"{label} where all sites are alike", _uniform(cell, rate)))
-        statement = _decided(cell, title, labelled, f"{label} telescopes, for all sizes")
+        terms = [(f"δ({label})/δ{n}" if "+" in label else f"δ{label}/δ{n}", e) for n, e in euler(cell, rate).items()]
+        terms.append((f"{label} where all sites are alike", _uniform(cell, rate)))
+        statement = _decided(cell, title, terms, f"{label} telescopes, for all sizes")
         if statement.verdict != REFUTED and OPEN in cell.boundary:
             ends = _at_ends(cell, title, partial(_invariant_of_box, name))
             statement = ends if ends.verdict != PROVED else statement
@@ -94,34 +94,34 @@ def invariants(cell: Cell) -> Iterator[Statement]:
 
 
 def euler(cell: Cell, density: Expression) -> dict[str, Expression]:
-    """The discrete Euler operator: the derivatives of the sum of a density by what a site has.
+    """Return the discrete Euler operator: the derivatives of the sum of a density by the symbols of a site.
 
-    All are 0 if and only if the density is a constant and a difference of densities of neighbouring sites.
+    All are 0 if and only if the density is a constant plus a difference of densities of neighbouring sites.
     """
-    found: dict[str, list[Expression]] = {n: [] for n in cell.neighbours.names}
+    slopes_by_symbol: dict[str, list[Expression]] = {n: [] for n in cell.neighbours.names}
     places = cell.places(density)
     for (base, offset), slope in zip(places.values(), gradient(density, list(places)), strict=True):
-        found[base].append(cell.shifted(slope, minus(offset)))
-    return {n: total(listed) for n, listed in found.items()}
+        slopes_by_symbol[base].append(cell.shifted(slope, minus(offset)))
+    return {n: total(listed) for n, listed in slopes_by_symbol.items()}
 
 
 def rate_of(cell: Cell, density: Expression) -> Expression:
-    """A density of the time derivative of the sum of a density."""
+    """Return a density of the time derivative of the sum of a density."""
     slopes, rates = euler(cell, density), vector_field(cell)
-    moved = total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
-    return moved + total(gradient(density, cell.times))
+    along_motion = total(slopes[f] * rates[f] for f in cell.fields if not (slopes[f].is_zero or rates[f].is_zero))
+    return along_motion + total(gradient(density, cell.times))
 
 
 def _uniform(cell: Cell, density: Expression) -> Expression:
-    """A density where all sites are alike."""
-    alike = {name: symbol(base) for name, (base, _) in cell.places(density).items()}
-    return substitute([density], alike)[0]
+    """Return a density of a state that is the same at all sites."""
+    same_symbols = {name: symbol(base) for name, (base, _) in cell.places(density).items()}
+    return substitute([density], same_symbols)[0]
 
 
 def _decided(cell: Cell, name: str, residuals: Iterable[Labelled], detail: str = "") -> Statement:
-    """`decide_zero`, where a positive parameter is so at every site."""
-    listed, own = list(residuals), {p.name for p in cell.parameters if p.positive}
-    positive = [n for n in symbols_of(*(e for _, e in listed)) if n.partition("[")[0] in own]
+    """Return `decide_zero` of the residuals; a positive parameter at sites is positive at every site."""
+    listed, positive_parameters = list(residuals), {p.name for p in cell.parameters if p.positive}
+    positive = [n for n in symbols_of(*(e for _, e in listed)) if n.partition("[")[0] in positive_parameters]
     return decide_zero(name, listed, positive, detail)
 
 
@@ -136,18 +136,18 @@ def _skewness(cell: Cell) -> Iterator[Labelled]:
 
 
 def _partners(cell: Cell) -> dict[str, list[tuple[Point, Expression]]]:
-    """By field, what has a bracket with it at the origin."""
-    found: dict[str, list[tuple[Point, Expression]]] = {f: [] for f in cell.fields}
+    """Return by field the coordinates that have a bracket with the field at the origin, with the brackets."""
+    partners: dict[str, list[tuple[Point, Expression]]] = {f: [] for f in cell.fields}
     for (f, other), entry in cell.bracket.items():
         g, offset = cell.place(other)
-        found[f].append(((g, steps(offset)), entry))
-    return found
+        partners[f].append(((g, steps(offset)), entry))
+    return partners
 
 
 def _jacobi(cell: Cell) -> Iterator[Labelled]:
-    """The cyclic sums of the triples that meet, one of each class of translations.
+    """Yield the cyclic sums of the triples of coordinates with brackets, one of each class of translations.
 
-    From all ordered pairs of coordinates, so each sum is twice that of the identity.
+    The terms come from all ordered pairs of coordinates, so each sum is twice that of the identity.
     """
     partners, sums = _partners(cell), dict[tuple[Point, ...], list[Expression]]()
     for f, listed in partners.items():
@@ -159,24 +159,24 @@ def _jacobi(cell: Cell) -> Iterator[Labelled]:
                     third = (h, plus(where, offset))
                     if third not in (first, second):
                         term = slope * cell.shifted(other, where)
-                        triple, sign, back = _canonical((first, second, third))
-                        sums.setdefault(triple, []).append(number(sign) * cell.shifted(term, back))
+                        triple, sign, translation = _canonical((first, second, third))
+                        sums.setdefault(triple, []).append(number(sign) * cell.shifted(term, translation))
     for triple, terms in sorted(sums.items(), key=lambda item: item[0]):
         label = ", ".join(cell.at(name, offset) for name, offset in triple)
         yield f"({label})", total(terms)
 
 
 def _canonical(triple: tuple[Point, Point, Point]) -> tuple[tuple[Point, ...], int, Offset]:
-    """The triple in order, its first at the origin; the sign of the permutation; the translation."""
+    """Return the sorted triple with its first point at the origin, the sign of the permutation, the translation."""
     order = min(permutations(range(3)), key=lambda p: [triple[k] for k in p])
     sign = 1 if order in ((0, 1, 2), (1, 2, 0), (2, 0, 1)) else -1
     ordered = [triple[k] for k in order]
-    back = minus(ordered[0][1])
-    return tuple((name, plus(offset, back)) for name, offset in ordered), sign, back
+    translation = minus(ordered[0][1])
+    return tuple((name, plus(offset, translation)) for name, offset in ordered), sign, translation
 
 
 def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
-    """{C, f} for all f that have a bracket with some argument of C."""
+    """Yield {C, f} for all f that have a bracket with some argument of C."""
     named = {n: p for n, p in cell.places(density).items() if p[0] in cell.fields}
     partners, sums = _partners(cell), dict[Point, list[Expression]]()
     for (base, where), slope in zip(named.values(), gradient(density, list(named)), strict=True):
@@ -187,7 +187,7 @@ def _of_site(cell: Cell, name: str, density: Expression) -> Iterator[Labelled]:
 
 
 def _of_sum(cell: Cell, name: str, density: Expression, product: bool) -> Iterator[Labelled]:
-    """{f, Σ C}, or {f, Π C}/Π C, for all f of a site."""
+    """Yield {f, Σ C}, or {f, Π C}/Π C, for all f of a site."""
     slopes = _logarithmic(cell, density) if product else euler(cell, density)
     for f, listed in _partners(cell).items():
         terms = [entry * cell.shifted(slopes[g], offset) for (g, offset), entry in listed]
@@ -195,18 +195,18 @@ def _of_sum(cell: Cell, name: str, density: Expression, product: bool) -> Iterat
 
 
 def _logarithmic(cell: Cell, density: Expression) -> dict[str, Expression]:
-    found: dict[str, list[Expression]] = {n: [] for n in cell.neighbours.names}
+    slopes_by_symbol: dict[str, list[Expression]] = {n: [] for n in cell.neighbours.names}
     places = cell.places(density)
     for (base, offset), slope in zip(places.values(), gradient(density, list(places)), strict=True):
-        found[base].append(cell.shifted(slope / density, minus(offset)))
-    return {n: total(listed) for n, listed in found.items()}
+        slopes_by_symbol[base].append(cell.shifted(slope / density, minus(offset)))
+    return {n: total(listed) for n, listed in slopes_by_symbol.items()}
 
 
 # --- open ends
 
 
 def _closed(cell: Cell) -> bool:
-    """Whether a bracket depends on nothing outside the box of its two sites."""
+    """Whether every bracket depends only on the box that its two sites span."""
     for (_, other), entry in cell.bracket.items():
         offset = steps(cell.place(other)[1])
         low, high = cell.extent(entry)
@@ -216,7 +216,7 @@ def _closed(cell: Cell) -> bool:
 
 
 def _box(cell: Cell) -> tuple[int, ...]:
-    """Sizes at which nothing reaches both ends."""
+    """Return sizes at which no term reaches both ends."""
     densities = [*cell.terms, *(d for d, _ in cell.casimirs.values()), *cell.invariants.values()]
     extents = [cell.extent(t) for d in densities for t in cell.additive_terms(d)]
     widths = [max((high[k] - low[k] for low, high in extents), default=0) for k in range(len(cell.axes))]
@@ -224,14 +224,14 @@ def _box(cell: Cell) -> tuple[int, ...]:
 
 
 def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], where: str = "") -> Statement:
-    """A statement on a box with open ends, and in one dimension on all that are smaller."""
+    """Return a statement on a box with open ends; in one dimension, on all smaller boxes as well."""
     sizes = _box(cell)
     count = len(cell.fields)
     for size in sizes:
         count *= size
-    if count > _LARGEST:
-        more = f"{where}, " if where else ""
-        return Statement(name, UNDECIDED, f"{more}proved away from open ends; a box with ends is too large")
+    if count > _MAX_BOX_COORDINATES:
+        prefix = f"{where}, " if where else ""
+        return Statement(name, UNDECIDED, f"{prefix}proved away from open ends; a box with ends is too large")
     least = 1 + max(*cell.hamiltonian_reach, *cell.poisson_reach)
     boxes = [(n,) for n in range(least, sizes[0] + 1)] if len(sizes) == 1 else [sizes]
     for box in boxes:
@@ -245,8 +245,8 @@ def _at_ends(cell: Cell, name: str, examine: Callable[[System], Statement], wher
 
 
 def _casimirs_of_box(name: str, system: System) -> Statement:
-    own = [n for n in system.declared if n == name or n.startswith(f"{name}_")]
-    listed = [(n, system.casimirs[n]) for n in own]
+    names = [n for n in system.declared if n == name or n.startswith(f"{name}_")]
+    listed = [(n, system.casimirs[n]) for n in names]
     residuals = [
         (f"{{{c}, {n}}}", rate)
         for n, casimir in listed
@@ -274,14 +274,14 @@ def _any(cell: Cell) -> str:
 
 
 def _small(cell: Cell) -> Iterator[tuple[str, System]]:
-    """Systems that stand for all, each with its name."""
+    """Yield the systems that represent all graphs or numbers of sites, each with its name."""
     graphs: Sequence[tuple[int, Sequence[tuple[int, int]]]] = [(1, ()), (2, ())]
     if cell.relation == "graph":
         graphs = [(1, ()), *((1 + max(max(b) for b in bonds), bonds) for bonds in GRAPHS)]
     for sites, bonds in graphs:
         shown = ", ".join(f"{a}–{b}" for a, b in bonds)
-        what = f"the graph {shown}" if bonds else f"{sites} site{'s' * (sites > 1)}"
-        yield what, system_from_spec(expand(cell, (sites,), bonds).spec())
+        description = f"the graph {shown}" if bonds else f"{sites} site{'s' * (sites > 1)}"
+        yield description, system_from_spec(expand(cell, (sites,), bonds).spec())
 
 
 def _tensor_of_graphs(cell: Cell) -> tuple[Statement, ...]:
@@ -291,9 +291,9 @@ def _tensor_of_graphs(cell: Cell) -> tuple[Statement, ...]:
     skew = _worst("π is skew", every, ((what, skew_symmetry(system)) for what, system in _small(cell)))
     if skew.verdict == REFUTED:
         return (skew,)
-    found = ((what, jacobi_identity(system)) for what, system in _small(cell))
+    statements = ((what, jacobi_identity(system)) for what, system in _small(cell))
     detail = f"{every}, from those of at most two bonds" if cell.relation == "graph" else every
-    return skew, _worst(JACOBI, detail, found)
+    return skew, _worst(JACOBI, detail, statements)
 
 
 def _casimir_of_graphs(cell: Cell, name: str) -> Iterator[tuple[str, Statement]]:
@@ -307,21 +307,21 @@ def _invariant_of_graphs(cell: Cell, name: str) -> Iterator[tuple[str, Statement
 
 
 def pair_symmetry(cell: Cell) -> Iterator[Statement]:
-    """The density of a pair does not depend on which of the two is a."""
+    """Yield that the density of a pair is symmetric under exchange of its sites."""
     if not cell.pair_hamiltonian.is_zero:
         places = cell.places(cell.pair_hamiltonian)
         other = {"a": "b", "b": "a"}
-        turned = {n: symbol(cell.at(base, (other[str(end[0])],))) for n, (base, end) in places.items()}
-        difference = cell.pair_hamiltonian - substitute([cell.pair_hamiltonian], turned)[0]
+        exchanged = {n: symbol(cell.at(base, (other[str(end[0])],))) for n, (base, end) in places.items()}
+        difference = cell.pair_hamiltonian - substitute([cell.pair_hamiltonian], exchanged)[0]
         yield _decided(cell, "the density of a pair is symmetric", [("", difference)])
 
 
-def _worst(name: str, detail: str, found: Iterator[tuple[str, Statement]]) -> Statement:
-    """One statement for several: refuted where one is, proved where all are."""
-    weak: Statement | None = None
-    for what, s in found:
+def _worst(name: str, detail: str, statements: Iterator[tuple[str, Statement]]) -> Statement:
+    """Return one statement for several: refuted if one is, proved if all are."""
+    unproved: Statement | None = None
+    for what, s in statements:
         if s.verdict == REFUTED:
             return Statement(name, REFUTED, f"{what}: {s.detail}", s.residual)
-        if s.verdict != PROVED and (weak is None or s.verdict == UNDECIDED):
-            weak = Statement(name, s.verdict, f"{what}: {s.detail}", s.residual)
-    return weak or Statement(name, PROVED, detail)
+        if s.verdict != PROVED and (unproved is None or s.verdict == UNDECIDED):
+            unproved = Statement(name, s.verdict, f"{what}: {s.detail}", s.residual)
+    return unproved or Statement(name, PROVED, detail)

@@ -1,9 +1,9 @@
-"""Bi-realisations on a lattice: α and β move each site by covectors p on its neighbourhood.
+"""Bi-realisations on a lattice: α and β at a site depend on covectors p on its neighbourhood.
 
-Where π is that of each site, so are α and β: any bi-realisation in closed form of the system of one site serves. Where
-π couples neighbours, it has to be constant in coordinates φ(f) of each field f, where φ is f or log f. With p' the
-covector in those coordinates and D = π' p', which is a stencil, α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D): constant π,
-log-canonical π, and those of Toda, all at once.
+Where π is local, so are α and β: any bi-realisation in closed form of the system of one site serves. Where π couples
+neighbours, it must be constant in coordinates φ(f) of each field f, with φ(f) = f or log f. With p' the covector in
+these coordinates and D = π'p', which is a stencil, α = φ⁻¹(φ − ½D) and β = φ⁻¹(φ + ½D). This covers constant π,
+log-canonical π, and the brackets of the Toda lattice.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from phigen.symbolic.expression import (
 )
 from phigen.symbolic.symbols import Symbol, initial, momentum
 
-#: Of brackets that couple neighbours.
+#: The kind of a bi-realisation for brackets that couple neighbours.
 KIND = "constant in logarithms"
 
 
@@ -44,8 +44,8 @@ class CellRealisation:
     """α and β at a site, symmetric and exact.
 
     ``displacement`` is α − x and ``increment`` β − α, for each field, in the symbols of the fields at offsets and of
-    their covectors (``momentum`` of those symbols). ``site`` is the system of one site and its bi-realisation, where π
-    is local, and ``logarithmic`` has the fields f with φ = log f where it is not.
+    their covectors (`momentum` of these symbols). Where π is local, ``site`` has the system of one site and its
+    bi-realisation; elsewhere ``logarithmic`` has the fields f with φ = log f.
     """
 
     kind: str
@@ -57,7 +57,7 @@ class CellRealisation:
 
     @cached_property
     def middle(self) -> dict[str, Expression]:
-        """y of α(y, p) = x at a site, from x there (`initial`): without y on the right where α is linear in y."""
+        """y of α(y, p) = x at a site, from x there (`initial`); an explicit formula where α is affine in y."""
         fields, values = list(self.displacement), list(self.displacement.values())
         slopes = [gradient(e, fields) for e in values]
         start = [symbol(initial(f)) for f in fields]
@@ -73,7 +73,7 @@ class CellRealisation:
 
 
 def realise_cell(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) -> CellRealisation:
-    """The bi-realisation of a grid or of pairs. Raises `SpecError` where none in closed form is known."""
+    """Return the bi-realisation of a grid or of pairs. Raises `SpecError` where none in closed form is known."""
     return _of_site(cell, form, choice) if cell.is_local else _of_neighbours(cell, choice)
 
 
@@ -81,26 +81,26 @@ def _of_site(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) 
     rows = tuple(tuple(cell.bracket.get((f, g), ZERO) for g in cell.fields) for f in cell.fields)
     energy = total(symbol(f) for f in cell.fields)  # α and β do not depend on H
     system = build_system(cell.name, cell.fields, cell.parameters, form or MatrixForm(rows), energy)
-    found = realise(system, choice)
-    if found.path or not found.exact:
-        what = "follows paths numerically" if found.path else "is approximate"
-        raise refuse(f"scheme series: on lattices α and β are in closed form; {found.kind} {what}")
-    if not found.symmetric:
-        raise refuse(f"scheme series: on lattices the bi-realisation is symmetric; {found.kind} is not")
+    realisation = realise(system, choice)
+    if realisation.path or not realisation.exact:
+        property_ = "follows paths numerically" if realisation.path else "is approximate"
+        raise refuse(f"scheme series: on lattices α and β are in closed form; {realisation.kind} {property_}")
+    if not realisation.symmetric:
+        raise refuse(f"scheme series: on lattices the bi-realisation is symmetric; {realisation.kind} is not")
     displacement, increment = (
-        dict(zip(cell.fields, values, strict=True)) for values in (found.displacement, found.increment)
+        dict(zip(cell.fields, values, strict=True)) for values in (realisation.displacement, realisation.increment)
     )
-    return CellRealisation(found.kind, displacement, increment, found.explanation, (system, found))
+    return CellRealisation(realisation.kind, displacement, increment, realisation.explanation, (system, realisation))
 
 
 def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
     if choice.kind not in ("auto", "constant", "log-canonical"):
         raise refuse(f"birealisation {choice.kind} is not for brackets that couple neighbours", "birealisation: auto")
-    found = _logarithms(cell)
-    if found is None:
+    coordinates = _logarithms(cell)
+    if coordinates is None:
         hint = "brackets that are constant, or become so for log f in place of some fields f"
         raise refuse("scheme series: no bi-realisation is known for these brackets, which couple neighbours", hint)
-    logarithmic, constants = found
+    logarithmic, constants = coordinates
     half, displacement, increment = number(Fraction(1, 2)), {}, {}
     for f in cell.fields:
         terms = [
@@ -108,20 +108,20 @@ def _of_neighbours(cell: Cell, choice: BirealisationChoice) -> CellRealisation:
             for (g, other), constant in constants.items()
             if g == f
         ]
-        moved = total(terms)
+        stencil_sum = total(terms)
         if f in logarithmic:
-            growth = call("expm1", -(half * moved))
+            growth = call("expm1", -(half * stencil_sum))
             displacement[f] = symbol(f) * growth
             increment[f] = -(symbol(f) * (growth * (1 + 1 / (1 + growth))))
         else:
-            displacement[f], increment[f] = -(half * moved), moved
+            displacement[f], increment[f] = -(half * stencil_sum), stencil_sum
     named = ", ".join(f"log {f}" if f in logarithmic else f for f in cell.fields)
     kind = KIND if logarithmic else "constant"
     return CellRealisation(kind, displacement, increment, f"π is constant in {named}", None, logarithmic)
 
 
 def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expression]] | None:
-    """The fewest fields whose logarithms make π constant, and π in these coordinates; None if there are none."""
+    """Return the fewest fields whose logarithms make π constant, and π in these coordinates, or None."""
     for count in range(len(cell.fields) + 1):
         for chosen in itertools.combinations(cell.fields, count):
             constants = {pair: _constant(cell, *pair, chosen) for pair in cell.bracket}
@@ -132,10 +132,10 @@ def _logarithms(cell: Cell) -> tuple[frozenset[str], dict[tuple[str, str], Expre
 
 
 def _constant(cell: Cell, f: str, other: str, logarithmic: Sequence[str]) -> Expression | None:
-    """The bracket of two fields in coordinates, some of which are logarithms; None if it is not constant."""
+    """Return the bracket of two fields in coordinates that may be logarithms, or None if it is not constant."""
     entry = cell.bracket[f, other]
     fields = [n for n, (base, _) in cell.places(entry, symbol(f), symbol(other)).items() if base in cell.fields]
     terms = coordinate_terms(fields, [entry])
     factors = {n for n in (f, other) if cell.place(n)[0] in logarithmic}
-    wanted = tuple(int(n in factors) for n in fields)
-    return terms[0][wanted] if terms and set(terms[0]) == {wanted} else None
+    exponents = tuple(int(n in factors) for n in fields)
+    return terms[0][exponents] if terms and set(terms[0]) == {exponents} else None

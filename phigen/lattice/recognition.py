@@ -1,8 +1,8 @@
-"""Ordinary systems that are lattices typed out: found by the names of their coordinates, and proved to be the same.
+"""Recognition of lattices among ordinary systems whose specs list the coordinates of all sites.
 
-Numbers in names are taken for sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. The terms of H are moved to one
-site, and where each kind of them is at every site, they make a density; brackets likewise. What is guessed from values
-at one point is then expanded and proved to be the system that was given.
+Numbers in names are read as sites: ``x1 … x16``, ``q_0_0 … q_7_7``, ``S3_x``. The terms of H are translated to one
+site; kinds of terms that occur at every site form a density, and brackets likewise. Terms are compared by their
+values at one point, so the lattice is then expanded and proved to be the original system.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from phigen.symbolic.neighbours import Neighbours
 from phigen.symbolic.numeric import DomainError, evaluate
 from phigen.symbolic.verdict import decide_zero
 
-#: Axes have at least so many sites: fewer may look alike by chance.
-LEAST = 4
+#: Least number of sites along an axis; fewer sites may be identical by chance.
+MIN_SITES_PER_AXIS = 4
 
 Site = tuple[int, ...]
 Terms = list[tuple[Site, Expression]]
 
 
-class _OtherError(Exception):
-    """It is no lattice, or not one by these names."""
+class _NoLatticeError(Exception):
+    """The system is no lattice, or not by these names."""
 
 
 @dataclass(frozen=True)
-class _Names:
-    """Where coordinates, and parameters that differ from site to site, are: ``sites`` by name."""
+class _SiteNames:
+    """Fields and sites of coordinates, and of parameters that differ from site to site: ``sites`` by name."""
 
     fields: tuple[str, ...]
     sizes: tuple[int, ...]
@@ -54,8 +54,11 @@ class _Names:
     point: dict[str, float] = field(default_factory=dict)
 
 
-def written_out(spec: Spec, least: int) -> Spec | None:
-    """The lattice that an ordinary spec is, if it is one of at least so many sites; None for matrices that fit not."""
+def recognised_lattice(spec: Spec, least: int) -> Spec | None:
+    """Return the lattice that an ordinary spec is, if it has at least this number of sites.
+
+    None for specs that are no lattice, and for π of the wrong shape.
+    """
     if not any(prod(_sizes(names)) >= least for names in _readings(spec.coordinates)):
         return None
     try:
@@ -66,14 +69,17 @@ def written_out(spec: Spec, least: int) -> Spec | None:
 
 
 def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
-    """The lattice that an ordinary spec with this π is, for any number of sites; None if it is none, or driven."""
+    """Return the lattice that an ordinary spec with this π is, for any number of sites.
+
+    None if the system is no lattice, or is driven.
+    """
     if spec.time or spec.forces or spec.noise:
         return None
     for names in _readings(spec.coordinates):
         for boundary in product(("periodic", "open"), repeat=len(_sizes(names))):
             try:
                 return _lattice(spec, poisson, names, boundary)
-            except (_OtherError, DomainError):
+            except (_NoLatticeError, DomainError):
                 continue
     return None
 
@@ -82,16 +88,16 @@ def recognised(spec: Spec, poisson: Matrix) -> Spec | None:
 
 
 def _readings(coordinates: Sequence[str]) -> Iterator[dict[str, tuple[str, Site]]]:
-    """Ways to read coordinates as a field and a site: all numbers in a name are its site, or one of them."""
+    """Yield ways to read coordinates as a field and a site: the site is all numbers in a name, or one of them."""
     groups = {len(re.findall(r"[0-9]+", c)) for c in coordinates}
     if len(groups) != 1 or groups == {0}:
         return
     (count,) = groups
     choices = [tuple(range(count))] * (count <= 3) + [(k,) for k in range(count) if count > 1]
     for chosen in choices:
-        found = {c: _split(c, chosen) for c in coordinates}
-        if _is_full(found):
-            yield found
+        places = {c: _split(c, chosen) for c in coordinates}
+        if _is_full(places):
+            yield places
 
 
 def _split(name: str, chosen: Sequence[int]) -> tuple[str, Site]:
@@ -102,22 +108,22 @@ def _split(name: str, chosen: Sequence[int]) -> tuple[str, Site]:
     return re.sub(r"_+", "_", "".join(parts)).strip("_") or "x", site
 
 
-def _sizes(found: Mapping[str, tuple[str, Site]]) -> tuple[int, ...]:
-    columns = zip(*(site for _, site in found.values()), strict=True)
+def _sizes(places: Mapping[str, tuple[str, Site]]) -> tuple[int, ...]:
+    columns = zip(*(site for _, site in places.values()), strict=True)
     return tuple(len(set(column)) for column in columns)
 
 
-def _is_full(found: Mapping[str, tuple[str, Site]]) -> bool:
+def _is_full(places: Mapping[str, tuple[str, Site]]) -> bool:
     """Whether each field has each site of a box once."""
-    sizes = _sizes(found)
-    sites = Counter(site for _, site in found.values())
-    fields = {f for f, _ in found.values()}
-    columns = [sorted(set(c)) for c in zip(*(s for _, s in found.values()), strict=True)]
+    sizes = _sizes(places)
+    sites = Counter(site for _, site in places.values())
+    fields = {f for f, _ in places.values()}
+    columns = [sorted(set(c)) for c in zip(*(s for _, s in places.values()), strict=True)]
     gapless = all(c[-1] - c[0] + 1 == len(c) for c in columns)
     return (
         gapless
-        and min(sizes) >= LEAST
-        and len(set(found.values())) == len(found) == len(fields) * prod(sizes)
+        and min(sizes) >= MIN_SITES_PER_AXIS
+        and len(set(places.values())) == len(places) == len(fields) * prod(sizes)
         and set(sites.values()) == {len(fields)}
     )
 
@@ -133,7 +139,7 @@ def _lattice(
     parameters = _parameters(spec, names, at_sites)
     local, far = _brackets(spec, poisson, names)
     casimirs, kinds = _casimirs(spec, names)
-    found = Spec(
+    lattice_spec = Spec(
         name=spec.name,
         coordinates=names.fields,
         poisson=MatrixForm(tuple(tuple(local.get((f, g), ZERO) for g in names.fields) for f in names.fields)),
@@ -145,62 +151,65 @@ def _lattice(
         title=spec.title,
         lattice=Lattice(names.space.axes, boundary, brackets=far, kinds=kinds),
     )
-    _prove(spec, poisson, found, names)
-    return replace(found, runs={n: _run(spec, run, names) for n, run in spec.runs.items()})
+    _prove(spec, poisson, lattice_spec, names)
+    return replace(lattice_spec, runs={n: _run(spec, run, names) for n, run in spec.runs.items()})
 
 
-def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _Names:
-    """The sites counted from 0, with parameters that have numbers as the coordinates do."""
+def _names(spec: Spec, coordinates: Mapping[str, tuple[str, Site]], boundary: tuple[str, ...]) -> _SiteNames:
+    """Return the sites counted from 0, with the parameters that have numbers as the coordinates do."""
     first = tuple(min(c) for c in zip(*(s for _, s in coordinates.values()), strict=True))
     fields = tuple(dict.fromkeys(f for f, _ in coordinates.values()))
     sizes = _sizes(coordinates)
     all_sites = {s for _, s in coordinates.values()}
-    found = dict(coordinates)
-    plain = [p.name for p in spec.parameters if len(re.findall(r"[0-9]+", p.name)) == len(sizes)]
+    places = dict(coordinates)
+    numbered = [p.name for p in spec.parameters if len(re.findall(r"[0-9]+", p.name)) == len(sizes)]
     by_stem: dict[str, dict[str, Site]] = {}
-    for name in plain:
+    for name in numbered:
         stem, site = _split(name, range(len(sizes)))
         by_stem.setdefault(stem, {})[name] = site
     for stem, listed in by_stem.items():
         if set(listed.values()) == all_sites and len(listed) == len(all_sites) and stem not in fields:
-            found |= {name: (stem, site) for name, site in listed.items()}
-    moved = {n: (f, tuple(a - b for a, b in zip(s, first, strict=True))) for n, (f, s) in found.items()}
-    stems = tuple(dict.fromkeys(f for f, _ in moved.values()))
-    others = {p.name for p in spec.parameters if p.name not in moved} | {*SPEC_FUNCTIONS}
-    taken = {*stems, *others}
-    letters = [a for a in ("i", "j", "k", "l", "m", "n") if a not in taken and f"N_{a}" not in taken]
+            places |= {name: (stem, site) for name, site in listed.items()}
+    sites = {n: (f, tuple(a - b for a, b in zip(s, first, strict=True))) for n, (f, s) in places.items()}
+    stems = tuple(dict.fromkeys(f for f, _ in sites.values()))
+    others = {p.name for p in spec.parameters if p.name not in sites} | {*SPEC_FUNCTIONS}
+    used_names = {*stems, *others}
+    letters = [a for a in ("i", "j", "k", "l", "m", "n") if a not in used_names and f"N_{a}" not in used_names]
     if len(letters) < len(sizes) or {*stems} & others:
-        raise _OtherError
+        raise _NoLatticeError
     axes = tuple(letters[: len(sizes)])
-    return _Names(fields, sizes, boundary, moved, Neighbours(stems, axes))
+    return _SiteNames(fields, sizes, boundary, sites, Neighbours(stems, axes))
 
 
-def _parameters(spec: Spec, names: _Names, at_sites: set[str]) -> tuple[Parameter, ...]:
-    found = [p for p in spec.parameters if p.name not in names.sites]
+def _parameters(spec: Spec, names: _SiteNames, at_sites: set[str]) -> tuple[Parameter, ...]:
+    parameters = [p for p in spec.parameters if p.name not in names.sites]
     for stem in sorted(at_sites):
         values = {names.sites[p.name][1]: p for p in spec.parameters if names.sites.get(p.name, ("",))[0] == stem}
         listed = [values[s] for s in sorted(values)]
-        alike = len({p.value for p in listed}) == 1
-        array = None if alike else Values(listed=tuple(p.value for p in listed))
+        equal = len({p.value for p in listed}) == 1
+        array = None if equal else Values(listed=tuple(p.value for p in listed))
         positive = all(p.positive for p in listed)
-        found.append(Parameter(stem, listed[0].value, positive, listed[0].description, "sites", array))
-    return tuple(found)
+        parameters.append(Parameter(stem, listed[0].value, positive, listed[0].description, "sites", array))
+    return tuple(parameters)
 
 
-def _moved(e: Expression, names: _Names, base: Site | None = None) -> tuple[Site, Expression]:
-    """A term as it is at one site, and where that is: the corner of the smallest box about all it mentions."""
-    own = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
+def _translated(e: Expression, names: _SiteNames, base: Site | None = None) -> tuple[Site, Expression]:
+    """Return a term translated to one site, and the site that it was at.
+
+    That site is the corner of the smallest box that contains all symbols of the term.
+    """
+    places = {n: names.sites[n] for n in symbols_of(e) if n in names.sites}
     if base is None:
-        if not own:
-            raise _OtherError
-        columns = list(zip(*(site for _, site in own.values()), strict=True))
+        if not places:
+            raise _NoLatticeError
+        columns = list(zip(*(site for _, site in places.values()), strict=True))
         base = tuple(_start(set(c), n, b) for c, n, b in zip(columns, names.sizes, names.boundary, strict=True))
-    values = {n: symbol(names.space.at(f, _offset(site, base, names))) for n, (f, site) in own.items()}
+    values = {n: symbol(names.space.at(f, _offset(site, base, names))) for n, (f, site) in places.items()}
     return base, substitute([e], values)[0]
 
 
 def _start(sites: set[int], size: int, boundary: str) -> int:
-    """Where the shortest stretch of an axis begins that holds the sites."""
+    """Return the first site of the shortest stretch of an axis that contains the sites."""
     if boundary == "open":
         return min(sites)
     ordered = sorted(sites)
@@ -208,54 +217,57 @@ def _start(sites: set[int], size: int, boundary: str) -> int:
     return max(gaps)[1] if len(ordered) > 1 else ordered[0]
 
 
-def _offset(site: Site, base: Site, names: _Names) -> Site:
-    found = []
+def _offset(site: Site, base: Site, names: _SiteNames) -> Site:
+    offset = []
     for a, b, n, boundary in zip(site, base, names.sizes, names.boundary, strict=True):
         step = a - b
         if boundary == "periodic":
             step = (step + n // 2) % n - n // 2
-        # What reaches half the way round may have wound up anywhere.
+        # An offset of half a period or more has no unique direction.
         if abs(step) > limits.OFFSET or 2 * abs(step) >= n:
-            raise _OtherError
-        found.append(step)
-    return tuple(found)
+            raise _NoLatticeError
+        offset.append(step)
+    return tuple(offset)
 
 
-def _key(e: Expression, names: _Names) -> float:
-    """A value that tells terms of one site apart."""
+def _key(e: Expression, names: _SiteNames) -> float:
+    """Return a value that distinguishes the terms of one site."""
     for name in symbols_of(e):
         # Multiples of the golden ratio modulo 1 are all different, and evenly spread.
         names.point.setdefault(name, 0.5 + (0.6180339887498949 * (len(names.point) + 1)) % 1)
     return float(f"{evaluate([e], names.point)[0]:.9g}")
 
 
-def _orbits(terms: Iterable[tuple[Site, Expression]], names: _Names) -> list[Expression]:
-    """The terms of a density, from those of a sum: each kind must be wherever there is room for it, equally often."""
+def _orbits(terms: Iterable[tuple[Site, Expression]], names: _SiteNames) -> list[Expression]:
+    """Return the terms of a density from the terms of a sum.
+
+    Each kind must occur equally often at every site that has room for it.
+    """
     kinds: dict[float, tuple[Expression, Counter[Site]]] = {}
     for base, term in terms:
         kinds.setdefault(_key(term, names), (term, Counter()))[1][base] += 1
-    found = []
-    for term, where in kinds.values():
-        (times,) = {*where.values()} if len({*where.values()}) == 1 else {0}
-        if not times or len(where) != _room(term, names):
-            raise _OtherError
-        found.append(term if times == 1 else times * term)
-    return found
+    density_terms = []
+    for term, occurrences in kinds.values():
+        (times,) = {*occurrences.values()} if len({*occurrences.values()}) == 1 else {0}
+        if not times or len(occurrences) != _room(term, names):
+            raise _NoLatticeError
+        density_terms.append(term if times == 1 else times * term)
+    return density_terms
 
 
-def _room(term: Expression, names: _Names) -> int:
-    """At how many sites a term can be."""
+def _room(term: Expression, names: _SiteNames) -> int:
+    """Return the number of sites at which a term fits."""
     offsets = [o for _, o in names.space.places(term).values()] or [(0,) * len(names.sizes)]
     wide = [max(map(int, c)) - min(0, *map(int, c)) for c in zip(*offsets, strict=True)]
     return prod(n - (w if b == "open" else 0) for n, w, b in zip(names.sizes, wide, names.boundary, strict=True))
 
 
-def _density(e: Expression, names: _Names) -> list[Expression]:
-    return _orbits((_moved(t, names) for t in _terms(e, names, ONE)), names)
+def _density(e: Expression, names: _SiteNames) -> list[Expression]:
+    return _orbits((_translated(t, names) for t in _terms(e, names, ONE)), names)
 
 
-def _terms(e: Expression, names: _Names, factor: Expression) -> Iterator[Expression]:
-    """The terms of a sum; a factor that is the same at all sites is multiplied into it."""
+def _terms(e: Expression, names: _SiteNames, factor: Expression) -> Iterator[Expression]:
+    """Yield the terms of a sum; a factor that is the same at all sites is multiplied into each."""
     args = e.args
     if e.op in ("add", "sub"):
         yield from _terms(args[0], names, factor)
@@ -269,14 +281,14 @@ def _terms(e: Expression, names: _Names, factor: Expression) -> Iterator[Express
         yield mul(factor, e)
 
 
-def _varies(e: Expression, names: _Names) -> bool:
+def _varies(e: Expression, names: _SiteNames) -> bool:
     return any(n in names.sites for n in symbols_of(e))
 
 
 def _brackets(
-    spec: Spec, poisson: Matrix, names: _Names
+    spec: Spec, poisson: Matrix, names: _SiteNames
 ) -> tuple[dict[tuple[str, str], Expression], dict[tuple[str, str], Expression]]:
-    """The brackets of fields of a site, and of different sites in one order."""
+    """Return the brackets of fields of one site, and of different sites in one order."""
     kinds: dict[tuple[str, str], dict[Site, Expression]] = {}
     for c, row in zip(spec.coordinates, poisson, strict=True):
         f, site = names.sites[c]
@@ -284,11 +296,11 @@ def _brackets(
             if not entry.is_zero:
                 g, there = names.sites[d]
                 pair = f, names.space.at(g, _offset(there, site, names))
-                kinds.setdefault(pair, {})[site] = _moved(entry, names, site)[1]
+                kinds.setdefault(pair, {})[site] = _translated(entry, names, site)[1]
     local, far = {}, dict[tuple[str, str], Expression]()
     for (f, g), entries in kinds.items():
         if len({_key(e, names) for e in entries.values()}) != 1:
-            raise _OtherError
+            raise _NoLatticeError
         first = next(iter(entries.values()))
         base, offset = names.space.place(g)
         if not any(offset):
@@ -298,36 +310,36 @@ def _brackets(
     return local, far
 
 
-def _casimirs(spec: Spec, names: _Names) -> tuple[dict[str, Expression], dict[str, str]]:
-    """Casimirs of every site, sums and products; others are left out."""
-    found, kinds = dict[str, Expression](), dict[str, str]()
-    alike: dict[float, list[tuple[str, Expression]]] = {}
-    taken = {*names.space.names, *(p.name for p in spec.parameters)}
+def _casimirs(spec: Spec, names: _SiteNames) -> tuple[dict[str, Expression], dict[str, str]]:
+    """Return the Casimirs of every site, sums and products, with their kinds; others are left out."""
+    densities, kinds = dict[str, Expression](), dict[str, str]()
+    by_value: dict[float, list[tuple[str, Expression]]] = {}
+    used_names = {*names.space.names, *(p.name for p in spec.parameters)}
     for name, e in spec.casimirs.items():
         for kind, density in (("product", _product_of), ("sum", _sum_of)):
             try:
-                found[name], kinds[name] = density(e, names), kind
+                densities[name], kinds[name] = density(e, names), kind
                 break
-            except _OtherError:
+            except _NoLatticeError:
                 continue
         else:
-            with suppress(_OtherError):
-                own = _moved(e, names)[1]
-                alike.setdefault(_key(own, names), []).append((name, own))
-    for listed in alike.values():
+            with suppress(_NoLatticeError):
+                density_here = _translated(e, names)[1]
+                by_value.setdefault(_key(density_here, names), []).append((name, density_here))
+    for listed in by_value.values():
         if len(listed) == prod(names.sizes):
             name = re.sub(r"[0-9_]+$", "", listed[0][0]) or "C"
-            while name in taken or name in found:
+            while name in used_names or name in densities:
                 name += "_"
-            found[name], kinds[name] = listed[0][1], "sites"
-    return found, kinds
+            densities[name], kinds[name] = listed[0][1], "sites"
+    return densities, kinds
 
 
-def _sum_of(e: Expression, names: _Names) -> Expression:
+def _sum_of(e: Expression, names: _SiteNames) -> Expression:
     return total(_density(e, names))
 
 
-def _product_of(e: Expression, names: _Names) -> Expression:
+def _product_of(e: Expression, names: _SiteNames) -> Expression:
     factors, stack = [], [e]
     while stack:
         node = stack.pop()
@@ -335,32 +347,34 @@ def _product_of(e: Expression, names: _Names) -> Expression:
             stack += node.args
         elif not node.is_number:
             factors.append(node)
-    return product_of(_orbits([_moved(f, names) for f in factors], names))
+    return product_of(_orbits([_translated(f, names) for f in factors], names))
 
 
-def _invariants(spec: Spec, names: _Names) -> dict[str, Expression]:
-    found = {}
+def _invariants(spec: Spec, names: _SiteNames) -> dict[str, Expression]:
+    invariants = {}
     for name, e in spec.invariants.items():
         try:
-            found[name] = _sum_of(e, names)
-        except _OtherError:
+            invariants[name] = _sum_of(e, names)
+        except _NoLatticeError:
             continue
-    return found
+    return invariants
 
 
-def _prove(spec: Spec, poisson: Matrix, found: Spec, names: _Names) -> None:
-    """That the lattice expands to the spec."""
+def _prove(spec: Spec, poisson: Matrix, lattice_spec: Spec, names: _SiteNames) -> None:
+    """Raise `_NoLatticeError` unless the lattice is proved to expand to the spec."""
     by_site = {(f, site): n for n, (f, site) in names.sites.items()}
-    expansion = Expansion(cell_from_spec(found), names.sizes, (), by_site)
+    expansion = Expansion(cell_from_spec(lattice_spec), names.sizes, (), by_site)
     entries = expansion.poisson()
-    listed = [("H", spec.hamiltonian - total(expansion.hamiltonian_terms()))]
+    residuals = [("H", spec.hamiltonian - total(expansion.hamiltonian_terms()))]
     for c, row in zip(spec.coordinates, poisson, strict=True):
-        listed += [(f"{{{c}, {d}}}", e - entries.get((c, d), ZERO)) for d, e in zip(spec.coordinates, row, strict=True)]
-    if not decide_zero("the same system", listed).holds:
-        raise _OtherError
+        residuals += [
+            (f"{{{c}, {d}}}", e - entries.get((c, d), ZERO)) for d, e in zip(spec.coordinates, row, strict=True)
+        ]
+    if not decide_zero("the same system", residuals).holds:
+        raise _NoLatticeError
 
 
-def _run(spec: Spec, run: Run, names: _Names) -> Run:
+def _run(spec: Spec, run: Run, names: _SiteNames) -> Run:
     by_field: dict[str, dict[Site, Fraction]] = {}
     for c, value in zip(spec.coordinates, run.initial, strict=True):
         f, site = names.sites[c]

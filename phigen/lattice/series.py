@@ -1,7 +1,7 @@
-"""The series on a lattice: S_h = hH, so a stage is the implicit step of order 2 of a bi-realisation, and composed.
+"""The series on a lattice, S_h = hH: a stage is the implicit step of order 2 of a bi-realisation, and stages compose.
 
 A stage solves y = x − (α − x)(y, h∇H(y)) for y on the whole lattice; then x moves by (β − α)(y, h∇H(y)). With the
-covectors written out, both are formulas of a site and its neighbourhood, whatever H and π couple.
+covectors written out, both are formulas of a site and its neighbourhood, for all H and π.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ from phigen.symbolic.symbols import MOMENTUM, Symbol, initial
 class SeriesPlan:
     """The bi-realisation, and the stages of order 2 that a step is composed of, as ``fractions`` of it.
 
-    ``middle`` is y at a site as a formula of y around and of x there (`initial`), ``increment`` what x moves by: for
-    each field, with the stage's step as `TIME`.
+    ``middle`` is y at a site as a formula of y around it and of x there (`initial`); ``increment`` is the increment
+    of x. Both have an entry for each field, with the step of the stage as `TIME`.
     """
 
     realisation: CellRealisation
@@ -43,21 +43,21 @@ class SeriesPlan:
     fractions: tuple[float, ...]
     middle: Mapping[str, Expression]
     increment: Mapping[str, Expression]
-    since: str = field(default="", kw_only=True)  # why steps are not split, although H can be
+    since: str = field(default="", kw_only=True)  # reason for the series although H splits
 
     @property
     def colouring(self) -> Colouring:
-        """All sites are alike."""
+        """All sites have one colour."""
         return Colouring()
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """No flow is that of one colour."""
+        """No flow belongs to one colour."""
         return ()
 
     @property
     def facts(self) -> list[str]:
-        """What the header says of the method."""
+        """Lines of the header on the method."""
         count = len(self.fractions)
         composed = [f"composition: {self.composition}, {count} stages of order 2"] if count > 1 else []
         step = "step: implicit, by sweeps over the sites until they change nothing"
@@ -71,12 +71,15 @@ class SeriesPlan:
         ]
 
     def schedule(self) -> Schedule:
-        """The stages of a step, as flows of one part."""
+        """Return the stages of a step, as flows of one part."""
         return Schedule(self.fractions, len(self.fractions) - 1, ((0, 0),))
 
 
 def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
-    """The plan for any H. Raises `SpecError` where no bi-realisation is known, and for orders that are not offered."""
+    """Return the plan for any H.
+
+    Raises `SpecError` where no bi-realisation is known, and for orders that are not offered.
+    """
     stages = _stages(spec)
     if cell.noise and len(stages[-1]) > 1:
         message = "noise: a step is not composed of others, among which some go back"
@@ -86,16 +89,16 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
         raise SpecError([Diagnostic(message, spec.locations.get(("poisson",)))])
     form = spec.poisson if cell.is_local else None
     try:
-        found = realise_cell(cell, form, spec.birealisation)
+        realisation = realise_cell(cell, form, spec.birealisation)
     except SpecError as error:
         place = spec.locations.get(("birealisation",)) or spec.locations.get(("poisson",))
         raise SpecError([Diagnostic(d.message, d.location or place, d.hint) for d in error.diagnostics]) from None
-    maps = _pushed(cell, found) if cell.forces.vector else (found.middle, found.increment)
-    return SeriesPlan(found, *stages, *(_at_covectors(cell, m) for m in maps))
+    maps = _with_impulse(cell, realisation) if cell.forces.vector else (realisation.middle, realisation.increment)
+    return SeriesPlan(realisation, *stages, *(_at_covectors(cell, m) for m in maps))
 
 
 def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients, *, tangent: bool = False) -> Equation:
-    """The kernels of a stage, and those of its derivative if they are asked for."""
+    """Return the kernels of a stage; with ``tangent`` those of its derivative too."""
     size = len(plan.middle)
     values = coefficients.hoist([*plan.middle.values(), *plan.increment.values()])
     relax = site_kernel(
@@ -115,7 +118,7 @@ def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients, *, tangen
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:
-    """The maps with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
+    """Return the maps with p = h(∇H + ζ) + Σ ΔW σ∇g at all sites that they mention."""
     at = SiteFields(cell, sums_by_field(cell))
     covectors: dict[str, Expression] = {}
     for name in symbols_of(*maps.values()):
@@ -127,30 +130,30 @@ def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expre
     return dict(zip(maps, substitute(list(maps.values()), covectors), strict=True))
 
 
-def _pushed(cell: Cell, found: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
-    """y and the increment of x, where half of the impulse hf is given before and half after the motion."""
+def _with_impulse(cell: Cell, realisation: CellRealisation) -> tuple[dict[str, Expression], dict[str, Expression]]:
+    """Return y and the increment of x with half of the impulse hf before and half after the motion."""
     at, half = SiteFields(cell), number(Fraction(1, 2))
     impulse = {f: symbol(TIME) * at.impulse(f) for f in cell.fields}
-    moved: dict[str, Expression] = {initial(f): symbol(initial(f)) + half * e for f, e in impulse.items()}
-    middle = dict(zip(found.middle, substitute(list(found.middle.values()), moved), strict=True))
-    return middle, {f: e + impulse[f] for f, e in found.increment.items()}
+    start: dict[str, Expression] = {initial(f): symbol(initial(f)) + half * e for f, e in impulse.items()}
+    middle = dict(zip(realisation.middle, substitute(list(realisation.middle.values()), start), strict=True))
+    return middle, {f: e + impulse[f] for f, e in realisation.increment.items()}
 
 
 def _stages(spec: Spec) -> tuple[Order, str, tuple[float, ...]]:
-    """The composition of steps of order 2 that gives the order of a spec; odd orders round up."""
+    """Return the composition of steps of order 2 that gives the order of a spec; odd orders round up."""
     order, composition = spec.wanted_order, spec.composition
     even = order + order % 2
     note = "" if even == order else f"order {order} was asked for; a symmetric method has even order"
     if even == 2 and composition in ("auto", "none"):
         return Order(2, 1, note), "none", (1.0,)
-    found = find(composition, even)
-    if found is None:
+    method = find(composition, even)
+    if method is None:
         place = spec.locations.get(("composition",)) or spec.locations.get(("order",))
         known = orders(composition) if composition != "none" else []
         listed = ", ".join(map(str, [2, *known] if composition in ("auto", "none") else known)) or "none"
-        who = (
+        offering = (
             "the series on lattices offers" if composition in ("auto", "none") else f"composition {composition} offers"
         )
-        message = f"scheme series: {who} the orders {listed}, not {even}"
+        message = f"scheme series: {offering} the orders {listed}, not {even}"
         raise SpecError([Diagnostic(message, place, "composition: auto" * (composition != "auto"))])
-    return Order(even, 1, note), found.name, found.fractions
+    return Order(even, 1, note), method.name, method.fractions

@@ -1,9 +1,10 @@
-"""What makes the series on a lattice right, proved for each build.
+"""Proofs that the series on a lattice is correct, made for each build.
 
-The axioms of the bi-realisation: at one site where π is local, else on a periodic box so large that the sites that α
-mentions at two sites that meet do not wrap, which is every box by translation. Then the equation of a stage: y at a
-site, as it is written, solves α(y, p) = x for any p; and with p = h∇H the increment is hπ∇H up to O(h²), so a stage,
-being symmetric, has order 2.
+The axioms of the bi-realisation are proved at one site where π is local, else on a periodic box. The box is so large
+that the sites of α at two neighbouring sites do not wrap around; by translation the proof holds for every larger box.
+
+Then follows the equation of a stage. Its y at a site, as it is written, solves α(y, p) = x for any p. With p = h∇H
+the increment is hπ∇H up to O(h²), so a stage, being symmetric, has order 2.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from phigen.symbolic.verdict import Statement, decide_zero
 
 
 def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """The statements on the bi-realisation, then those on a stage."""
+    """Yield the statements on the bi-realisation, then those on a stage."""
     system, realisation = plan.realisation.site or _on_a_box(cell, plan.realisation)
     where = (
         "" if plan.realisation.site else f"on {system.dimension // len(cell.fields)} sites, as on all by translation"
@@ -38,39 +39,39 @@ def check(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
 
 
 def _stage(cell: Cell, plan: SeriesPlan) -> Iterator[Statement]:
-    """The equation of a stage and its order."""
-    found, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
-    alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in found.displacement.items()}
-    written = substitute([found.middle[f] for f in cell.fields], alpha)
+    """Yield the equation of a stage and its order."""
+    realisation, positive = plan.realisation, tuple(p.name for p in cell.parameters if p.positive)
+    alpha: dict[str, Expression] = {initial(f): symbol(f) + e for f, e in realisation.displacement.items()}
+    written = substitute([realisation.middle[f] for f in cell.fields], alpha)
     residuals = [(f, w - symbol(f)) for f, w in zip(cell.fields, written, strict=True)]
     yield decide_zero("y, as it is written, solves α(y, p) = x", residuals, positive)
     rates = derivatives(list(plan.increment.values()), TIME)
-    drawn = [n for n, (base, _) in cell.places(*rates).items() if base in cell.increments]
-    slopes = substitute(rates, {TIME: ZERO, **dict.fromkeys(drawn, ZERO)})
+    noise_symbols = [n for n, (base, _) in cell.places(*rates).items() if base in cell.increments]
+    slopes = substitute(rates, {TIME: ZERO, **dict.fromkeys(noise_symbols, ZERO)})
     residuals = [(f, a - b) for f, a, b in zip(cell.fields, slopes, field_with_sums(cell), strict=True)]
     order = f"hence the order 2 of {'a step' if plan.order.order == 2 else 'each stage'}, which is symmetric"
-    acting = "(β − α)(y, h(∇H + ζ)(y)) + hf(y) = h(π(∇H + ζ) + f)(y) + O(h²)"
-    name = acting if cell.forces else "(β − α)(y, h∇H(y)) = hπ∇H(y) + O(h²)"
+    forced_name = "(β − α)(y, h(∇H + ζ)(y)) + hf(y) = h(π(∇H + ζ) + f)(y) + O(h²)"
+    name = forced_name if cell.forces else "(β − α)(y, h∇H(y)) = hπ∇H(y) + O(h²)"
     yield decide_zero(name, residuals, positive, order)
 
 
-def _on_a_box(cell: Cell, found: CellRealisation) -> tuple[System, BiRealisation]:
-    """The realisation on a small periodic lattice."""
+def _on_a_box(cell: Cell, realisation: CellRealisation) -> tuple[System, BiRealisation]:
+    """Return the realisation on a small periodic lattice."""
     periodic = replace(cell, boundary=(PERIODIC,) * len(cell.axes))
     box = expand(periodic, [4 * r + 1 for r in cell.poisson_reach])
     coordinates, places = box.coordinates, [(f, site) for f in cell.fields for site in box.sites]
-    displacement = tuple(_at(box, found.displacement[f], site) for f, site in places)
-    increment = tuple(_at(box, found.increment[f], site) for f, site in places)
+    displacement = tuple(_at(box, realisation.displacement[f], site) for f, site in places)
+    increment = tuple(_at(box, realisation.increment[f], site) for f, site in places)
     energy = total(symbol(c) for c in coordinates)
     system = build_system(cell.name, coordinates, box.spec().parameters, box.matrix(), energy)
     alpha = tuple(symbol(c) + d for c, d in zip(coordinates, displacement, strict=True))
     beta = tuple(a + d for a, d in zip(alpha, increment, strict=True))
     symmetric = is_symmetric(alpha, beta, coordinates)
-    return system, BiRealisation(found.kind, coordinates, alpha, beta, displacement, increment, symmetric)
+    return system, BiRealisation(realisation.kind, coordinates, alpha, beta, displacement, increment, symmetric)
 
 
 def _at(box: Expansion, e: Expression, site: Site) -> Expression:
-    """An expression in fields and covectors around a site."""
+    """Return an expression in fields and covectors around a site."""
     values: dict[str, Expression] = {}
     for name in symbols_of(e):
         covector = isinstance(name, Symbol) and name.kind == MOMENTUM
@@ -78,8 +79,8 @@ def _at(box: Expansion, e: Expression, site: Site) -> Expression:
             base, offset = box.cell.place(str(name.key[0]) if isinstance(name, Symbol) and covector else name)
         except KeyError:
             continue
-        there = box.neighbour(site, offset)
-        assert there is not None  # the box is periodic
-        known = box.names[base, there]
-        values[name] = symbol(momentum(known) if covector else known)
+        source = box.neighbour(site, offset)
+        assert source is not None  # the box is periodic
+        coordinate = box.names[base, source]
+        values[name] = symbol(momentum(coordinate) if covector else coordinate)
     return substitute([e], values)[0]

@@ -1,4 +1,4 @@
-"""Runs of lattices as arrays: initial states, parameters at sites and bonds, bonds."""
+"""Runs of lattices as arrays: initial states, parameters at sites and bonds, and bonds."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ Bonds = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Start:
-    """A run before its first step.
+    """The data of a run before its first step.
 
-    ``sizes`` are those of the axes, of graphs and pairs the number of sites. ``state`` has the shape (fields, *sizes).
-    ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2), ``graph`` tells
-    whether there are any.
+    ``sizes`` are those of the axes; of graphs and pairs, the number of sites. ``state`` has the shape (fields,
+    *sizes). ``parameters`` are numbers, and arrays over sites or bonds. ``bonds`` has the shape (bonds, 2); ``graph``
+    says whether the lattice is a graph.
     """
 
     sizes: tuple[int, ...]
@@ -43,7 +43,7 @@ class Start:
 
 
 def start_of(spec: Spec, run: Run) -> Start:
-    """What a run of a lattice starts from.
+    """Return the initial state, parameters and bonds of a run of a lattice.
 
     Raises `SpecError` for files that cannot be read and arrays that do not fit, with the place in the spec.
     """
@@ -68,11 +68,11 @@ class _Reader:
     def __init__(self, spec: Spec, run: Run) -> None:
         if spec.lattice is None or run.lattice is None:
             raise ValueError(f"{spec.name} is no lattice")
-        self.spec, self.run, self.lattice, self.given = spec, run, spec.lattice, run.lattice
+        self.spec, self.run, self.lattice, self.lattice_run = spec, run, spec.lattice, run.lattice
 
     def start(self) -> Start:
-        bonds, columns = self._bonds(self.given)
-        sizes = self.given.sizes or (self._sites(bonds),)
+        bonds, columns = self._bonds(self.lattice_run)
+        sizes = self.lattice_run.sizes or (self._sites(bonds),)
         if len(bonds) and bonds.max() >= sizes[0]:
             raise self._error("bonds", f"a bond ends at site {bonds.max()}, but there are {sizes[0]} sites")
         self._expect_room(sizes)
@@ -81,20 +81,20 @@ class _Reader:
         for p in self.spec.parameters:
             if p.at != "all":
                 shape = sizes if p.at == "sites" else (len(bonds),)
-                found = self.given.arrays.get(p.name)
-                if found is None and p.at == "bonds" and p.name in columns:
+                values = self.lattice_run.arrays.get(p.name)
+                if values is None and p.at == "bonds" and p.name in columns:
                     parameters[p.name] = columns[p.name]
                 else:
-                    found = found or p.values
-                    whole = np.full(shape, float(p.value))
-                    parameters[p.name] = whole if found is None else self.arrays.read(found, shape, p.name)
+                    values = values or p.values
+                    default = np.full(shape, float(p.value))
+                    parameters[p.name] = default if values is None else self.arrays.read(values, shape, p.name)
                 if p.positive and np.any(np.asarray(parameters[p.name]) <= 0):
                     message = f"the parameter {p.name!r} is positive by declaration, but not all its values are"
                     raise self._error("parameters", message)
         return Start(sizes, self._state(sizes), parameters, bonds, bool(self.lattice.graph))
 
     def _expect_room(self, sizes: Sequence[int]) -> None:
-        """The indices of sites, the state, and parameters at sites are arrays at once."""
+        """Raise `SpecError` if the arrays over sites do not fit in memory together."""
         arrays = len(self.lattice.indices) + len(self.spec.coordinates)
         arrays += sum(p.at == "sites" for p in self.spec.parameters)
         place = self.spec.diagnostic(("runs", self.run.name, "sizes"), "").location
@@ -104,39 +104,39 @@ class _Reader:
         return SpecError([self.spec.diagnostic(("runs", self.run.name, key), message, hint)])
 
     def _sites(self, bonds: Bonds) -> int:
-        """The number of sites where the run does not say it: what bonds or lists of initial values have."""
-        lengths = [len(v.listed) for v in self.given.state.values() if v.listed]
+        """Return the number of sites where the run does not state it: the length of lists, or the sites of bonds."""
+        lengths = [len(v.listed) for v in self.lattice_run.state.values() if v.listed]
         if not lengths and not len(bonds):
             raise self._error("initial", "the number of sites is not known", "sizes: [N]")
         return max([*lengths, int(bonds.max()) + 1 if len(bonds) else 0])
 
     def _state(self, sizes: tuple[int, ...]) -> Floats:
-        fields, given = self.spec.coordinates, self.given.state
+        fields, values_by_field = self.spec.coordinates, self.lattice_run.state
         shape = (len(fields), *sizes)
-        if "" not in given:
-            return np.stack([self.arrays.read(given[f], sizes, f) for f in fields])
-        values = given[""]
+        if "" not in values_by_field:
+            return np.stack([self.arrays.read(values_by_field[f], sizes, f) for f in fields])
+        values = values_by_field[""]
         if values.random != "sphere":
             return self.arrays.read(values, shape, "initial")
         drawn = np.random.default_rng(values.seed).normal(size=shape)
         return np.asarray(float(values.scale) * drawn / np.sqrt((drawn**2).sum(axis=0)))
 
-    def _bonds(self, given: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
-        if not isinstance(given.bonds, str):
-            return np.array(given.bonds, dtype=np.int64).reshape(-1, 2), {}
-        if not given.bonds:
+    def _bonds(self, lattice_run: LatticeRun) -> tuple[Bonds, dict[str, Floats]]:
+        if not isinstance(lattice_run.bonds, str):
+            return np.array(lattice_run.bonds, dtype=np.int64).reshape(-1, 2), {}
+        if not lattice_run.bonds:
             return np.zeros((0, 2), dtype=np.int64), {}
         at_bonds = [p.name for p in self.spec.parameters if p.at == "bonds"]
         try:
-            return bonds_in(Path(self.spec.file).parent / given.bonds, at_bonds)
+            return bonds_in(Path(self.spec.file).parent / lattice_run.bonds, at_bonds)
         except (OSError, ValueError) as error:
-            raise self._error("bonds", f"bonds: cannot read {given.bonds!r}: {_reason(error)}") from None
+            raise self._error("bonds", f"bonds: cannot read {lattice_run.bonds!r}: {_reason(error)}") from None
 
 
 class _Arrays:
-    """Values of a spec as arrays over the sites or bonds of a lattice of given sizes.
+    """Values of a spec as arrays over the sites or bonds of a lattice of these sizes.
 
-    ``run`` is the name of the run whose values they may be, and ``hint`` that of errors.
+    ``run`` is the name of the run that has the values, and ``hint`` the hint of errors.
     """
 
     def __init__(self, spec: Spec, sizes: Sequence[int], run: str = "", hint: str = "") -> None:
@@ -155,29 +155,29 @@ class _Arrays:
             except (OSError, ValueError) as error:
                 raise self._refused(name, f"cannot read {values.file!r}: {_reason(error)}") from None
         elif values.listed:
-            found = np.array([float(v) for v in values.listed])
-            if found.size == np.prod(shape):
-                found = found.reshape(shape)
+            array = np.array([float(v) for v in values.listed])
+            if array.size == np.prod(shape):
+                array = array.reshape(shape)
         elif values.random:
             random = np.random.default_rng(values.seed)
             drawn = random.normal(size=shape) if values.random == "normal" else random.uniform(-1, 1, size=shape)
-            found = float(values.scale) * drawn
+            array = float(values.scale) * drawn
         else:
-            found = np.zeros(shape)
+            array = np.zeros(shape)
         if values.formula is not None:
-            found += evaluate([values.formula], self.indices)[0]
-        if found.shape != shape:
-            wanted, has = "×".join(map(str, shape)), "×".join(map(str, found.shape))
-            raise self._refused(name, f"{has} values, not {wanted}")
-        if not np.all(np.isfinite(found)):
+            array += evaluate([values.formula], self.indices)[0]
+        if array.shape != shape:
+            needed, actual = "×".join(map(str, shape)), "×".join(map(str, array.shape))
+            raise self._refused(name, f"{actual} values, not {needed}")
+        if not np.all(np.isfinite(array)):
             raise self._refused(name, "not all values are finite")
-        return found
+        return array
 
     def _refused(self, name: str, message: str) -> SpecError:
-        """The error of the values of a field, of a parameter, or of the whole state, at the place of these."""
-        here = ("runs", self.run)
-        paths = [(*here, "parameters", name), ("parameters", name, "value"), (*here, "initial", name)]
-        path = next((p for p in paths if p in self.spec.locations), (*here, "initial"))
+        """Return the error for values of a field, of a parameter, or of the whole state, at their place in the spec."""
+        run_path = ("runs", self.run)
+        paths = [(*run_path, "parameters", name), ("parameters", name, "value"), (*run_path, "initial", name)]
+        path = next((p for p in paths if p in self.spec.locations), (*run_path, "initial"))
         return SpecError([self.spec.diagnostic(path, f"{name}: {message}", self.hint)])
 
 

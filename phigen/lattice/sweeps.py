@@ -1,4 +1,7 @@
-"""From a cell to a program: a step is a schedule of sweeps over the sites, each a kernel evaluated at every site."""
+"""From a cell to a program: a step is a schedule of sweeps over the sites.
+
+Each sweep has a kernel that is evaluated at every site.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,15 @@ from dataclasses import dataclass, replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import Misfit, MisfitError, least_sizes, misfits, since_of, since_seam, told_at
+from phigen.lattice.building import (
+    Misfit,
+    MisfitError,
+    least_sizes,
+    misfit_diagnostics,
+    misfit_reason,
+    misfits,
+    seam_reason,
+)
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
 from phigen.lattice.damping import TogetherError
 from phigen.lattice.graphs import GraphSearch, energies, site_sums
@@ -51,12 +62,12 @@ from phigen.symbolic.neighbours import steps
 
 @dataclass(frozen=True)
 class SplittingPlan:
-    """The parts of H of a lattice, and the method, with the flows in the order of its steps; and those of ``noise``."""
+    """The parts of H of a lattice, the method, and the flows of ``noise``."""
 
     parts: CellSplitting
     choice: Choice
     noise: tuple[CellFlow, ...] = ()
-    since: str = ""  # why there are more colours than the fewest
+    since: str = ""  # reason for more colours than the fewest
 
     @property
     def order(self) -> Order:
@@ -80,27 +91,27 @@ class SplittingPlan:
 
     @property
     def by_colour(self) -> tuple[bool, ...]:
-        """Of each flow whether it is that of one colour of a graph; nothing where none is."""
+        """For each flow whether it belongs to one colour of a graph; empty if none does."""
         return tuple(flow.by_colour for flow in self.flows) if any(flow.by_colour for flow in self.flows) else ()
 
     def schedule(self) -> Schedule:
-        """The flows of a step, part by part."""
+        """Return the flows of a step, part by part."""
         if self.by_colour:
             return _any_number(self.choice.method, dated=self.choice.carrier is not None)
-        found = self.choice.schedule()
-        return with_noise(found, len(self.noise)) if self.noise else found
+        schedule = self.choice.schedule()
+        return with_noise(schedule, len(self.noise)) if self.noise else schedule
 
 
-#: How a step of a lattice is made.
+#: The method of a step of a lattice.
 LatticePlan = SplittingPlan | SeriesPlan
 
 
 def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
-    """The parts and the method; by the series where that was asked for, or where H does not split.
+    """Return the parts and the method; the series where the spec asks for it, or H does not split.
 
-    Raises `SpecError` where neither is possible, and for what is not offered.
+    Raises `SpecError` where neither is possible, and for features that lattices do not have.
     """
-    _expect_offered(cell, spec)
+    _expect_supported(cell, spec)
     if spec.scheme == "series" or (spec.scheme == "auto" and spec.birealisation.kind != "auto"):
         return plan_series(cell, spec)
     try:
@@ -109,19 +120,19 @@ def plan_sweeps(cell: Cell, spec: Spec) -> LatticePlan:
         if spec.scheme == "splitting":
             raise
         try:
-            found = plan_series(cell, spec)
-            return replace(found, since=unsplit.since) if isinstance(unsplit, MisfitError) else found
+            series_plan = plan_series(cell, spec)
+            return replace(series_plan, since=unsplit.reason) if isinstance(unsplit, MisfitError) else series_plan
         except SpecError as error:
             raise SpecError([*unsplit.diagnostics, *error.diagnostics]) from None
 
 
 def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
     search = GraphSearch if cell.relation == GRAPH else PartSearch
-    parts, forced, since = _coloured(cell, search, spec)
+    parts, forces, since = _coloured(cell, search, spec)
     noise = tuple(noise_flows(cell, parts.colouring, search, spec))
-    flows = (*parts.flows, *forced)
-    wanted = spec.wanted_order, spec.composition
-    choice = planned(spec, Splitting(flows), *wanted, lambda: () if cell.forces else _kicks(cell, parts))
+    flows = (*parts.flows, *forces)
+    requested = spec.wanted_order, spec.composition
+    choice = planned(spec, Splitting(flows), *requested, lambda: () if cell.forces else _kicks(cell, parts))
     coloured = any(flow.by_colour for flow in flows)
     if coloured and noise:
         message = "scheme splitting: noise is not offered where parts are those of one colour of a graph"
@@ -132,14 +143,17 @@ def _plan_splitting(cell: Cell, spec: Spec) -> SplittingPlan:
 
 
 def _with_seams(choice: Choice, colouring: Colouring) -> Choice:
-    """The choice with the flows of terms on seams, behind the flow of the others, and of the last flow before it."""
+    """Return the choice with the flows of terms on seams added.
+
+    They follow the flow of the other terms of their part; in the last part they precede it.
+    """
     flows = choice.splitting.flows
-    last, found = len(flows) - 1, list[Flow]()
+    last, all_flows = len(flows) - 1, list[Flow]()
     for k, flow in enumerate(flows):
         seams = list(_on_seams(flow, colouring)) if isinstance(flow, CellFlow) and flow.beside else []
-        found += [*seams, flow] if k == last > 0 else [flow, *seams]
-    carrier = choice.carrier + len(found) - len(flows) if choice.carrier else choice.carrier
-    return replace(choice, splitting=replace(choice.splitting, flows=tuple(found)), carrier=carrier)
+        all_flows += [*seams, flow] if k == last > 0 else [flow, *seams]
+    carrier = choice.carrier + len(all_flows) - len(flows) if choice.carrier else choice.carrier
+    return replace(choice, splitting=replace(choice.splitting, flows=tuple(all_flows)), carrier=carrier)
 
 
 def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
@@ -152,38 +166,42 @@ def _on_seams(flow: CellFlow, colouring: Colouring) -> Iterator[CellFlow]:
 
 
 def _coloured(cell: Cell, search: type[PartSearch], spec: Spec) -> tuple[CellSplitting, tuple[CellFlow, ...], str]:
-    """The parts of H and of the forces, by the fewest colours such as all runs have sizes for, and why not by fewer.
+    """Return the parts of H and of the forces for the fewest colours that fit the sizes of all runs.
 
-    Where there are none, the scheme ``splitting`` has the fewest of all, with which the runs are refused.
+    With them goes the reason for not taking fewer colours. If no number of colours fits, the scheme ``splitting``
+    takes the fewest, and the runs are refused later; the scheme ``auto`` raises `MisfitError`.
     """
     best: tuple[CellSplitting, tuple[CellFlow, ...]] | None = None
-    misfit: list[Misfit] = []
+    rejected: list[Misfit] = []
     refused: SpecError | None = None
     for parts in splittings(cell, spec.locations.get(("hamiltonian",)), search):
         try:
-            made = parts, force_flows(cell, parts.colouring, spec)
+            parts_and_forces = parts, force_flows(cell, parts.colouring, spec)
         except TogetherError as error:
             refused = refused or error
             continue
-        wrong = misfits(spec, cell, parts.colouring.periods(cell.boundary))
-        if not wrong:
-            return *made, since_of(misfit, best[0].colouring.count) if best else ""
+        wrong_sizes = misfits(spec, cell, parts.colouring.periods(cell.boundary))
+        if not wrong_sizes:
+            return *parts_and_forces, misfit_reason(rejected, best[0].colouring.count) if best else ""
         if seamed := _seamed(cell, parts.colouring, search, spec):
-            return *seamed, since_seam(wrong)
-        best, misfit = best or made, misfit or wrong
+            return *seamed, seam_reason(wrong_sizes)
+        best, rejected = best or parts_and_forces, rejected or wrong_sizes
     if best is None:
         assert refused is not None
         raise refused
     if spec.scheme == "auto":
-        raise MisfitError(told_at(spec, misfit), since_of(misfit, best[0].colouring.count))
+        reason = misfit_reason(rejected, best[0].colouring.count)
+        raise MisfitError(misfit_diagnostics(spec, rejected), reason)
     return *best, ""
 
 
 def _seamed(
     cell: Cell, colouring: Colouring, search: type[PartSearch], spec: Spec
 ) -> tuple[CellSplitting, tuple[CellFlow, ...]] | None:
-    """The parts of H and of the forces with seams, which take every size; None where some run is too small, where ends
-    are open, and where sites near seams have no elementary flow."""
+    """Return the parts of H and of the forces with boundary seams, which fit every size.
+
+    None where some run is too small, ends are open, or sites near seams have no elementary flow.
+    """
     seamed = colouring.with_seams(cell)
     small = any(
         size < seam.least
@@ -199,12 +217,15 @@ def _seamed(
 
 
 def _kicks(cell: Cell, parts: CellSplitting) -> list[Kick]:
-    """The parts that can be V beside T + e, if there is a time: T does not depend on it; V and ∂V/∂t commute."""
+    """Return the parts that can be V.
+
+    Where there is a time, beside T + e: then T must not depend on it, and V and ∂V/∂t commute.
+    """
     return [k for k in cell_kicks(cell, parts) if not (cell.time and is_dated(parts.flows[1 - k.part], cell.time))]
 
 
 def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
-    """The solver of a lattice as a program."""
+    """Return the solver of a lattice as a program."""
     extras = spec.extras
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
     schedule, swept, solved = plan.schedule(), tuple[tuple[Sweep, ...], ...](), None
@@ -230,17 +251,17 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     )
     observed = observables(cell, single=extras.real == "float")
     kernels = [*(sweep.kernel for part in swept for sweep in part), *((solved.relax, solved.advance) if solved else ())]
-    drawn = Noise(tuple(cell.noise), 1 if solved else 2) if cell.noise else None
+    noise = Noise(tuple(cell.noise), 1 if solved else 2) if cell.noise else None
     sites = _sites(cell, plan.colouring, [*kernels, *observed.kernels])
     kinds, partners = tuple(k for _, k in cell.casimirs.values()), _partners(cell, varied=solved is not None)
     if partners:
-        own = partners.gathers
-        every = [s for part in swept for sweep in part for s in (sweep, sweep.tangent) if s]
-        gathers = [*(sweep.gather for sweep in every if sweep.gather), *own]
+        gathers_of_partners = partners.gathers
+        all_sweeps = [s for part in swept for sweep in part for s in (sweep, sweep.tangent) if s]
+        gathers = [*(sweep.gather for sweep in all_sweeps if sweep.gather), *gathers_of_partners]
         at_bonds = tuple(p.name for p in cell.parameters if p.at == "bonds")
         sites = replace(sites, ends=_ends(cell, [k for g in gathers for k in g.kernels]), at_bonds=at_bonds)
     adjoint = transposed(swept, solved, prepare, refresh, coefficients, partners) if extras.adjoint else None
-    settled = Sweeps(
+    sweeps = Sweeps(
         prepare,
         sites,
         swept,
@@ -253,7 +274,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         refresh=refresh,
         adjoint=adjoint,
     )
-    step = coefficients.settled(settled)
+    step = coefficients.settled(sweeps)
     facts = [_lattice_fact(cell, plan.colouring), *_facts(plan), *_acting_facts(cell, plan), plan.order.note]
     return Program(
         name=cell.name,
@@ -268,7 +289,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         observables=observed,
         forced=bool(cell.forces),
         pushed=pushed_casimirs(cell),
-        noise=drawn,
+        noise=noise,
         fractions=plan.fractions if isinstance(plan, SeriesPlan) else (1.0,),
         extras=extras,
         lanes=spec.solver.lanes,
@@ -278,7 +299,10 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
 
 
 def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
-    """A method for any number of flows; see `Sweeps`. If H is ``dated``, the time advances in place of a last flow."""
+    """Return a method for any number of flows; see `Sweeps`.
+
+    If H is ``dated``, the advance of the time takes the place of a last flow.
+    """
     assert isinstance(method, Alternation)
     backwards = {(1, 2): (3, 2)}
     of_three = alternating(method, 3)
@@ -287,20 +311,20 @@ def _any_number(method: Alternation | Nystrom, *, dated: bool) -> Schedule:
     return replace(of_three, pattern=tuple(backwards.get(flow, flow) for flow in of_three.pattern))
 
 
-def _expect_offered(cell: Cell, spec: Spec) -> None:
-    problems, locations = [], spec.locations
+def _expect_supported(cell: Cell, spec: Spec) -> None:
+    diagnostics, locations = [], spec.locations
     if cell.bond_bracket and cell.relation == PAIRS:
         message = "brackets between the sites of pairs are not compiled"
-        problems.append(Diagnostic(message, locations.get(("poisson",))))
-    asked = ["modified_hamiltonian"] if spec.extras.modified_hamiltonian else []
-    asked += ["reconstruct"] if ("reconstruct",) in locations else []
-    problems += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in asked]
-    if problems:
-        raise SpecError(problems)
+        diagnostics.append(Diagnostic(message, locations.get(("poisson",))))
+    unsupported = ["modified_hamiltonian"] if spec.extras.modified_hamiltonian else []
+    unsupported += ["reconstruct"] if ("reconstruct",) in locations else []
+    diagnostics += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in unsupported]
+    if diagnostics:
+        raise SpecError(diagnostics)
 
 
 def _named(cell: Cell, plan: SplittingPlan) -> Iterator[tuple[CellFlow, str]]:
-    """All flows, those of the noise first, with what each is that of."""
+    """Yield all flows, those of the noise first, each with the name of its Hamiltonian."""
     for flow, name in zip(plan.noise, cell.noise, strict=True):
         yield flow, f"the noise {name}"
     for k, flow in enumerate(plan.flows, 1):
@@ -313,40 +337,40 @@ def _sweep(
     motion: SiteMotion,
     k: int,
     coefficients: Coefficients,
-    what: str,
+    hamiltonian: str,
     *,
     tangent: bool,
 ) -> Sweep:
     increments = staged(list(motion.increments.values()), coefficients)
-    moved = tuple(cell.fields.index(f) for f in motion.increments)
-    beside = motion is flow.beside
-    suffix = "_beside" if beside else f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
-    where = f" on the seam {flow.window}" if flow.window else " near seams" if beside else ""
-    named = f"the flow of {what}{where}: {motion.manner}".replace(KICK, KICK.kind)
-    kernel = site_kernel(cell, f"sweep{k}{suffix}", named, increments, "change", coefficients, Role.SWEEP)
+    updated = tuple(cell.fields.index(f) for f in motion.increments)
+    near_seam = motion is flow.beside
+    suffix = "_beside" if near_seam else f"_{flow.motions.index(motion)}" if len(flow.motions) > 1 else ""
+    location = f" on the seam {flow.window}" if flow.window else " near seams" if near_seam else ""
+    purpose = f"the flow of {hamiltonian}{location}: {motion.manner}".replace(KICK, KICK.kind)
+    kernel = site_kernel(cell, f"sweep{k}{suffix}", purpose, increments, "change", coefficients, Role.SWEEP)
     purpose = f"what all other sites b add to the forces of H_{k} at a site a"
     gather = _gather(cell, motion.gathered, f"gather{k}{suffix}", purpose, coefficients)
-    varied = _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
-    inside, window = flow.beside is not None and not beside, flow.window if beside else None
-    varied = replace(varied, inside=inside, window=window) if varied else None
-    return Sweep(kernel, moved, motion.colour, gather, varied, inside, window)
+    tangent_sweep = _tangent(cell, motion, f"{k}{suffix}", coefficients) if tangent else None
+    inside, window = flow.beside is not None and not near_seam, flow.window if near_seam else None
+    tangent_sweep = replace(tangent_sweep, inside=inside, window=window) if tangent_sweep else None
+    return Sweep(kernel, updated, motion.colour, gather, tangent_sweep, inside, window)
 
 
 def _tangent(cell: Cell, motion: SiteMotion, suffix: str, coefficients: Coefficients) -> Sweep:
-    """The derivative of a sweep."""
+    """Return the derivative of a sweep."""
     slopes = staged(along(cell, list(motion.increments.values())), coefficients)
-    moved = tuple(cell.fields.index(f) for f in motion.increments)
+    updated = tuple(cell.fields.index(f) for f in motion.increments)
     purpose = f"the derivative of sweep {suffix.replace('_', '.')}"
     kernel = site_kernel(cell, f"tangent{suffix}", purpose, slopes, "change", coefficients, Role.SWEEP_TANGENT)
     sums = [replace(s, values=with_variations(cell, s.values)) for s in motion.gathered]
     purpose = "what all other sites b add to forces at a site a, and to their variations"
-    return Sweep(kernel, moved, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))
+    return Sweep(kernel, updated, motion.colour, _gather(cell, sums, f"gather_tangent{suffix}", purpose, coefficients))
 
 
 def _gather(
     cell: Cell, sums: Sequence[BondSum], name: str, purpose: str, coefficients: Coefficients | None = None
 ) -> Gather | None:
-    """Sums over bonds or pairs, all of the same symbols, as kernels."""
+    """Return sums over bonds or pairs as kernels; all have the same symbols."""
     if not sums:
         return None
     ends = []
@@ -354,26 +378,26 @@ def _gather(
         values = list(s.values.values())
         values = coefficients.hoist(values) if coefficients else values
         verb = {"a": "begin", "b": "end"}.get(s.end)
-        suffix, seen = (f"_{s.end}", f", by bonds that {verb} there") if verb else ("", "")
+        suffix, condition = (f"_{s.end}", f", by bonds that {verb} there") if verb else ("", "")
         ends.append(
-            Ends(site_kernel(cell, name + suffix, purpose + seen, values, "sums", coefficients), s.end, s.chosen)
+            Ends(site_kernel(cell, name + suffix, purpose + condition, values, "sums", coefficients), s.end, s.chosen)
         )
     return Gather(tuple(ends), tuple(sums[0].values))
 
 
 def _partners(cell: Cell, *, varied: bool) -> Partners | None:
-    """Energies and forces of bonds or pairs; if so asked, with how the forces follow variations."""
+    """Return the energies and forces of bonds or pairs; if ``varied``, also the derivatives of the forces."""
     if cell.relation == GRID:
         return None
-    what = "bond" if cell.relation == GRAPH else "pair"
+    kind = "bond" if cell.relation == GRAPH else "pair"
     empty, purpose, sums = Gather((), ()), "what a site b adds to the forces at a site a", site_sums(cell)
-    follow = [replace(s, values=with_variations(cell, s.values)) for s in sums] if varied else []
+    varied_sums = [replace(s, values=with_variations(cell, s.values)) for s in sums] if varied else []
     return Partners(
-        _gather(cell, energies(cell), f"{what}_energy", f"the energy of a {what}") or empty,
-        _gather(cell, sums, f"{what}_forces", purpose) or empty,
+        _gather(cell, energies(cell), f"{kind}_energy", f"the energy of a {kind}") or empty,
+        _gather(cell, sums, f"{kind}_forces", purpose) or empty,
         cell.relation == GRAPH,
-        _gather(cell, follow, f"{what}_slopes", f"{purpose}, and to their variations") or empty,
-        _gather(cell, observed_sums(cell), f"{what}_quantities", f"the densities of observables of a {what}") or empty,
+        _gather(cell, varied_sums, f"{kind}_slopes", f"{purpose}, and to their variations") or empty,
+        _gather(cell, observed_sums(cell), f"{kind}_quantities", f"the densities of observables of a {kind}") or empty,
     )
 
 
@@ -401,7 +425,7 @@ def _sites(cell: Cell, colouring: Colouring, kernels: Sequence[Kernel]) -> Sites
 
 
 def _ends(cell: Cell, kernels: Sequence[Kernel]) -> dict[str, tuple[str, str]]:
-    """What kernels of pairs read, with the end of the pair."""
+    """Return the symbols that kernels of pairs read, each with its field and the end of the pair."""
     places = [p for kernel in kernels for p in cell.places(*kernel.roots).items()]
     return {name: (f, str(offset[0])) for name, (f, offset) in places}
 
@@ -417,7 +441,7 @@ def _lattice_fact(cell: Cell, colouring: Colouring) -> str:
 
 
 def _facts(plan: LatticePlan) -> Sequence[str]:
-    """What the header says of the method."""
+    """Return the lines of the header on the method."""
     if isinstance(plan, SeriesPlan):
         return plan.facts
     choice = plan.choice
@@ -436,7 +460,7 @@ def _facts(plan: LatticePlan) -> Sequence[str]:
 
 
 def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
-    """What the header says of forces and noise."""
+    """Yield the lines of the header on forces and noise."""
     series = isinstance(plan, SeriesPlan)
     how = "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(cell.forces.vector)
     yield from forces_said(bool(cell.forces), pushed_casimirs(cell), how if series else "")
@@ -444,9 +468,9 @@ def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
 
 
 def _operations(step: Sweeps) -> dict[str, int]:
-    """The operations of a step at one site."""
+    """Return the numbers of operations of a step at one site."""
     times = Counter(part for part, _ in step.schedule.flows)
-    if step.by_colour:  # of each colour, but for the first and the last
+    if step.by_colour:  # for each colour but the first and the last
         times = Counter(dict.fromkeys(range(len(step.parts)), 2 * step.schedule.stages))
     counted: Counter[str] = Counter()
     for part, sweeps in enumerate(step.parts):

@@ -1,4 +1,4 @@
-"""How what is computed at a site follows variations of the fields around it, for Newton's method and tangents."""
+"""Derivatives of kernels at a site along variations of the fields around it, for Newton's method and tangents."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from phigen.symbolic.symbols import GATHERED, INITIAL, VARIATION, Symbol, kind_o
 
 
 def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
-    """The derivatives of values along the `variation` of each field that they read, and along that of what bonds or
-    pairs add up (`varied_sum`)."""
+    """Return the derivatives of values along variations.
+
+    The variations are those of the fields that the values read (`variation`), and of the sums over bonds or pairs
+    (`varied_sum`).
+    """
     slots: dict[str, Symbol] = {n: variation(n) for n, (f, _) in cell.places(*values).items() if f in cell.fields}
     slots |= {n: varied_sum(n) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == GATHERED}
     slopes = (zip(slots.values(), gradient(e, list(slots)), strict=True) for e in values)
@@ -19,19 +22,19 @@ def along(cell: Cell, values: Sequence[Expression]) -> list[Expression]:
 
 
 def along_start(values: Sequence[Expression]) -> list[Expression]:
-    """The derivatives of values along the variation of each field that they read at the start of a stage."""
+    """Return the derivatives of values along the variations of the fields at the start of a stage."""
     starts = {n: variation(str(n.key[0])) for n in symbols_of(*values) if isinstance(n, Symbol) and n.kind == INITIAL}
     slopes = (zip(starts.values(), gradient(e, list(starts)), strict=True) for e in values)
     return [total(d * symbol(v) for v, d in listed if not d.is_zero) for listed in slopes]
 
 
 def varied_sum(name: Symbol) -> Symbol:
-    """The symbol of the variation of a sum over bonds or pairs."""
+    """Return the symbol of the variation of a sum over bonds or pairs."""
     return Symbol(GATHERED, VARIATION, *name.key)
 
 
 def with_variations(cell: Cell, values: Mapping[str, Expression]) -> dict[str, Expression]:
-    """What a bond or a pair adds, and what it adds to the variations of these sums."""
+    """Return the terms of a bond or a pair in sums, with the terms in the variations of these sums."""
     names = [n for n in values if isinstance(n, Symbol) and kind_of(n) == GATHERED]
     assert len(names) == len(values)
     return {**values, **dict(zip(map(varied_sum, names), along(cell, list(values.values())), strict=True))}

@@ -21,7 +21,7 @@ from phigen.geometry.checks import COMMUTING
 from phigen.lattice.acting import noise_statements
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.expansion import Expansion, expand, ring
-from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MOST_BALANCED, errors_of, units_of, works
+from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SITE_STEPS, errors_of, units_of, works
 from phigen.lattice.series import SeriesPlan
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
@@ -99,7 +99,7 @@ def verify_lattice(
     """
     assert compilation.cell is not None
     subject = _Subject(compilation, solvers, start, h, t0, seed)
-    most = MOST_BALANCED if compilation.cell.driven else MOST_UPDATES
+    most = MAX_BALANCED_SITE_STEPS if compilation.cell.driven else MOST_UPDATES
     steps = min(steps, max(20, (min(most, FEW_UPDATES) if quick else most) // int(np.prod(start.sizes))))
     name = compilation.spec.name
     with progress.stage(f"{name}: {steps} steps"):

@@ -14,7 +14,7 @@ from phigen.errors import PhigenWarning
 from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import vector_field
 from phigen.lattice.expansion import expand, run_of
-from phigen.lattice.recognition import written_out
+from phigen.lattice.recognition import recognised_lattice
 from phigen.lattice.states import start_of
 from phigen.spec import load, loads
 from phigen.spec.model import Spec
@@ -40,7 +40,7 @@ def bundled(name: str) -> Spec:
 @pytest.mark.parametrize("name", SIZES)
 def test_a_lattice_comes_back_from_its_expansion(name: str) -> None:
     spec = loads(LATTICES[name])
-    found = written_out(expanded(name), least=4)
+    found = recognised_lattice(expanded(name), least=4)
     assert (found.lattice.axes, found.lattice.boundary) == (spec.lattice.axes, spec.lattice.boundary)
     assert {p.name: p.at for p in found.parameters} == {p.name: p.at for p in spec.parameters}
     assert found.lattice.kinds == spec.lattice.kinds
@@ -50,10 +50,10 @@ def test_a_lattice_comes_back_from_its_expansion(name: str) -> None:
 
 
 def test_specs_that_people_wrote_are_recognised_with_casimirs_invariants_and_runs() -> None:
-    spins = written_out(bundled("spin_chain5"), least=4)
+    spins = recognised_lattice(bundled("spin_chain5"), least=4)
     assert spins.lattice.kinds == {"C": "sites"}
     assert set(spins.invariants) == {"X", "Y", "Z"}
-    assert written_out(bundled("volterra5"), least=4).lattice.kinds == {"C": "product"}
+    assert recognised_lattice(bundled("volterra5"), least=4).lattice.kinds == {"C": "product"}
     read = loads(spec_text(spins))
     run = read.runs["reference"]
     assert start_of(read, run).state.reshape(-1).tolist() == [1, 0, 0.6, 0, 0, 0, 1, 0, -0.8, 0, 0, 0, 0.8, 0.6, 1]
@@ -71,12 +71,12 @@ def test_specs_that_people_wrote_are_recognised_with_casimirs_invariants_and_run
 def test_one_site_that_differs_is_no_lattice(old: str, new: str) -> None:
     source = resources.bundled()["spin_chain5"].read_text(encoding="utf-8")
     assert old in source
-    assert written_out(loads(source.replace(old, new)), least=4) is None
+    assert recognised_lattice(loads(source.replace(old, new)), least=4) is None
 
 
 @pytest.mark.parametrize("name", ["kepler", "rigid_body", "lagrange_top", "so4_manakov", "toda3"])
 def test_other_systems_are_no_lattices(name: str) -> None:
-    assert written_out(bundled(name), least=2) is None
+    assert recognised_lattice(bundled(name), least=2) is None
 
 
 def test_parameters_with_numbers_are_at_sites_with_their_values_of_a_run() -> None:
@@ -88,13 +88,13 @@ def test_parameters_with_numbers_are_at_sites_with_their_values_of_a_run() -> No
     ordinary = replace(
         expansion.spec(), runs={"quench": run_of(expansion, run, start.state, expansion.numbers(start.parameters))}
     )
-    found = loads(spec_text(written_out(ordinary, least=4)))
+    found = loads(spec_text(recognised_lattice(ordinary, least=4)))
     again = start_of(found, found.runs["quench"])
     assert again.parameters["B"].tolist() == start.parameters["B"].tolist()
     assert again.state.tolist() == start.state.tolist()
 
 
-def test_who_compiles_a_lattice_written_out_is_told() -> None:
+def test_who_compiles_a_lattice_recognised_lattice_is_told() -> None:
     spec = loads(spec_text(replace(expanded("fput"), name="chain")), "chain.yaml")
     with pytest.warns(PhigenWarning, match="chain is a lattice of 16 like sites") as caught:
         compile_spec(spec, scheme="splitting", order=2)
