@@ -25,7 +25,7 @@ if TYPE_CHECKING:
         ToolchainError,
     )
     from phigen.geometry.system import System
-    from phigen.lattice.system import LatticeSystem
+    from phigen.lattice.lattice_system import LatticeSystem
     from phigen.runtime.habits import solve_ivp
     from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
     from phigen.runtime.solver import Solver
@@ -39,7 +39,7 @@ _HOMES = {
     "sweep": "phigen.sweeping.api",
     "System": "phigen.geometry.system",
     "LatticeSolver": "phigen.runtime.lattice",
-    "LatticeSystem": "phigen.lattice.system",
+    "LatticeSystem": "phigen.lattice.lattice_system",
     "LatticeTrajectory": "phigen.runtime.lattice",
     "Solver": "phigen.runtime.solver",
     "solve_ivp": "phigen.runtime.habits",

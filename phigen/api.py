@@ -29,7 +29,7 @@ from phigen.spec.names import ARGUMENT_HINT, ARGUMENTS, IDENTIFIER, PROFILES, SC
 from phigen.spec.taken import objection
 
 if TYPE_CHECKING:
-    from phigen.lattice.system import LatticeSystem
+    from phigen.lattice.lattice_system import LatticeSystem
     from phigen.notation.sympy_formulas import SympyFormulas
     from phigen.runtime.backend import Backend
     from phigen.runtime.interface import Interface
@@ -49,7 +49,7 @@ def load(path: str | PathLike[str]) -> System | LatticeSystem:
     spec = specs.load(resources.file_of(fspath(path)))
     try:
         if spec.lattice:
-            from phigen.lattice.system import lattice_from_spec
+            from phigen.lattice.lattice_system import lattice_from_spec
 
             return lattice_from_spec(spec)
         return system_from_spec(spec)

@@ -21,7 +21,7 @@ from phigen.symbolic.expression import Expression
 
 if TYPE_CHECKING:
     from phigen.lattice.cell import Cell
-    from phigen.lattice.sweeps import LatticePlan
+    from phigen.lattice.sweep_plans import LatticePlan
 
 
 class NoSystem:

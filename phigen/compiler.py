@@ -65,7 +65,7 @@ def compile_spec(
     """
     spec, clock = spec.overridden(**options), _Clock()
     if spec.lattice:
-        from phigen.lattice.building import cell_from_spec
+        from phigen.lattice.cell_building import cell_from_spec
 
         with bounded(spec):
             cell = clock.timed("cell", lambda: cell_from_spec(spec))
@@ -162,7 +162,7 @@ def _tell_of_lattice(spec: Spec) -> None:
 
 def _examine_lattice(spec: Spec, clock: _Clock) -> Examination:
     """Prove what can be proved about a lattice, for all sizes at once."""
-    from phigen.lattice.building import cell_from_spec
+    from phigen.lattice.cell_building import cell_from_spec
     from phigen.proofs import lattices
 
     with bounded(spec), progress.stage(spec.name):
@@ -279,9 +279,9 @@ def _swept(spec: Spec, cell: Cell, clock: _Clock) -> Compilation:
     """Compile a lattice, of any sizes, to sweeps over its sites."""
     if spec.scheme == "gauss":
         expect_offered(spec)
-    from phigen.lattice.building import expect_coloured
+    from phigen.lattice.cell_building import expect_coloured
     from phigen.lattice.series import SeriesPlan
-    from phigen.lattice.sweeps import build_sweeps, plan_sweeps
+    from phigen.lattice.sweep_plans import build_sweeps, plan_sweeps
 
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec))
     if spec.solver.compensated and (isinstance(plan, SeriesPlan) or spec.extras.adjoint):

@@ -21,7 +21,7 @@ OPTION = "--expand"
 
 def expanded_text(spec: Spec, sizes: str) -> str:
     """The text of a spec for the lattice at sizes such as ``3x3``, or at those of the run of that name."""
-    from phigen.lattice.building import cell_from_spec
+    from phigen.lattice.cell_building import cell_from_spec
     from phigen.spec.yaml_text import spec_text
 
     if spec.lattice is None:
@@ -61,7 +61,7 @@ def typed_sizes(text: str) -> tuple[int, ...] | None:
 
 def too_small(cell: Cell, sizes: Sequence[int], text: str) -> str:
     """Refusal of sizes that are too small for the stencil; empty if they are large enough."""
-    from phigen.lattice.building import least_sizes
+    from phigen.lattice.cell_building import least_sizes
 
     least = least_sizes(cell)
     if all(size >= room for size, room in zip(sizes, least, strict=False)):

@@ -43,7 +43,7 @@ def resized(spec: Spec, name: str | None, text: str | None) -> Spec:
         expected = f"the axes {', '.join(axes)}" if len(axes) > 1 else "one axis" if axes else "sites alone"
         many = counted(len(sizes), "size")
         raise click.BadParameter(f"{text} has {many}; {spec.name} has {expected}", param_hint=OPTION)
-    from phigen.lattice.building import cell_from_spec
+    from phigen.lattice.cell_building import cell_from_spec
 
     if small := too_small(cell_from_spec(spec), sizes, text):
         raise click.BadParameter(small, param_hint=OPTION)

@@ -93,7 +93,7 @@ def command(
 
 def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -> None:
     from phigen.cli.show_lattice import described_cell, print_cell
-    from phigen.lattice.building import cell_from_spec
+    from phigen.lattice.cell_building import cell_from_spec
     from phigen.notation.lattices import document
 
     cell = cell_from_spec(spec)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.cell import GRAPH, PAIRS, Cell
 from phigen.lattice.graphs import site_sums, sums_by_field
-from phigen.lattice.parts import (
+from phigen.lattice.site_parts import (
     FORCE,
     BondSum,
     CellFlow,

@@ -11,8 +11,8 @@ from collections.abc import Iterator, Sequence
 
 from phigen.lattice.cell import Cell
 from phigen.lattice.graphs import sums_by_field
-from phigen.lattice.parts import CellFlow, SiteFields, SiteMotion, summands_of
-from phigen.lattice.sweeps import SplittingPlan
+from phigen.lattice.site_parts import CellFlow, SiteFields, SiteMotion, summands_of
+from phigen.lattice.sweep_plans import SplittingPlan
 from phigen.splitting.ring import KICK, TIME
 from phigen.splitting.statements import angles_added
 from phigen.symbolic.expression import ONE, ZERO, Expression, derivatives, number, substitute, symbol, symbols_of, total

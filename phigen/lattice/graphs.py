@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.lattice.cell import GRID, PAIRS, Cell
-from phigen.lattice.parts import (
+from phigen.lattice.site_parts import (
     FORCE,
     BondSum,
     CellFlow,

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from phigen.errors import StepError
-from phigen.lattice.balance import Power, inside_ends, integral, shifted
 from phigen.lattice.cell import Cell
+from phigen.lattice.energy_balance import Power, inside_ends, integral, shifted
 from phigen.runtime.arguments import Beginning
 from phigen.runtime.interface import BackendError
 from phigen.runtime.lattice import LatticeTrajectory

@@ -20,7 +20,7 @@ from typing import Any
 from phigen.errors import SpecError
 from phigen.geometry.forms import algebra_of_form, poisson_matrix
 from phigen.geometry.shapes import Matrix
-from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import Expansion
 from phigen.spec import limits
 from phigen.spec.model import Lattice, LatticeRun, MatrixForm, Parameter, Run, Spec, Values

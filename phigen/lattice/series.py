@@ -12,10 +12,10 @@ from fractions import Fraction
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.cell import Cell
+from phigen.lattice.cell_realisation import CellRealisation, realise_cell
 from phigen.lattice.graphs import sums_by_field
-from phigen.lattice.kernels import site_kernel
-from phigen.lattice.parts import Colouring, SiteFields
-from phigen.lattice.realisation import CellRealisation, realise_cell
+from phigen.lattice.site_kernels import site_kernel
+from phigen.lattice.site_parts import Colouring, SiteFields
 from phigen.lattice.variations import along, along_start
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.composition import find, orders

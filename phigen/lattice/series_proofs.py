@@ -14,9 +14,9 @@ from dataclasses import replace
 
 from phigen.geometry.system import System, build_system
 from phigen.lattice.cell import PERIODIC, Cell
+from phigen.lattice.cell_realisation import CellRealisation
 from phigen.lattice.expansion import Expansion, Site, expand
 from phigen.lattice.graphs import field_with_sums
-from phigen.lattice.realisation import CellRealisation
 from phigen.lattice.series import SeriesPlan
 from phigen.realisations import axioms
 from phigen.realisations.protocol import BiRealisation, is_symmetric

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phigen.errors import SpecError
-from phigen.lattice.files import bonds_in, values_in
+from phigen.lattice.array_files import bonds_in, values_in
 from phigen.runtime.memory import expect_room
 from phigen.spec.model import LatticeRun, Run, Spec, Values
 from phigen.symbolic.arrays import evaluate

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from phigen.compilation import Compilation
-from phigen.lattice import acting, flow_proofs, proofs, series_proofs
+from phigen.lattice import flow_proofs, forcing, proofs, series_proofs
 from phigen.lattice.cell import Cell
 from phigen.lattice.series import SeriesPlan
 from phigen.proofs.statements import CASIMIRS, FORCES, INVARIANTS, METHOD, NOISE, SPLITTING
@@ -17,8 +17,8 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
         return groups
     statements = {
         CASIMIRS: tuple(proofs.casimirs(cell)),
-        FORCES: tuple(acting.force_statements(cell)),
-        NOISE: tuple(acting.noise_statements(cell)),
+        FORCES: tuple(forcing.force_statements(cell)),
+        NOISE: tuple(forcing.noise_statements(cell)),
         INVARIANTS: tuple(proofs.invariants(cell)),
         "Hamiltonian": tuple(proofs.pair_symmetry(cell)),
     }

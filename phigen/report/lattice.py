@@ -11,7 +11,7 @@ from markupsafe import Markup
 from phigen.compilation import Compilation
 from phigen.drawing.lattices import lattice_figure, places_of, sites_figure
 from phigen.lattice.cell import Cell
-from phigen.lattice.sweeps import SplittingPlan
+from phigen.lattice.sweep_plans import SplittingPlan
 from phigen.notation import mathml
 from phigen.notation.lattices import described, formulas
 from phigen.proofs.examination import Examination

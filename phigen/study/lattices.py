@@ -18,9 +18,9 @@ from phigen import progress
 from phigen.compilation import Compilation
 from phigen.errors import StepError
 from phigen.geometry.checks import COMMUTING
-from phigen.lattice.acting import noise_statements
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.expansion import Expansion, expand, ring
+from phigen.lattice.forcing import noise_statements
 from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SITE_STEPS, errors_of, units_of, works
 from phigen.lattice.series import SeriesPlan
 from phigen.lattice.states import Start

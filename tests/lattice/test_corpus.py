@@ -14,8 +14,8 @@ from phigen import resources
 from phigen.api import lattice_solver_of
 from phigen.compiler import compile_spec, emit, examine
 from phigen.geometry.system import system_from_spec
-from phigen.lattice.building import cell_from_spec, least_sizes
 from phigen.lattice.cell import vector_field
+from phigen.lattice.cell_building import cell_from_spec, least_sizes
 from phigen.lattice.expansion import expand
 from phigen.lattice.observing import summed
 from phigen.lattice.states import start_of

@@ -13,8 +13,8 @@ from lattice.lattices import LATTICES, on_grid
 
 from phigen.geometry.checks import check
 from phigen.geometry.system import System, hamiltonian_vector_field, system_from_spec
-from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import Cell, bond_forces, contributions, vector_field
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import Expansion, expand, run_of
 from phigen.lattice.observing import summed
 from phigen.lattice.recognition import recognised

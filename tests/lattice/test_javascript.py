@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lattice import test_acting, test_tangents, test_time
+from lattice import test_forcing, test_tangents, test_time
 from lattice.lattices import LATTICES
 from node import answers as answers_of
 
@@ -98,8 +98,8 @@ VARIANTS: dict[str, Callable[[], Spec]] = {
 }
 #: Lattices with a time, and with forces.
 DRIVEN = {f"{name}, in time": (test_time, name) for name in test_time.TEXTS}
-DRIVEN |= {f"{name}, forced": (test_acting, name) for name in test_acting.FORCED}
-DRIVEN |= {f"{name}, noisy": (test_acting, name) for name in test_acting.NOISY}
+DRIVEN |= {f"{name}, forced": (test_forcing, name) for name in test_forcing.FORCED}
+DRIVEN |= {f"{name}, noisy": (test_forcing, name) for name in test_forcing.NOISY}
 #: Whose random numbers they are: numbers of 64, 32 and 48 bits.
 DRAWS: dict[str, Any] = {"seed": 2**61 + 5, "member": 2**31 + 3, "step0": 2**45 + 2}
 CASES = [*CORPUS, *VARIANTS, *DRIVEN]
@@ -222,7 +222,7 @@ def test_one_number_is_the_value_at_all_bonds_of_none(tmp_path: Path, answers: d
 #: Tangent vectors: open ends, colours, a graph of colours, pairs, noise, the series with sweeps and Newton's method.
 CARRYING = {
     **dict.fromkeys(("sheet", "volterra", "magnet", "tangle", "vortices"), test_tangents.with_tangents),
-    **{name: lambda name: carrying(test_acting.compiled(name)) for name in ("free", "bath")},
+    **{name: lambda name: carrying(test_forcing.compiled(name)) for name in ("free", "bath")},
     "stiff graph": lambda name: carrying(compiled(name)),
 }
 
@@ -240,8 +240,8 @@ def carried(tmp_path_factory: pytest.TempPathFactory) -> dict[str, tuple[dict[st
         if case in test_tangents.IN_C:
             x = test_tangents.start(case, test_tangents.FEW.get(case))
             values, h = test_tangents.disorder(case, x), test_tangents.H
-        elif case in test_acting.TEXTS:
-            (x, values), h = test_acting.given(case), 0.05
+        elif case in test_forcing.TEXTS:
+            (x, values), h = test_forcing.given(case), 0.05
         else:
             begin, h = begun(case)
             x, values = begin.state, begin.arguments

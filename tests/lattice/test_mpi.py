@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lattice import test_acting as acting
+from lattice import test_forcing as forcing
 from lattice.test_sweeps import UNEVEN, disorder, solver, start, with_default
 
 from phigen.runtime import toolchain
@@ -39,7 +39,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> Path:
         # steps so large that some need the functions for large arguments
         run = found.integrate(x, 0.2, 50, 20, **values)
         np.savez(folder / f"{name}_alone.npz", x=run.x, energy=run.energy)
-    found, x = acting.solver("hot", 2, "c"), np.random.default_rng(1).normal(size=(3, 9, 5))
+    found, x = forcing.solver("hot", 2, "c"), np.random.default_rng(1).normal(size=(3, 9, 5))
     with (folder / "hot.pickle").open("wb") as file:
         pickle.dump((found, x, {"T": 0.3}), file)
     run = found.integrate(x, 0.2, 50, 20, seed=7, T=0.3)

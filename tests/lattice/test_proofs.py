@@ -11,8 +11,8 @@ from phigen import resources
 from phigen.compiler import examine
 from phigen.geometry.jacobi import jacobi_identity
 from phigen.geometry.system import system_from_spec
-from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import Cell
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import expand
 from phigen.lattice.proofs import euler, tensor
 from phigen.spec import loads

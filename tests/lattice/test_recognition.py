@@ -11,8 +11,8 @@ from lattice.lattices import LATTICES
 from phigen import resources
 from phigen.compiler import compile_spec
 from phigen.errors import PhigenWarning
-from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import vector_field
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import expand, run_of
 from phigen.lattice.recognition import recognised_lattice
 from phigen.lattice.states import start_of

@@ -15,7 +15,7 @@ from systems import slow_but
 
 import phigen
 from phigen.compiler import compile_spec, emit
-from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import expand
 from phigen.runtime.lattice import LatticeSolver
 from phigen.spec import loads

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from lattice import test_acting as acting
+from lattice import test_forcing as forcing
 from lattice import test_sweeps as sweeps
 from lattice import test_time as timed
 
 from phigen.errors import StepError
 
 #: A splitting whose steps are joined, one in time, the series with noise, and a splitting with noise.
-CASES = {"xxz": sweeps, "coloured": timed, "bath": acting, "langevin": acting}
+CASES = {"xxz": sweeps, "coloured": timed, "bath": forcing, "langevin": forcing}
 
 
 def prepared(name: str, target: str) -> tuple[Any, np.ndarray, dict[str, Any]]:

@@ -17,7 +17,7 @@ from phigen.api import lattice_solver_of, solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
 from phigen.errors import StepError
-from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import expand
 from phigen.runtime.modules import load_module
 

@@ -20,7 +20,7 @@ from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec, emit
 from phigen.errors import SpecError, StepError
-from phigen.lattice.building import cell_from_spec
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.lattice.expansion import Expansion, expand
 from phigen.proofs import lattices, statements
 from phigen.runtime.lattice import LatticeSolver

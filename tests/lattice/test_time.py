@@ -15,7 +15,7 @@ from phigen.api import lattice_solver_of
 from phigen.compilation import Compilation
 from phigen.compiler import compile_spec
 from phigen.geometry.system import system_from_spec
-from phigen.lattice.balance import Power, integral
+from phigen.lattice.energy_balance import Power, integral
 from phigen.lattice.expansion import expand
 from phigen.lattice.observing import BALANCE, errors_of
 from phigen.lattice.states import Start

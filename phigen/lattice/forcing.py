@@ -18,7 +18,7 @@ from phigen.lattice.cell import GRAPH, PERIODIC, Cell
 from phigen.lattice.damping import damping_flows
 from phigen.lattice.expansion import expand
 from phigen.lattice.graphs import sums_by_field
-from phigen.lattice.parts import (
+from phigen.lattice.site_parts import (
     CellFlow,
     Colouring,
     NoPartError,

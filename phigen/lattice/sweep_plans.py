@@ -10,9 +10,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.errors import Diagnostic, SpecError
-from phigen.lattice.acting import force_flows, noise_flows, pushed_casimirs
-from phigen.lattice.adjoint import transposed
-from phigen.lattice.building import (
+from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
+from phigen.lattice.cell_building import (
     Misfit,
     MisfitError,
     least_sizes,
@@ -21,13 +20,14 @@ from phigen.lattice.building import (
     misfits,
     seam_reason,
 )
-from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
+from phigen.lattice.cell_kicks import cell_kicks
 from phigen.lattice.damping import TogetherError
+from phigen.lattice.forcing import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.graphs import GraphSearch, energies, site_sums
-from phigen.lattice.kernels import site_kernel
-from phigen.lattice.kicks import cell_kicks
-from phigen.lattice.observables import observables, observed_sums
-from phigen.lattice.parts import (
+from phigen.lattice.observable_kernels import observables, observed_sums
+from phigen.lattice.series import SeriesPlan, equation, plan_series
+from phigen.lattice.site_kernels import site_kernel
+from phigen.lattice.site_parts import (
     BondSum,
     CellFlow,
     CellSplitting,
@@ -37,7 +37,7 @@ from phigen.lattice.parts import (
     SiteMotion,
     splittings,
 )
-from phigen.lattice.series import SeriesPlan, equation, plan_series
+from phigen.lattice.site_transposes import transposed
 from phigen.lattice.variations import along, with_variations
 from phigen.scheme.alternation import Alternation, Schedule, with_clock
 from phigen.scheme.alternation import schedule as alternating

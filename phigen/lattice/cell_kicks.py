@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from phigen.lattice.cell import GRID, Cell
-from phigen.lattice.parts import CellFlow, CellSplitting, PartSearch, Summand
+from phigen.lattice.site_parts import CellFlow, CellSplitting, PartSearch, Summand
 from phigen.splitting.kicks import MOST_MONOMIALS, Kick, degree
 from phigen.splitting.ring import Ring
 from phigen.symbolic.expression import Expression, gradient, symbols_of

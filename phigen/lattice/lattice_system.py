@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from typing import cast
 
 from phigen.display import display
-from phigen.lattice.building import cell_from_spec
 from phigen.lattice.cell import Cell
+from phigen.lattice.cell_building import cell_from_spec
 from phigen.spec.model import Spec
 
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.graphs import field_with_sums
-from phigen.lattice.kernels import site_kernel
-from phigen.lattice.parts import BondSum, present, summands_of
+from phigen.lattice.site_kernels import site_kernel
+from phigen.lattice.site_parts import BondSum, present, summands_of
 from phigen.scheme.program import Observables
 from phigen.spec.names import ADDITIVE
 from phigen.symbolic.expression import ONE, Expression, call, number, symbol, total
