@@ -16,6 +16,7 @@ CLEAN = (
     "drawing",
     "fmu",
     "geometry",
+    "ir",
     "lattice",
     "notation",
     "paper",

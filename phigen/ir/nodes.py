@@ -1,8 +1,8 @@
 """Nodes of the loop IR. Real arithmetic is an `Expression` over symbols that statements declare.
 
-There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops go
-over sites, bonds or pairs. Each target has one lowering pass from there to the level of *memory*, where `Entry`,
-`Member` and plain loops say which array element is meant. Printers accept the level of memory only.
+There are two levels. On the level of *sites*, `Load` and `Store` name an array and the offset of a site, and loops
+run over sites, bonds or pairs. On the level of *memory*, `Entry`, `Member` and plain loops name elements of arrays.
+Each target has one lowering pass from sites to memory; printers accept the level of memory only.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from enum import Enum, auto
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.symbols import Symbol
 
-#: The kinds of symbols that are printed as they are, since the printed function reserves them; and of those that are
-#: printed by their text, unless a name of the user is the same.
+#: The kind of symbols that are printed as they are, since the printed function reserves them; and the kind of those
+#: that are printed by their text, unless the user has the same name.
 FIXED, LABEL = "fixed", "label"
 
 
@@ -58,7 +58,7 @@ class Storage(Enum):
 
 @dataclass(frozen=True)
 class Array:
-    """Array over the sites: its number among those of one kind of storage."""
+    """Array over the sites: its number among the arrays of one kind of storage."""
 
     storage: Storage
     number: int
@@ -86,7 +86,8 @@ class Constant:
 class Load:
     """Element of an array at an offset from the site of the loop, or at the ``end``, a or b, of a bond or pair.
 
-    In transposed functions, arrays of cotangents are loaded and stored at the end "bond" too: at the bond itself.
+    In transposed functions the end "bond" is the bond itself: arrays of cotangents of parameters at bonds are loaded
+    and stored there.
     """
 
     array: Array
@@ -96,7 +97,7 @@ class Load:
 
 @dataclass(frozen=True)
 class Coefficient:
-    """State-independent value that ``prepare`` has computed."""
+    """State-independent value, computed by ``prepare``."""
 
     number: int
 
@@ -171,7 +172,7 @@ class Binary:
 
 @dataclass(frozen=True)
 class Accumulated:
-    """A value to which the terms of another one are added one by one, from the left."""
+    """A value, plus the terms of another value added one by one, from the left."""
 
     start: Value
     terms: Value
@@ -187,7 +188,7 @@ class Cast:
 
 @dataclass(frozen=True)
 class Select:
-    """One of two values by a condition."""
+    """One of two values, selected by a condition."""
 
     condition: Value
     then: Value
@@ -218,7 +219,7 @@ class Listed:
 
 @dataclass(frozen=True)
 class Several:
-    """Values with commas between them."""
+    """Values separated by commas."""
 
     values: tuple[Value, ...]
 
@@ -243,7 +244,7 @@ Value = (
 
 @dataclass(frozen=True)
 class Declare:
-    """Constants of one type; those ``in_place`` get no name: their value is printed wherever they are used."""
+    """Constants of one type; a constant ``in_place`` gets no name: its value is printed wherever it is used."""
 
     type: Type | Pointer | Vector
     items: tuple[tuple[str, Value], ...]
@@ -254,7 +255,7 @@ class Declare:
 
 @dataclass(frozen=True)
 class Unpack:
-    """Constants that are the members, or the items, of one value."""
+    """Constants for the members, or the items, of one value."""
 
     names: tuple[str, ...]
     value: Value
@@ -262,7 +263,10 @@ class Unpack:
 
 @dataclass(frozen=True)
 class Store:
-    """The element at the site of the loop becomes a value, or grows by it; so does one that `Load` reads otherwise."""
+    """Assign a value to the element at the site of the loop or, if it ``adds``, add the value to the element.
+
+    ``offset`` and ``end`` select other elements, as in `Load`.
+    """
 
     array: Array
     value: Value
@@ -273,7 +277,7 @@ class Store:
 
 @dataclass(frozen=True)
 class Reduce:
-    """The cotangent of a value that is the same at all sites, a coefficient or a parameter, grows by a value."""
+    """Add a value to the cotangent of a coefficient or a parameter, which is the same at all sites."""
 
     source: str  # coef or params
     number: int
@@ -281,13 +285,13 @@ class Reduce:
     value: Value
 
 
-#: Statements whose values are graphs until temporaries are made.
+#: Statements whose values are graphs before the pass `phigen.ir.passes.temporaries`.
 Update = Store | Reduce
 
 
 @dataclass(frozen=True)
 class GatherSums:
-    """The sums over bonds or pairs are computed for all sites by the functions of these names."""
+    """Compute sums over bonds or pairs for all sites, by the functions of these names."""
 
     functions: tuple[str, ...]
     count: int
@@ -295,7 +299,7 @@ class GatherSums:
 
 @dataclass(frozen=True)
 class Assign:
-    """A place in memory, and others ``too``, becomes a value, or grows by it."""
+    """Assign a value to a place in memory and to the places ``too`` or, if it ``adds``, add it."""
 
     target: Value
     value: Value
@@ -305,7 +309,7 @@ class Assign:
 
 @dataclass(frozen=True)
 class Clear:
-    """The first elements of an array, or those from an index on, become zero."""
+    """Set ``count`` elements of an array to zero, from the index ``first`` on."""
 
     array: Name
     first: Value | None
@@ -314,7 +318,10 @@ class Clear:
 
 @dataclass(frozen=True)
 class Selection:
-    """The sites that a sweep updates: of one ``colour``, away from boundary seams, or on those of a ``window``."""
+    """The sites that a sweep updates: those of one ``colour``, those away from boundary seams, or those on a seam.
+
+    ``inside`` excludes boundary seams; ``window`` selects the sites on the seams of these axes.
+    """
 
     colour: int | None = None
     inside: bool = False
@@ -326,9 +333,9 @@ ALL_SITES = Selection()
 
 @dataclass(frozen=True)
 class Loop:
-    """Loop over sites, bonds or pairs; in memory over a variable from ``low`` to before ``high``.
+    """Loop over sites, bonds or pairs; in memory, over a variable from ``low`` to before ``high``.
 
-    ``end`` and ``chosen`` say which bonds a loop over bonds takes, as in `phigen.scheme.steps.Ends`.
+    ``end`` and ``chosen`` say which bonds a loop over bonds runs over, as in `phigen.scheme.steps.Ends`.
     """
 
     kind: str
@@ -341,21 +348,21 @@ class Loop:
     chosen: str = ""
     step: Value | None = None
     limit: str = ""  # the name of a variable that holds ``high``
-    condition: Value | None = None  # under which the loop goes on
-    independent: str = ""  # what the compiler may vectorise over: SITE or LANE
+    condition: Value | None = None  # the loop runs while it holds
+    independent: str = ""  # SITE or LANE: the iterations that the compiler may vectorise
     note: str = ""
 
 
 @dataclass(frozen=True)
 class Discard:
-    """A parameter that is not read, for the compiler."""
+    """Mark a parameter as unused, for the compiler."""
 
     name: str
 
 
 @dataclass(frozen=True)
 class If:
-    """Statements under a condition."""
+    """Run statements if a condition holds."""
 
     condition: Value
     then: Block
@@ -371,12 +378,12 @@ class Within:
 
 @dataclass(frozen=True)
 class Continue:
-    """Go on with the next iteration."""
+    """Go to the next iteration."""
 
 
 @dataclass(frozen=True)
 class Call:
-    """A function called for its effect."""
+    """Call a function for its effect."""
 
     name: str
     arguments: tuple[Value, ...]
@@ -385,7 +392,7 @@ class Call:
 
 @dataclass(frozen=True)
 class Return:
-    """The end of a function."""
+    """End a function, with a value or without."""
 
     value: Value | None = None
 
@@ -414,7 +421,7 @@ PARAMETERS = ("coef", "params", "start", "state", "varied", "sites", "colour", "
 
 
 class LoopRole(Enum):
-    """Purpose of a function of loops; `phigen.scheme.kernel.Role` is that of a kernel."""
+    """Purpose of a function of loops, as `phigen.scheme.kernel.Role` is the purpose of a kernel."""
 
     SWEEP = auto()
     TANGENT_SWEEP = auto()
@@ -447,7 +454,7 @@ def fixed(name: str) -> Name:
 
 
 def label(text: str) -> Name:
-    """Return a name that is printed by its text, unless a name of the user is the same."""
+    """Return a name that is printed by its text, unless the user has the same name."""
     return Name(Symbol(LABEL, text))
 
 
@@ -467,5 +474,5 @@ def index(name: Name, value: Value) -> Declare:
 
 
 def plus(value: Value, offset: int) -> Value:
-    """Return a value moved by an integer."""
+    """Return a value plus an integer."""
     return Binary("+" if offset > 0 else "-", value, Constant(abs(offset))) if offset else value

@@ -7,7 +7,7 @@ from lattice.lattices import LATTICES
 
 from phigen.compiler import compile_spec
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes.by_tables import by_tables
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries

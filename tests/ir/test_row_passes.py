@@ -7,7 +7,7 @@ from ir.ir_text import text
 from ir.test_passes import P, Q, lattice
 
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes import row_loops, row_transposes
 from phigen.ir.passes.by_rows import RowLayout
 from phigen.symbolic.expression import symbol

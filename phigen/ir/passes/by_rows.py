@@ -1,4 +1,4 @@
-"""Lowering by rows: loops over a piece of a row, with pointers to that row of each array and to the rows beside it."""
+"""Lowering by rows: loops over a row segment, with pointers to the row in each array and to the neighbouring rows."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import Storage
 from phigen.symbolic.symbols import Symbol
 
@@ -21,7 +21,7 @@ _MEMBERS = {Storage.STATE: "x", Storage.VARIATION: "varied", Storage.START: "sta
 
 @dataclass(frozen=True)
 class RowLayout:
-    """The rows that functions read, by their offsets beside the row of the loop, and the members of ``params``."""
+    """The rows that functions read, by their offsets from the row of the loop, and the members of ``params``."""
 
     lattice: LatticeLoops
     lines: tuple[tuple[int, ...], ...]
@@ -34,31 +34,31 @@ class RowLayout:
 
     @property
     def colour_step(self) -> int:
-        """The distance in a row from a site to the next of its colour."""
+        """The distance in a row between two successive sites of one colour."""
         sites = self.lattice.step.sites
         return next(k for k in range(1, sites.colours + 1) if k * sites.weights[-1] % sites.colours == 0)
 
     def line(self, offset: Sequence[int]) -> int:
-        """Return the number of the row at an offset."""
+        """Return the number of the row that a neighbour at an offset lies in."""
         return self.lines.index(tuple(offset[:-1])) if any(offset) else 0
 
     def place(self, line: int) -> str:
-        """Return where a row is, beside that of the loop, for readers."""
+        """Return the position of a row relative to the row of the loop, for a comment."""
         axes = zip(self.lattice.step.sites.axes, self.lines[line], strict=False)
         return ", ".join(f"{axis} {'+' if o > 0 else '-'} {abs(o)}" for axis, o in axes if o)
 
     def row(self, arrays: ir.Value, line: int = 0, rows: str = "at") -> ir.Value:
-        """Return the address of a row of an array, by the member that holds the ``rows``."""
+        """Return the address of a row of an array; the member ``rows`` has the addresses of all rows."""
         return arrays if self.single_row else ir.Binary("+", arrays, ir.Entry(ir.Member(ROW, rows), ir.Constant(line)))
 
 
 @dataclass(frozen=True)
 class Reading:
-    """How a function reads: ``updated`` fields are written too; ``seeds`` are the arrays of cotangents of each kind.
+    """Access of a function to arrays.
 
-    Functions that sum over bonds at each site have the sums in ``local`` variables. The site of the loop is the end
-    ``here`` of a bond or pair; parameters at bonds are in ``at_bonds``, of which ``oriented`` ones have the opposite
-    sign seen from the end b.
+    The ``updated`` fields are written too; ``seeds`` are the arrays of cotangents of each kind. Functions that sum
+    over bonds at each site have the sums in ``local`` variables. The site of the loop is the end ``here`` of a bond
+    or pair. Parameters at bonds are in ``at_bonds``; ``oriented`` ones change their sign when seen from the end b.
     """
 
     updated: frozenset[str] = frozenset()
@@ -70,23 +70,23 @@ class Reading:
 
 
 @dataclass
-class Rows:
-    """The declarations that a function needs: those before its loop, and those at the site and at the other one."""
+class RowDeclarations:
+    """The declarations that a function needs before its loop, at the site, and at the other end of a bond or pair."""
 
     layout: RowLayout
-    how: Reading = field(default_factory=Reading)
+    reading: Reading = field(default_factory=Reading)
     once: list[tuple[str, ir.Value]] = field(default_factory=list)
     substituted: list[ir.Statement] = field(default_factory=list)
     starts: dict[str, tuple[ir.Pointer, ir.Value]] = field(default_factory=dict)
     rows: dict[tuple[str, int], ir.Name] = field(default_factory=dict)
     loaded: dict[str, ir.Value] = field(default_factory=dict)
     weights: list[ir.Statement] = field(default_factory=list)
-    own: list[tuple[str, ir.Value]] = field(default_factory=list)
+    here: list[tuple[str, ir.Value]] = field(default_factory=list)
     other: dict[str, ir.Value] = field(default_factory=dict)
     computed: list[ir.Statement] = field(default_factory=list)
 
-    def read(self, body: Iterable[ir.Statement]) -> Rows:
-        """Take the declarations of some statements; those of temporaries are ``computed``."""
+    def read(self, body: Iterable[ir.Statement]) -> RowDeclarations:
+        """Sort the declarations of some statements by where they belong; those of temporaries are ``computed``."""
         for s in body:
             match s:
                 case ir.Declare(items=((name, value),)):
@@ -102,8 +102,8 @@ class Rows:
             case ir.SystemParameter(parameter):
                 self.once.append((name, ir.Member(ir.Member(SOLVER, "params"), self.layout.members[parameter])))
             case ir.BondParameter(number, parameter):
-                at_bond = ir.Entry(ir.Entry(self.how.at_bonds, ir.Constant(number)), BOND)
-                oriented = parameter in self.how.oriented
+                at_bond = ir.Entry(ir.Entry(self.reading.at_bonds, ir.Constant(number)), BOND)
+                oriented = parameter in self.reading.oriented
                 self.other[name] = ir.Binary("*", ir.fixed("side"), at_bond) if oriented else at_bond
             case ir.HasColour():
                 chosen = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
@@ -117,9 +117,9 @@ class Rows:
             case _:
                 self.computed.append(s)
 
-    def _once(self, name: str, called: ir.Name, value: ir.Value) -> None:
-        self.once.append((called.symbol, value))
-        self._substitute(name, called)
+    def _once(self, name: str, local_name: ir.Name, value: ir.Value) -> None:
+        self.once.append((local_name.symbol, value))
+        self._substitute(name, local_name)
 
     def _substitute(self, name: str, value: ir.Value) -> None:
         self.substituted.append(ir.in_place(name, value))
@@ -127,17 +127,17 @@ class Rows:
     def _load(self, name: str, load: ir.Load) -> None:
         array, beside = load.array, any(load.offset)
         match array.storage:
-            case Storage.SUM if self.how.local:
+            case Storage.SUM if self.reading.local:
                 self._substitute(name, ir.fixed(f"sum{array.number}"))
             case Storage.SUM:
                 self._substitute(name, ir.Entry(_gathered(array.number), SITE))
             case Storage.SEED if load.offset:
                 line = self.layout.line(load.offset)
                 pointer = ir.Name(Symbol("around", array.number, line))
-                self._start(pointer, READ, self.layout.row(self.how.seeds["around"][array.number], line))
+                self._start(pointer, READ, self.layout.row(self.reading.seeds["around"][array.number], line))
                 self._substitute(name, _beside(pointer, load))
             case Storage.SEED:
-                self._at_end(name, self.how.seeds[array.name][array.number], load)
+                self._at_end(name, self.reading.seeds[array.name][array.number], load)
             case Storage.START:
                 pointer = ir.Name(Symbol("start", array.name))
                 self._start(pointer, READ, self.layout.row(_member(array)))
@@ -152,7 +152,7 @@ class Rows:
                     self._substitute(name, _beside(pointer, load))
             case _:
                 pointer = self.pointer(array.name, self.layout.line(load.offset))
-                if load.end == self.how.here and self.how.local:
+                if load.end == self.reading.here and self.reading.local:
                     self._substitute(name, ir.Name(array.name))
                     self.loaded[array.name] = ir.Entry(pointer, SITE)
                 elif beside:
@@ -164,26 +164,26 @@ class Rows:
         """Declare a value at the site of the loop, or at the other end of a bond or pair."""
         if not load.end:
             self.loaded[name] = ir.Entry(pointer, SITE)
-        elif load.end == self.how.here:
-            self.own.append((name, ir.Entry(pointer, SITE)))
+        elif load.end == self.reading.here:
+            self.here.append((name, ir.Entry(pointer, SITE)))
         else:
             self.other[name] = ir.Entry(pointer, OTHER)
 
     def _inside(self, name: str, value: ir.Inside) -> None:
-        called, number = ir.fixed(f"w{value.number}"), ir.Constant(value.number)
+        local_name, number = ir.fixed(f"w{value.number}"), ir.Constant(value.number)
         in_row: ir.Value = ir.Entry(ir.Member(ROW, "present"), number)
         low, high = value.bounds[-1]
         tests = [ir.Binary(">=", ir.plus(SITE, low), ir.Constant(0))] * (low < 0)
         tests += [ir.Binary("<", ir.plus(SITE, high), LENGTH)] * (high > 0)
         if not tests:
-            self._once(name, called, in_row)
+            self._once(name, local_name, in_row)
             return
-        there: ir.Value = ir.Constant(1.0)
-        if not self.layout.single_row:  # read before the loop, or gcc would not vectorise that
-            there = ir.fixed(f"there{value.number}")
-            self.once.append((there.symbol, in_row))
+        in_open_rows: ir.Value = ir.Constant(1.0)
+        if not self.layout.single_row:  # read before the loop, which gcc would not vectorise otherwise
+            in_open_rows = ir.fixed(f"there{value.number}")
+            self.once.append((in_open_rows.symbol, in_row))
         condition = tests[0] if len(tests) == 1 else ir.Binary("and", *tests)
-        self._weight(name, called, ir.Select(condition, there, ir.Constant(0.0)))
+        self._weight(name, local_name, ir.Select(condition, in_open_rows, ir.Constant(0.0)))
 
     def _on_seam(self, name: str, value: ir.OnSeam) -> None:
         line = self.layout.line(value.offset)
@@ -191,13 +191,13 @@ class Rows:
         self._start(kinds, READ, self.layout.row(ir.Member(SOLVER, "kinds"), line))
         if (window.symbol, ir.Member(ROW, "window")) not in self.once:
             self.once.append((window.symbol, ir.Member(ROW, "window")))
-        wanted = ir.Binary("+", window, ir.Constant(float(value.colour)))
-        own = ir.Binary("==", ir.Entry(kinds, ir.plus(SITE, value.offset[-1])), wanted)
-        self._weight(name, ir.fixed(f"w{value.number}"), ir.Select(own, ir.Constant(1.0), ir.Constant(0.0)))
+        seam_kind = ir.Binary("+", window, ir.Constant(float(value.colour)))
+        matches = ir.Binary("==", ir.Entry(kinds, ir.plus(SITE, value.offset[-1])), seam_kind)
+        self._weight(name, ir.fixed(f"w{value.number}"), ir.Select(matches, ir.Constant(1.0), ir.Constant(0.0)))
 
-    def _weight(self, name: str, called: ir.Name, value: ir.Value) -> None:
-        self.weights.append(ir.real(called.symbol, value))
-        self._substitute(name, called)
+    def _weight(self, name: str, local_name: ir.Name, value: ir.Value) -> None:
+        self.weights.append(ir.real(local_name.symbol, value))
+        self._substitute(name, local_name)
 
     def _start(self, pointer: ir.Name, kind: ir.Pointer, row: ir.Value) -> None:
         self.starts.setdefault(pointer.symbol, (kind, row))
@@ -208,19 +208,19 @@ class Rows:
 
     def before(self) -> Iterator[ir.Statement]:
         """Yield the declarations before the loop."""
-        for updated in sorted(self.how.updated):
+        for updated in sorted(self.reading.updated):
             self.pointer(updated)
-        first, beside = dict(self.starts), list[ir.Statement]()
+        pointers, neighbour_pointers = dict(self.starts), list[ir.Statement]()
         for (base, line), name in self.rows.items():
-            written = base in self.how.updated
+            written = base in self.reading.updated
             kind = ir.Pointer(constant=not (written and line == 0), restricted=not written)
             number = self.layout.lattice.arrays.index(base)
             row = self.layout.row(ir.Entry(ir.Member(ROW, "x"), ir.Constant(number)), line)
             if line:
-                beside.append(ir.Declare(kind, ((name.symbol, row),), note=self.layout.place(line)))
+                neighbour_pointers.append(ir.Declare(kind, ((name.symbol, row),), note=self.layout.place(line)))
             else:
-                first[name.symbol] = kind, row
-        yield from (*self.substituted, *together(self.once), *grouped(first), *beside)
+                pointers[name.symbol] = kind, row
+        yield from (*self.substituted, *together(self.once), *grouped(pointers), *neighbour_pointers)
 
     def at_site(self) -> list[ir.Statement]:
         """Return the declarations at the beginning of the loop over sites."""
@@ -228,20 +228,20 @@ class Rows:
 
 
 def lowered(function: ir.Function) -> ir.Loop:
-    """Return the loop of a function on the level of sites."""
+    """Return the loop of a function on the level of sites, its last statement."""
     loop = function.body[-1]
     assert isinstance(loop, ir.Loop)
     return loop
 
 
-def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **more: object) -> ir.Loop:
-    """Return the loop over the sites of a piece of a row."""
+def over_sites(body: Iterable[ir.Statement], independent: str = "SITE", **fields: object) -> ir.Loop:
+    """Return the loop over the sites of a row segment."""
     loop = ir.Loop("row", tuple(body), low=FROM, high=TO, limit="to", independent=independent)
-    return replace(loop, **more)  # type: ignore[arg-type]
+    return replace(loop, **fields)  # type: ignore[arg-type]
 
 
 def together(values: Iterable[tuple[str, ir.Value]]) -> list[ir.Statement]:
-    """Return one declaration of several reals."""
+    """Return one declaration of several real constants."""
     items = tuple(values)
     return [ir.Declare(ir.Type.REAL, items)] if items else []
 
@@ -249,7 +249,9 @@ def together(values: Iterable[tuple[str, ir.Value]]) -> list[ir.Statement]:
 def grouped(pointers: Mapping[str, tuple[ir.Pointer, ir.Value]]) -> Iterator[ir.Statement]:
     """Yield the declarations of pointers, one for each type."""
     for kind in dict.fromkeys(kind for kind, _ in pointers.values()):
-        yield ir.Declare(kind, tuple((name, row) for name, (own, row) in pointers.items() if own == kind))
+        yield ir.Declare(
+            kind, tuple((name, row) for name, (pointer_kind, row) in pointers.items() if pointer_kind == kind)
+        )
 
 
 def _member(array: ir.Array) -> ir.Value:

@@ -1,4 +1,4 @@
-"""Lowering by tables: the fields of all sites in one array, and neighbours by tables of site numbers."""
+"""Lowering by tables: one array has the fields of all sites, and tables of site numbers give the neighbours."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.walk import names_in, statements
 from phigen.symbolic.symbols import BEGINS, PRESENT, Symbol
 
 SITE, OTHER, NUMBER, SITES, COUNT, COLOUR = (ir.fixed(name) for name in ("i", "j", "k", "sites", "count", "colour"))
 
-#: The arrays of each kind of storage, and the parameters of functions that have another name here.
+#: The names of the arrays of each kind of storage, and of parameters of functions, where JavaScript has other names.
 _ARRAYS = {ir.Storage.STATE: "x", ir.Storage.VARIATION: "v", ir.Storage.START: "start", ir.Storage.SUM: "sums"}
 _PARAMETERS = {"state": "x", "varied": "v"}
 
 
 def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
-    """Return the function on memory."""
+    """Return the function on the level of memory."""
     parameters = tuple(_PARAMETERS.get(p, p) for p in function.parameters)
     if not any(isinstance(s, ir.Store) for s in statements(function.body)):
         return replace(function, parameters=parameters, body=())
@@ -27,7 +27,10 @@ def by_tables(function: ir.Function, lattice: LatticeLoops) -> ir.Function:
 
 @dataclass
 class _Tables:
-    """The lowering of one function; ``head`` are the declarations before its loops, ``hoisted`` their names."""
+    """The lowering of one function.
+
+    ``head`` has the declarations before its loops, and ``hoisted`` the names that they declare.
+    """
 
     function: ir.Function
     lattice: LatticeLoops
@@ -40,7 +43,7 @@ class _Tables:
         return ir.fixed("params") if "params" in self.function.parameters else ir.Member(SITES, "params")
 
     def lowered(self) -> ir.Function:
-        """Return the function on memory."""
+        """Return the function on the level of memory."""
         calls: list[ir.Statement] = []
         loops: list[ir.Statement] = []
         for s in self.function.body:
@@ -109,8 +112,8 @@ class _Tables:
                     self._hoisted(Symbol(PRESENT, k), ir.Entry(ir.Member(SITES, "present"), ir.Constant(k))), SITE
                 )
             case ir.HasColour():
-                own = ir.Binary("==", ir.Entry(ir.Member(SITES, "colours"), SITE), COLOUR)
-                return ir.Select(own, ir.Constant(1), ir.Constant(0))
+                matches = ir.Binary("==", ir.Entry(ir.Member(SITES, "colours"), SITE), COLOUR)
+                return ir.Select(matches, ir.Constant(1), ir.Constant(0))
             case ir.OnSeam(k):
                 window = ir.Constant(selection.window or 0)
                 return ir.Entry(
@@ -121,12 +124,12 @@ class _Tables:
     def _element(self, array: ir.Array, site: ir.Value) -> ir.Value:
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         if array.storage is not ir.Storage.STATE or array.name in fields:
-            own = ir.fixed(_ARRAYS.get(array.storage, "out"))
+            whole = ir.fixed(_ARRAYS.get(array.storage, "out"))
             sums = array.storage is ir.Storage.SUM and self.function.role is not ir.LoopRole.GATHER
-            return ir.Entry(ir.Member(SITES, "sums") if sums else own, _of_field(site, array.number))
+            return ir.Entry(ir.Member(SITES, "sums") if sums else whole, _of_field(site, array.number))
         if array.name in increments:
-            drawn = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))
-            return ir.Entry(drawn, _of_field(site, increments.index(array.name)))
+            increments_array = self._hoisted(Symbol("at", "dw"), ir.Member(SITES, "dw"))
+            return ir.Entry(increments_array, _of_field(site, increments.index(array.name)))
         return ir.Entry(self._parameter(array.name), site)
 
     def _parameter(self, name: str) -> ir.Name:
@@ -145,7 +148,7 @@ class _Tables:
         return ir.Name(Symbol("beside", self.lattice.neighbours.index(load.offset)))
 
     def _neighbour(self, load: ir.Load) -> Iterator[ir.Statement]:
-        """Yield the declaration of the site that is read, where it is a new one."""
+        """Yield the declaration of the number of the neighbour, unless it is declared already."""
         site = self._site(load)
         if isinstance(site, ir.Name) and site not in (SITE, OTHER) and site.symbol not in self.hoisted:
             number = self.lattice.neighbours.index(load.offset)

@@ -18,8 +18,8 @@ from phigen.ir.passes.by_rows import (
     SOLVER,
     WRITTEN,
     Reading,
+    RowDeclarations,
     RowLayout,
-    Rows,
     grouped,
     lowered,
     over_sites,
@@ -32,16 +32,16 @@ from phigen.symbolic.symbols import Symbol
 COEF, OUT = ir.fixed("coef"), ir.fixed("out")
 OTHER_SITE = ir.Entry(ir.Member(SOLVER, "other"), BOND)
 ZERO, ONE = ir.Constant(0.0), ir.Constant(1.0)
-#: The distance between the values of one site, in arrays that callers see.
+#: The distance between two values of one site in arrays that callers receive.
 SITES: ir.Value = ir.Cast(ir.Member(SOLVER, "sites"))
 
 
 def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, compensated: bool = False) -> ir.Block:
-    """Return the statements of a sweep; of one colour it updates the sites that have the colour ``swept``."""
+    """Return the statements of a sweep; a coloured one updates the sites of the colour ``swept``."""
     loop, tangent = lowered(function), function.role is LoopRole.TANGENT_SWEEP
     stores = [s for s in loop.body if isinstance(s, ir.Store)]
     updated = frozenset(s.array.name for s in stores) if not tangent else frozenset[str]()
-    rows = Rows(layout, Reading(updated)).read((*function.body, *loop.body))
+    rows = RowDeclarations(layout, Reading(updated)).read((*function.body, *loop.body))
     head, body = unread_coefficients(rows), [*rows.at_site(), *rows.computed]
     if tangent:
         head += grouped({Symbol("out", s.array.name): (ir.Pointer(constant=False), layout.row(_varied(s.array.number)))
@@ -50,10 +50,12 @@ def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, c
     for k, s in enumerate(stores if not tangent else ()):
         field = ir.Entry(rows.pointer(s.array.name), SITE)
         if compensated:
-            carry = ir.Name(Symbol("carry", s.array.name))
-            memory = ir.Entry(ir.Member(SOLVER, "carry"), ir.Constant(s.array.number))
-            head.append(ir.Declare(ir.Pointer(constant=False), ((carry.symbol, layout.row(memory)),)))
-            body += _compensated(k, field, ir.Entry(carry, SITE), s.value)
+            compensation = ir.Name(Symbol("carry", s.array.name))
+            compensation_array = ir.Entry(ir.Member(SOLVER, "carry"), ir.Constant(s.array.number))
+            head.append(
+                ir.Declare(ir.Pointer(constant=False), ((compensation.symbol, layout.row(compensation_array)),))
+            )
+            body += _compensated(k, field, ir.Entry(compensation, SITE), s.value)
         elif s.array.name in rows.loaded:
             body.append(ir.Assign(field, ir.Accumulated(ir.Name(s.array.name), s.value)))
         else:
@@ -64,19 +66,19 @@ def sweep(function: ir.Function, layout: RowLayout, swept: ir.Value | None, *, c
     return (*head, *rows.before(), over_sites(body, low=first, step=ir.Constant(layout.colour_step)))
 
 
-def _compensated(k: int, field: ir.Value, carry: ir.Value, change: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statements of a compensated sum: what rounding leaves out is carried to the next one."""
+def _compensated(k: int, field: ir.Value, compensation: ir.Value, increment: ir.Value) -> Iterator[ir.Statement]:
+    """Yield the statements of a compensated sum; the rounding error goes into the compensation term."""
     add, total = ir.fixed(f"add{k}"), ir.fixed(f"sum{k}")
-    items = ((add.symbol, ir.Accumulated(carry, change)), (total.symbol, ir.Binary("+", field, add)))
+    items = ((add.symbol, ir.Accumulated(compensation, increment)), (total.symbol, ir.Binary("+", field, add)))
     yield ir.Declare(ir.Type.REAL, items)
-    yield ir.Assign(carry, ir.Binary("-", add, ir.Binary("-", total, field)))
+    yield ir.Assign(compensation, ir.Binary("-", add, ir.Binary("-", total, field)))
     yield ir.Assign(field, total)
 
 
 def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *, adds: bool) -> ir.Block:
     """Return the statements of a kernel of the equation of a stage, which assigns or adds to its outputs."""
     loop = lowered(function)
-    rows = Rows(layout).read((*function.body, *loop.body))
+    rows = RowDeclarations(layout).read((*function.body, *loop.body))
     arrays = {name: layout.row(ir.Entry(ir.Member(ROW, "out"), ir.Constant(k))) for k, name in enumerate(outputs)}
     head = [*unread_coefficients(rows), *grouped({name: (WRITTEN, array) for name, array in arrays.items()})]
     stores = (s for s in loop.body if isinstance(s, ir.Store))
@@ -87,10 +89,10 @@ def stage(function: ir.Function, layout: RowLayout, outputs: Sequence[Symbol], *
 
 @dataclass(frozen=True)
 class BondLoop:
-    """A function that sums over bonds or pairs, on the level of sites; see `Reading` for ``oriented`` and ``at_bonds``.
+    """A function that sums over bonds or pairs, on the level of sites.
 
-    Its callers may say the ``sign`` of the direction of bonds, and whether the sites of the colour of the sweep lie
-    ``across`` the bonds.
+    ``oriented`` and ``at_bonds`` are as in `Reading`. Callers pass the ``sign`` of the direction of bonds, and
+    whether the sites of the colour of the sweep lie ``across`` the bonds, to functions that have these parameters.
     """
 
     function: ir.Function
@@ -113,37 +115,35 @@ class BondLoop:
 def observable(function: ir.Function, layout: RowLayout, calls: Sequence[str], apart: ir.Value = SITES) -> ir.Block:
     """Return the statements of a density, an energy or the vector field, after ``calls`` that sum over bonds.
 
-    Values of one site are ``apart`` from each other.
+    The values of one site are at the distance ``apart``.
     """
     loop = lowered(function)
-    rows = Rows(layout).read((*function.body, *loop.body))
-    early = [ir.Call(name, (ROW,)) for name in calls]
+    rows = RowDeclarations(layout).read((*function.body, *loop.body))
+    calls_first = [ir.Call(name, (ROW,)) for name in calls]
     body = (*rows.at_site(), *rows.computed, *_observed(loop))
-    return (*early, *_apart(loop, apart), *rows.before(), over_sites(body))
+    return (*calls_first, *_apart(loop, apart), *rows.before(), over_sites(body))
 
 
 def observable_with_bonds(
     function: ir.Function, layout: RowLayout, sums: Sequence[BondLoop], apart: ir.Value = SITES
 ) -> ir.Block:
-    """Return the same where each site sums over its bonds itself."""
+    """Return the statements of an observable where each site sums over its own bonds."""
     loop = lowered(function)
     oriented = frozenset[str]().union(*(s.oriented for s in sums))
-    own = [*function.body, *(s for one in sums for s in one.function.body)]
-    members = [*layout.members]
+    outer = [*function.body, *(s for bond_loop in sums for s in bond_loop.function.body)]
+    order = [*layout.members]
     once = sorted(
-        (s for s in own if isinstance(s, ir.Declare)),
-        key=lambda s: (
-            members.index(s.items[0][1].name) if isinstance(s.items[0][1], ir.SystemParameter) else len(members)
-        ),
+        (s for s in outer if isinstance(s, ir.Declare)),
+        key=lambda s: order.index(s.items[0][1].name) if isinstance(s.items[0][1], ir.SystemParameter) else len(order),
     )
-    rows = Rows(layout, Reading(local=True, oriented=oriented)).read(dict.fromkeys(once)).read(loop.body)
-    computed, inner = rows.computed, []
-    rows.read(sorted((s for one in sums for s in one.loop.body if not _is_computed(s)), key=_at_bond))
-    for one in sums:
-        rows.computed = [s for s in one.loop.body if _is_computed(s)]
-        inner.append(_summed_over_bonds(one, rows))
-    count = max((s.array.number for one in sums for s in one.stores), default=0) + 1
-    body = (*rows.at_site(), _zeros(count), *inner, *computed, *_observed(loop))
+    rows = RowDeclarations(layout, Reading(local=True, oriented=oriented)).read(dict.fromkeys(once)).read(loop.body)
+    computed, bond_loops = rows.computed, []
+    rows.read(sorted((s for bond_loop in sums for s in bond_loop.loop.body if not _is_computed(s)), key=_at_bond))
+    for bond_loop in sums:
+        rows.computed = [s for s in bond_loop.loop.body if _is_computed(s)]
+        bond_loops.append(_summed_over_bonds(bond_loop, rows))
+    count = max((s.array.number for bond_loop in sums for s in bond_loop.stores), default=0) + 1
+    body = (*rows.at_site(), _zeros(count), *bond_loops, *computed, *_observed(loop))
     return (*_apart(loop, apart), *rows.before(), over_sites(body, ""))
 
 
@@ -156,13 +156,13 @@ def _at_bond(s: ir.Statement) -> bool:
 
 
 def _apart(loop: ir.Loop, apart: ir.Value) -> list[ir.Statement]:
-    """Return the declaration of the distance between outputs, where there are several."""
+    """Return the declaration of the distance between the values of a site, if there are several."""
     several = any(isinstance(s, ir.Store) and s.array.number for s in loop.body)
     return [ir.index(ir.fixed("apart"), apart)] * several
 
 
 def _observed(loop: ir.Loop) -> Iterator[ir.Statement]:
-    """Yield the stores of what callers see; a share that is added to the first value is a term of it."""
+    """Yield the stores of values for callers; a share that adds to the first value becomes a term of it."""
     stores = [s for s in loop.body if isinstance(s, ir.Store)]
     shares = [s.value for s in stores if s.adds]
     for s in stores:
@@ -178,15 +178,15 @@ def _observed(loop: ir.Loop) -> Iterator[ir.Statement]:
             yield ir.Assign(ir.Entry(OUT, ir.Binary("-", place, FROM)), value)
 
 
-def over_bonds(one: BondLoop, layout: RowLayout, *, first: bool) -> ir.Block:
-    """Return the statements that sum over the bonds of each site; those that are not ``first`` add to the sums."""
-    rows = Rows(layout, Reading(oriented=one.oriented, at_bonds=one.at_bonds))
-    rows.read((*one.function.body, *one.loop.body))
-    count = len(one.stores)
+def over_bonds(bond_loop: BondLoop, layout: RowLayout, *, first: bool) -> ir.Block:
+    """Return the statements that sum over the bonds of each site; unless ``first``, they add to the sums."""
+    rows = RowDeclarations(layout, Reading(oriented=bond_loop.oriented, at_bonds=bond_loop.at_bonds))
+    rows.read((*bond_loop.function.body, *bond_loop.loop.body))
+    count = len(bond_loop.stores)
     sums = (ir.Entry(ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k)), SITE) for k in range(count))
-    out = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
-    body = (*together(rows.own), _zeros(count), _summed_over_bonds(one, rows), *out)
-    return (*_unread_source(one.function, rows), *rows.before(), over_sites(body, ""))
+    stores = [ir.Assign(place, ir.fixed(f"sum{k}"), adds=not first) for k, place in enumerate(sums)]
+    body = (*together(rows.here), _zeros(count), _summed_over_bonds(bond_loop, rows), *stores)
+    return (*_unread_source(bond_loop.function, rows), *rows.before(), over_sites(body, ""))
 
 
 def _zeros(count: int) -> ir.Declare:
@@ -194,29 +194,35 @@ def _zeros(count: int) -> ir.Declare:
     return ir.Declare(ir.Type.REAL, items, mutable=True)
 
 
-def _summed_over_bonds(one: BondLoop, rows: Rows) -> ir.Loop:
+def _summed_over_bonds(bond_loop: BondLoop, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over the bonds of a site."""
-    sign = ir.fixed("sign") if one.sign else ONE
-    body = [*bond_reads(one.loop, rows, told=one.across, oriented=bool(one.oriented), sign=sign), *rows.computed]
-    body += [ir.Assign(ir.fixed(f"sum{s.array.number}"), s.value, adds=True) for s in one.stores]
-    return bonds_of(one.loop, body, told=one.across)
+    sign = ir.fixed("sign") if bond_loop.sign else ONE
+    body = [
+        *bond_reads(bond_loop.loop, rows, across=bond_loop.across, oriented=bool(bond_loop.oriented), sign=sign),
+        *rows.computed,
+    ]
+    body += [ir.Assign(ir.fixed(f"sum{s.array.number}"), s.value, adds=True) for s in bond_loop.stores]
+    return bonds_of(bond_loop.loop, body, across=bond_loop.across)
 
 
 def bond_reads(
-    loop: ir.Loop, rows: Rows, *, oriented: bool, sign: ir.Value, told: bool = False
+    loop: ir.Loop, rows: RowDeclarations, *, oriented: bool, sign: ir.Value, across: bool = False
 ) -> Iterator[ir.Statement]:
-    """Yield the statements that pass over bonds without a site of the chosen colour, and that read at their ends."""
+    """Yield the statements that skip bonds without a site of the colour, and that read at the ends of the others.
+
+    With ``across`` the caller decides by a flag which end has the colour.
+    """
     names = [s.items[0][0] for s in loop.body if isinstance(s, ir.Declare)]
-    other = [(name, rows.other[name]) for name in rows.other if name in names]
-    across = ir.Select(ir.fixed("across"), OTHER_SITE, SITE) if told else OTHER_SITE
-    if told or loop.chosen == "there":
-        colour = ir.Entry(ir.Member(SOLVER, "colours"), across)
+    reads_there = [(name, rows.other[name]) for name in rows.other if name in names]
+    coloured_site = ir.Select(ir.fixed("across"), OTHER_SITE, SITE) if across else OTHER_SITE
+    if across or loop.chosen == "there":
+        colour = ir.Entry(ir.Member(SOLVER, "colours"), coloured_site)
         yield ir.If(ir.Binary("!=", colour, ir.Member(ROW, "chosen")), (ir.Continue(),))
-    if other:
+    if reads_there:
         yield ir.index(OTHER, OTHER_SITE)
     if oriented:
         yield ir.real(ir.fixed("side").symbol, side(sign))
-    yield from together(other)
+    yield from together(reads_there)
 
 
 def side(sign: ir.Value) -> ir.Value:
@@ -226,38 +232,38 @@ def side(sign: ir.Value) -> ir.Value:
     return ir.Select(ir.Binary("<", BOND, middle), sign, minus)
 
 
-def bonds_of(loop: ir.Loop, body: Iterable[ir.Statement], *, told: bool = False) -> ir.Loop:
-    """Return the loop over the bonds of a site i, those that it begins or ends or both."""
+def bonds_of(loop: ir.Loop, body: Iterable[ir.Statement], *, across: bool = False) -> ir.Loop:
+    """Return the loop over the bonds of a site: those that begin there, those that end there, or both."""
     first, middle = (ir.Entry(ir.Member(SOLVER, name), SITE) for name in ("bonds", "middle"))
     end = ir.Entry(ir.Member(SOLVER, "bonds"), ir.plus(SITE, 1))
     low, high = {"": (first, end), "a": (first, middle), "b": (middle, end)}[loop.end]
-    here = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
-    condition = here if loop.chosen == "here" and not told else None
+    at_colour = ir.Binary("==", ir.Entry(ir.Member(SOLVER, "colours"), SITE), ir.Member(ROW, "chosen"))
+    condition = at_colour if loop.chosen == "here" and not across else None
     return ir.Loop("plain", tuple(body), "k", low, high, condition=condition)
 
 
-def over_pairs(one: BondLoop, layout: RowLayout) -> ir.Block:
-    """Return the statements that sum over all other sites, for the sites of a piece of a row."""
-    rows = Rows(layout).read((*one.function.body, *one.loop.body))
-    sums = [ir.fixed(f"g{s.array.number}") for s in one.stores]
+def over_pairs(bond_loop: BondLoop, layout: RowLayout) -> ir.Block:
+    """Return the statements that sum over all other sites, for the sites of a row segment."""
+    rows = RowDeclarations(layout).read((*bond_loop.function.body, *bond_loop.loop.body))
+    sums = [ir.fixed(f"g{s.array.number}") for s in bond_loop.stores]
     arrays = {g.symbol: (WRITTEN, ir.Entry(ir.Member(SOLVER, "gathered"), ir.Constant(k))) for k, g in enumerate(sums)}
     places = [ir.Entry(g, SITE) for g in sums]
     clear = over_sites((ir.Assign(places[0], ZERO, too=tuple(places[1:])),), "", kind="line")
     same = ir.Binary("==", SITE, OTHER)
-    values = [ir.Select(same, ZERO, s.value) for s in one.stores]
+    values = [ir.Select(same, ZERO, s.value) for s in bond_loop.stores]
     updates = (ir.Assign(place, value, adds=True) for place, value in zip(places, values, strict=True))
-    inner = over_sites((*together(rows.own), *rows.computed, *updates))
+    inner = over_sites((*together(rows.here), *rows.computed, *updates))
     outer = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
-    return (*rows.before(), *_unread_source(one.function, rows), *grouped(arrays), clear, outer)
+    return (*rows.before(), *_unread_source(bond_loop.function, rows), *grouped(arrays), clear, outer)
 
 
-def unread_coefficients(rows: Rows) -> list[ir.Statement]:
-    """Return the statement that the argument for coefficients is not read, where that is so."""
+def unread_coefficients(rows: RowDeclarations) -> list[ir.Statement]:
+    """Return the statement that marks the coefficients as unused, if no coefficient is read."""
     read = any(isinstance(value, ir.Entry) and value.array == COEF for _, value in rows.once)
     return [] if read else [ir.Discard("coef")]
 
 
-def _unread_source(function: ir.Function, rows: Rows) -> list[ir.Statement]:
+def _unread_source(function: ir.Function, rows: RowDeclarations) -> list[ir.Statement]:
     return unread_coefficients(rows) if "coef" in function.parameters else []
 
 

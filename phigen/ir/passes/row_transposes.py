@@ -1,7 +1,7 @@
-"""Lowering by rows of transposes: every site is written by itself alone, whatever the threads.
+"""Lowering by rows of transposes, without write conflicts between threads: each site writes only its own elements.
 
-A site adds its own cotangents at once. Those of other sites it hands over in arrays, one for each value, and in a
-second loop each site adds what the sites around have handed to it.
+A site adds to its own cotangents at once. Cotangents of other sites are stored in arrays, one for each value; in a
+second loop each site adds the values that its neighbours have stored for it.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from phigen.ir.passes.by_rows import (
     TO,
     WRITTEN,
     Reading,
+    RowDeclarations,
     RowLayout,
-    Rows,
     lowered,
     over_sites,
     together,
@@ -35,16 +35,16 @@ from phigen.symbolic.symbols import HERE
 BEGIN, END, APART, WHOLE, LANES, LANE, INDEX_TO = (
     ir.fixed(name) for name in ("begin", "end", "apart", "whole", "lanes", "l", "to")
 )
-#: Sites whose shares in a sum the runtime adds at once.
+#: Number of partial sums of a sum over sites, which the runtime adds at the end.
 BATCH, SUMS = ir.fixed("ADDED"), ir.fixed("sums")
 
-#: Sites that receive at once what pairs give them: as many as make the additions to their sums independent.
+#: Sites in a batch of a sum over pairs: so many additions are independent that their latency is hidden.
 PAIR_BATCH = 32
 
 
 @dataclass(frozen=True)
 class Handed:
-    """A cotangent that sites hand to the site at an offset: its array, and the number of the field it belongs to."""
+    """A cotangent for the site at an offset: the array that stores it, and the number of the field it belongs to."""
 
     array: int
     base: int
@@ -53,13 +53,13 @@ class Handed:
 
 @dataclass(frozen=True)
 class Transpose:
-    """A transposed function on the level of sites, and where it reads and stores cotangents.
+    """A transposed function on the level of sites, and the arrays of its cotangents.
 
-    The cotangents of what the function has computed, of the kind ``seed``, are those of the fields with the numbers
-    ``fields``, or else the variation of the row. It hands over the values ``handed``, and the cotangents of sums over
-    bonds or pairs in arrays from ``sums_from`` on; ``summed`` is their number if it computes any. It first adds what
-    the loop before it has handed over: ``taken``. The fields ``recomputed`` are written too. A sweep of one ``colour``
-    updates the sites of this colour alone.
+    The function reads cotangents of the kind ``seed``: those of the fields with the numbers ``fields``, or else the
+    variation of the row. It stores the cotangents of neighbours as ``handed``, and those of sums over bonds or pairs
+    in arrays from ``sums_from`` on; ``summed`` is the number of these sums. First it adds the cotangents ``received``
+    from the loop before it. The fields ``recomputed`` are written too. A sweep of one ``colour`` updates the sites of
+    this colour alone.
     """
 
     function: ir.Function
@@ -68,7 +68,7 @@ class Transpose:
     handed: tuple[Handed, ...] = ()
     sums_from: int = 0
     summed: int = 0
-    taken: tuple[Handed, ...] = ()
+    received: tuple[Handed, ...] = ()
     recomputed: frozenset[str] = frozenset()
     colour: int | None = None
 
@@ -81,57 +81,59 @@ def transposed(transpose: Transpose, layout: RowLayout, *, vectors: bool) -> ir.
         ir.fixed(f"v_{k}") for k in range(layout.lattice.program.dimension)
     ]
     around = [ir.Entry(ir.Member(ROW, "bar"), ir.Constant(k)) for k in fields]
-    rows = Rows(layout, Reading(transpose.recomputed, {transpose.seed: pointers, "around": around}))
+    rows = RowDeclarations(layout, Reading(transpose.recomputed, {transpose.seed: pointers, "around": around}))
     rows.read((*transpose.function.body, *loop.body))
     seeds = {d.array.number for d in _loads(loop) if d.array.storage is Storage.SEED and not d.offset}
-    given, stores = _stores(transpose, loop, rows)
-    own = {s.array.number for s in _updates(loop) if s.array.storage in _COTANGENTS and not any(s.offset)}
-    own |= {h.base for h in transpose.taken} | {fields[k] for k in seeds if fields}
+    handed_values, stores = _stores(transpose, loop, rows)
+    written_bars = {s.array.number for s in _updates(loop) if s.array.storage in _COTANGENTS and not any(s.offset)}
+    written_bars |= {h.base for h in transpose.received} | {fields[k] for k in seeds if fields}
     head = unread_coefficients(rows)
     if not fields:
         head += [_pointer(f"v_{k}", READ, row(_entry("varied", k))) for k in sorted(seeds)]
-    head += [_pointer(f"bar_{k}", WRITTEN, row(_entry("bar", k))) for k in sorted(own)]
-    for array in given:
+    head += [_pointer(f"bar_{k}", WRITTEN, row(_entry("bar", k))) for k in sorted(written_bars)]
+    for array in handed_values:
         head.append(_pointer(f"handed_{array}", WRITTEN, row(_entry("handed", array))))
         if transpose.colour is not None:
             head.append(ir.Clear(ir.fixed(f"handed_{array}"), FROM, ir.Binary("-", TO, FROM)))
-    from_others, added = _added_up("given", transpose.taken, layout)
+    received_pointers, added = _added_up("given", transpose.received, layout)
     body = (*added, *rows.at_site(), *rows.computed, *stores)
     shares = [s for s in loop.body if isinstance(s, ir.Reduce)]
     colour = transpose.colour
     loops = (
         in_vectors(body, shares) if vectors and shares and colour is None else in_batches(body, shares, layout, colour)
     )
-    return (*head, *from_others, *rows.before(), *loops)
+    return (*head, *received_pointers, *rows.before(), *loops)
 
 
 _COTANGENTS = (Storage.COTANGENT, Storage.START_COTANGENT)
 
 
-def _stores(transpose: Transpose, loop: ir.Loop, rows: Rows) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
-    """Return the values that are handed over, by their arrays, and the statements that store all values of a site."""
+def _stores(
+    transpose: Transpose, loop: ir.Loop, rows: RowDeclarations
+) -> tuple[dict[int, ir.Value], list[ir.Statement]]:
+    """Return the cotangents for other sites, by their arrays, and the statements that store all values of a site."""
     places = {(h.base, h.offset): h.array for h in transpose.handed}
-    given: dict[int, ir.Value] = {}
+    handed_values: dict[int, ir.Value] = {}
     stores: list[ir.Statement] = []
     for s in _updates(loop):
         number = s.array.number
         if s.array.storage is Storage.SUM_COTANGENT:
-            given[transpose.sums_from + number] = s.value
+            handed_values[transpose.sums_from + number] = s.value
         elif s.array.storage is Storage.STATE:
             stores.append(ir.Assign(ir.Entry(rows.pointer(s.array.name), SITE), s.value))
         elif any(s.offset):
-            given.setdefault(places[number, s.offset], s.value)
+            handed_values.setdefault(places[number, s.offset], s.value)
         else:
             stores.append(ir.Assign(ir.Entry(ir.fixed(f"bar_{number}"), SITE), s.value, adds=True))
     arrays = [*(h.array for h in transpose.handed)]
     arrays += range(transpose.sums_from, transpose.sums_from + transpose.summed)
-    given |= {array: ZERO for array in arrays if array not in given}
-    stores += [ir.Assign(ir.Entry(ir.fixed(f"handed_{array}"), SITE), value) for array, value in given.items()]
-    return given, stores
+    handed_values |= {array: ZERO for array in arrays if array not in handed_values}
+    stores += [ir.Assign(ir.Entry(ir.fixed(f"handed_{array}"), SITE), value) for array, value in handed_values.items()]
+    return handed_values, stores
 
 
 def handing(handed: Sequence[Handed], layout: RowLayout) -> ir.Block:
-    """Return the statements of the second loop: each site adds what the sites around have handed to it."""
+    """Return the statements of the second loop: each site adds the cotangents that its neighbours have stored."""
     pointers, added = _added_up("handed", handed, layout)
     bars = dict.fromkeys(h.base for h in handed)
     head = [_pointer(f"bar_{k}", WRITTEN, layout.row(_entry("bar", k))) for k in bars]
@@ -139,19 +141,19 @@ def handing(handed: Sequence[Handed], layout: RowLayout) -> ir.Block:
 
 
 def _added_up(
-    called: str, handed: Sequence[Handed], layout: RowLayout
+    prefix: str, handed: Sequence[Handed], layout: RowLayout
 ) -> tuple[list[ir.Statement], list[ir.Statement]]:
-    """Return the pointers to what sites around hand to a site, and the additions to its cotangents."""
+    """Return the pointers to the cotangents that neighbours store for a site, and their additions."""
     sums: dict[int, ir.Value] = {}
     pointers: dict[str, ir.Statement] = {}
-    open_rows = called == "given" and any(layout.lattice.step.sites.open[:-1])
+    open_rows = prefix == "given" and any(layout.lattice.step.sites.open[:-1])
     for h in handed:
-        back = tuple(-o for o in h.offset)
-        line = layout.line(back)
-        name = f"{called}_{h.array}" + (f"_{line}" if line else "")
-        place = layout.row(_entry(called, h.array), line, "givers" if open_rows else "at")
+        opposite = tuple(-o for o in h.offset)
+        line = layout.line(opposite)
+        name = f"{prefix}_{h.array}" + (f"_{line}" if line else "")
+        place = layout.row(_entry(prefix, h.array), line, "givers" if open_rows else "at")
         pointers[name] = _pointer(name, READ, place)
-        value = ir.Entry(ir.fixed(name), ir.plus(SITE, back[-1]))
+        value = ir.Entry(ir.fixed(name), ir.plus(SITE, opposite[-1]))
         sums[h.base] = ir.Binary("+", sums[h.base], value) if h.base in sums else value
     added = (ir.Assign(ir.Entry(ir.fixed(f"bar_{k}"), SITE), value, adds=True) for k, value in sums.items())
     return [*pointers.values()], [*added]
@@ -163,7 +165,7 @@ def _added_up(
 def in_batches(
     body: ir.Block, shares: Sequence[ir.Reduce], layout: RowLayout, colour: int | None
 ) -> Iterator[ir.Statement]:
-    """Yield the loop over sites; shares in sums are kept apart for as many sites as the runtime adds at once."""
+    """Yield the loop over sites; for sums over sites each site of a batch has its own partial sum."""
     step = None if colour is None else ir.Constant(layout.colour_step)
     low = BEGIN if shares else FROM
     first = low if colour is None else ir.Called("first", (ROW, ir.Constant(colour), low))
@@ -185,7 +187,7 @@ def in_batches(
 
 
 def in_vectors(body: ir.Block, shares: Sequence[ir.Reduce]) -> Iterator[ir.Statement]:
-    """Yield the same with shares in registers: loops over vectors of 8 sites, then over the sites that are left."""
+    """Yield the loops over vectors of 8 sites, then over the remaining sites; partial sums stay in registers."""
     names = [ir.fixed(f"share{k}") for k in range(len(shares))]
     yield ir.Declare(ir.Vector(ir.Constant(8)), tuple((n.symbol, ir.Listed((ZERO,))) for n in names), mutable=True)
     rest = ir.Binary("%", ir.Binary("-", INDEX_TO, FROM), ir.Constant(8))
@@ -211,10 +213,10 @@ def _totals(shares: Sequence[ir.Reduce], function: str, *arguments: ir.Value) ->
 
 @dataclass(frozen=True)
 class BondTranspose:
-    """The transpose of a function that sums over bonds or pairs, seen from the ``end`` that the site of the loop is.
+    """The transpose of a function that sums over bonds or pairs, for sites that are at this ``end``.
 
-    The cotangents of the ``count`` sums are in arrays from ``sums_from`` on; ``oriented`` parameters at bonds have the
-    opposite sign seen from the end b.
+    The cotangents of the ``count`` sums are in arrays from ``sums_from`` on. Parameters at bonds that are
+    ``oriented`` change their sign when seen from the end b.
     """
 
     function: ir.Function
@@ -223,11 +225,11 @@ class BondTranspose:
     count: int
     oriented: frozenset[str] = frozenset()
 
-    def rows(self, layout: RowLayout) -> Rows:
-        """Return what the function reads."""
+    def rows(self, layout: RowLayout) -> RowDeclarations:
+        """Return the declarations of the values that the function reads."""
         arrays = [ir.fixed(f"handed_{self.sums_from + k}") for k in range(self.count)]
         reading = Reading(seeds={HERE: arrays}, here=self.end, oriented=self.oriented)
-        return Rows(layout, reading).read((*self.function.body, *lowered(self.function).body))
+        return RowDeclarations(layout, reading).read((*self.function.body, *lowered(self.function).body))
 
     @property
     def updates(self) -> list[ir.Update]:
@@ -256,29 +258,29 @@ def transposed_sums(transpose: BondTranspose, layout: RowLayout) -> ir.Block:
     return (*head, over(transpose, rows), *totals)
 
 
-def _over_bonds(transpose: BondTranspose, rows: Rows) -> ir.Loop:
+def _over_bonds(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over sites, and in it over their bonds.
 
-    What bonds add to a sum over all sites is added up at each site first, so that few additions wait for one another.
+    Contributions to a sum over all sites are first summed at each site, so that few additions depend on one another.
     """
     loop, updates = lowered(transpose.function), transpose.updates
     at_bonds = {k: s.array for k, s in enumerate(updates) if isinstance(s, ir.Store) and s.end == "bond"}
-    turned = [k for k, array in at_bonds.items() if array.name in transpose.oriented]
-    inner = [*_bond_reads(transpose, rows, signed=bool(turned)), *rows.computed]
+    sign_changing = [k for k, array in at_bonds.items() if array.name in transpose.oriented]
+    inner = [*_bond_reads(transpose, rows, signed=bool(sign_changing)), *rows.computed]
     for k, s in enumerate(updates):
-        value = ir.Binary("*", ir.fixed("side"), ir.Grouped(s.value)) if k in turned else s.value
+        value = ir.Binary("*", ir.fixed("side"), ir.Grouped(s.value)) if k in sign_changing else s.value
         place: ir.Value = ir.fixed(f"own{k}")
         if k in at_bonds:
             place = ir.Entry(ir.fixed(f"bar_{at_bonds[k].number}"), BOND)
         inner.append(ir.Assign(place, value, adds=True))
     summed = [k for k in range(len(updates)) if k not in at_bonds]
-    own = (_zero(f"own{k}") for k in summed)
-    out = (_into(updates[k], k, SITE, ir.fixed(f"own{k}")) for k in summed)
-    return over_sites((*together(rows.own), *own, bonds_of(loop, inner), *out), "")
+    zeros = (_zero(f"own{k}") for k in summed)
+    stores = (_into(updates[k], k, SITE, ir.fixed(f"own{k}")) for k in summed)
+    return over_sites((*together(rows.here), *zeros, bonds_of(loop, inner), *stores), "")
 
 
-def _bond_reads(transpose: BondTranspose, rows: Rows, *, signed: bool) -> Iterator[ir.Statement]:
-    """Yield the statements that pass over bonds without a site of the chosen colour, and that read at their ends."""
+def _bond_reads(transpose: BondTranspose, rows: RowDeclarations, *, signed: bool) -> Iterator[ir.Statement]:
+    """Yield the statements that skip bonds without a site of the colour, and that read at the ends of the others."""
     other = ir.Entry(ir.Member(SOLVER, "other"), BOND)
     if lowered(transpose.function).chosen == "there":
         colour = ir.Entry(ir.Member(SOLVER, "colours"), other)
@@ -290,11 +292,11 @@ def _bond_reads(transpose: BondTranspose, rows: Rows, *, signed: bool) -> Iterat
     yield from together(rows.other.items())
 
 
-def _over_pairs(transpose: BondTranspose, rows: Rows) -> ir.Loop:
+def _over_pairs(transpose: BondTranspose, rows: RowDeclarations) -> ir.Loop:
     """Return the loop over batches of sites, and in it over all other sites.
 
-    Batches are whole vectors of 8: rows have room for them. What a pair adds is computed for all sums before any of it
-    is added, or gcc would not vectorise the loop.
+    Batches are whole vectors of 8, for which rows have room. For each pair all summands are computed before one is
+    added, since gcc would not vectorise the loop otherwise.
     """
     updates = transpose.updates
     first, left, count, batch = ir.fixed("first"), ir.fixed("left"), ir.fixed("count"), ir.Constant(PAIR_BATCH)
@@ -304,20 +306,20 @@ def _over_pairs(transpose: BondTranspose, rows: Rows) -> ir.Loop:
         (left.symbol, ir.Select(ir.Binary("<", rest, batch), rest, batch)),
         (count.symbol, ir.Binary("*", vectors, ir.Constant(8))),
     )
-    own = [ir.fixed(f"own{k}") for k in range(len(updates))]
-    places = [ir.Entry(name, LANE) for name in own]
+    partial_sums = [ir.fixed(f"own{k}") for k in range(len(updates))]
+    places = [ir.Entry(name, LANE) for name in partial_sums]
     site, same = ir.index(SITE, ir.Binary("+", first, LANE)), ir.Binary("==", SITE, OTHER)
     added = [ir.real(ir.fixed(f"add{k}").symbol, ir.Select(same, ZERO, s.value)) for k, s in enumerate(updates)]
     add = (ir.Assign(place, ir.fixed(f"add{k}"), adds=True) for k, place in enumerate(places))
-    inner = _lanes(count, (site, *together(rows.own), *rows.computed, *added, *add), independent="SITE")
+    inner = _lanes(count, (site, *together(rows.here), *rows.computed, *added, *add), independent="SITE")
     others = ir.Loop("plain", (*together(rows.other.items()), inner), "j", ir.Constant(0), LENGTH)
-    out = (_into(s, k, ir.Binary("+", first, LANE), places[k]) for k, s in enumerate(updates))
+    stores = (_into(s, k, ir.Binary("+", first, LANE), places[k]) for k, s in enumerate(updates))
     body = (
         ir.Declare(ir.Type.INDEX, sizes),
-        ir.Declare(ir.Vector(batch), tuple((name.symbol, ir.Constant(None)) for name in own), mutable=True),
+        ir.Declare(ir.Vector(batch), tuple((name.symbol, ir.Constant(None)) for name in partial_sums), mutable=True),
         _lanes(count, tuple(ir.Assign(place, ZERO) for place in places)),
         others,
-        _lanes(left, tuple(out), note="beyond are numbers, but no sites"),
+        _lanes(left, tuple(stores), note="beyond are numbers, but no sites"),
     )
     return ir.Loop("plain", body, "first", FROM, TO, limit="to", step=batch)
 
@@ -327,7 +329,7 @@ def _lanes(count: ir.Value, body: ir.Block, *, independent: str = "", note: str 
 
 
 def _into(s: ir.Update, k: int, site: ir.Value, value: ir.Value) -> ir.Assign:
-    """Return the statement that adds what bonds or pairs give to a site, or that puts a sum where it is read."""
+    """Return the statement that adds a sum over bonds or pairs to a cotangent, or stores it as a sum at a site."""
     if isinstance(s, ir.Reduce):
         return ir.Assign(ir.fixed(f"share{k}"), value, adds=True)
     if s.array.storage is Storage.SUM:

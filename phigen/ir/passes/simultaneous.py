@@ -1,4 +1,4 @@
-"""Simultaneous updates: all changes of a sweep are computed before any field is changed."""
+"""Simultaneous updates: all increments of a sweep are computed before any field is updated."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from phigen.ir.walk import map_blocks
 
 
 def simultaneous(function: ir.Function) -> ir.Function:
-    """Return a sweep with a name for each change, where it makes several; other functions as they are."""
+    """Return a sweep with a name for each increment, if there are several; other functions unchanged."""
     if function.role not in (ir.LoopRole.SWEEP, ir.LoopRole.TANGENT_SWEEP):
         return function
 

@@ -20,12 +20,12 @@ def temporaries(function: ir.Function) -> ir.Function:
     read = names_in(tuple(s.value for s in statements(function.body) if isinstance(s, ir.Update)))
 
     def without_unread(body: ir.Block) -> Iterator[ir.Statement]:
-        kept = []
+        read_statements = []
         for s in reversed(body):
             if not isinstance(s, ir.Declare) or any(name in read for name, _ in s.items):
                 read.update(names_in(s))
-                kept.append(s)
-        return reversed(kept)
+                read_statements.append(s)
+        return reversed(read_statements)
 
     return map_blocks(function, without_unread)
 

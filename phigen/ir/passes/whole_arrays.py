@@ -1,4 +1,4 @@
-"""Lowering to whole arrays: a statement works on all sites, all bonds or all pairs at once, without loops."""
+"""Lowering to whole arrays: each statement works on all sites, all bonds or all pairs, without loops."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.nodes import LoopRole, Storage
 from phigen.symbolic.symbols import HERE
 
@@ -17,45 +17,46 @@ X, V, SITES, NP, BAR, COLOUR, BOND, SUMS, MOVED, OUT, AXIS = (
 _ARRAYS = {Storage.STATE: "x", Storage.VARIATION: "v", Storage.START: "start", Storage.SUM: "gathered"}
 _ARRAYS |= {Storage.COTANGENT: "bar", Storage.START_COTANGENT: "start_bar"}
 
-#: Values that are printed where they are used.
+#: Values that are printed where they are used, without a name.
 _IN_PLACE = ir.Coefficient | ir.Time | ir.Inside | ir.HasColour | ir.OnSeam
 _READ_IN_PLACE = (Storage.START, Storage.SUM, Storage.SEED)
 
-#: The parameters of transposed functions beside those that they read.
+#: The further parameters of transposed functions: cotangents, and where they are added.
 _TRANSPOSED = ("bar", "sites", "coef_bar", "own")
 
 
 def sums_name(kernel: str) -> str:
-    """Return the name of the function that sums over all bonds or pairs, by the kernel of one of their ends."""
+    """Return the name of the function that sums over all bonds or pairs, from the kernel of one of their ends."""
     base = kernel.removesuffix("_a").removesuffix("_b")
-    return {"energy": "energies"}.get(own := base.removeprefix("bond_").removeprefix("pair_"), own)
+    plain = base.removeprefix("bond_").removeprefix("pair_")
+    return {"energy": "energies"}.get(plain, plain)
 
 
 def transposed_sums_name(kernel: str) -> str:
-    """Return the name of its transpose, by the same kernel."""
+    """Return the name of the transpose of the function that sums, from the same kernel."""
     return kernel.removesuffix("_a").removesuffix("_b") + "_back"
 
 
 @dataclass(frozen=True)
 class WholeArrays:
-    """The lowering of the functions of one lattice, whose values have names already."""
+    """The lowering of the functions of one lattice, after the pass `phigen.ir.passes.temporaries`."""
 
     lattice: LatticeLoops
 
     def sweep(self, function: ir.Function) -> ir.Function:
-        """Return a sweep as a function from a state to the next, or from its variation to the next."""
-        loop, own = _loop(function), V if function.role is LoopRole.TANGENT_SWEEP else X
-        body = [*_unless_beside(loop, own), *self._sums(function), *self._reads(function), *_copied(MOVED, own)]
+        """Return a sweep as a function from a state, or from its variation, to the next."""
+        loop, array = _loop(function), V if function.role is LoopRole.TANGENT_SWEEP else X
+        body = [*_unless_beside(loop, array), *self._sums(function), *self._reads(function), *_copied(MOVED, array)]
         for s in _stores(loop):
-            old = ir.Entry(own, ir.Constant(s.array.number))
+            old = ir.Entry(array, ir.Constant(s.array.number))
             new = _chosen(loop.selection, ir.Binary("+", old, ir.Grouped(s.value)), old)
             body.append(ir.Assign(ir.Entry(MOVED, ir.Constant(s.array.number)), new))
-        varied = ("v",) if own is V else ()
+        varied = ("v",) if array is V else ()
         parameters = ("coef", "x", *varied, "sites", *_argument(loop.selection))
         return replace(function, parameters=parameters, body=(*body, ir.Return(MOVED)))
 
     def stage(self, function: ir.Function) -> ir.Function:
-        """Return a kernel of the equation of a stage as a function of y, called x, and of x, called start."""
+        """Return a kernel of the equation of a stage as a function of y, named x, and of x, named start."""
         shape = ir.Member(SITES, "sizes")
         values = (ir.Called("broadcast_to", (s.value, shape), NP) for s in _stores(_loop(function)))
         result = ir.Return(ir.Called("array", (ir.Listed(tuple(values)),), NP))
@@ -89,10 +90,10 @@ class WholeArrays:
 
     # ---- transposes
 
-    def transposed_sweep(self, function: ir.Function, moved: Sequence[int]) -> ir.Function:
-        """Return a function from the cotangent after a sweep to that before it, at the state before it."""
+    def transposed_sweep(self, function: ir.Function, updated: Sequence[int]) -> ir.Function:
+        """Return a function from the cotangent after a sweep to the cotangent before, at the state before it."""
         loop = _loop(function)
-        seeds = (_chosen(loop.selection, ir.Entry(BAR, ir.Constant(k)), ir.Constant(0.0)) for k in moved)
+        seeds = (_chosen(loop.selection, ir.Entry(BAR, ir.Constant(k)), ir.Constant(0.0)) for k in updated)
         body = [*_unless_beside(loop, BAR), ir.real(ir.fixed("change_bar").symbol, ir.Listed(tuple(seeds)))]
         body += [*self._sums(function), *self._reads(function), *_copied(BAR, BAR)]
         body += self._added_cotangents(loop)
@@ -101,7 +102,7 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def transposed_stage(self, function: ir.Function, seed: str) -> ir.Function:
-        """Return a function from a cotangent to those of y, called x, and of the start of a stage."""
+        """Return a function from a cotangent to the cotangents of y, named x, and of the start of a stage."""
         zeros, both = ir.Called("zeros_like", (X,), NP), (BAR, ir.fixed("start_bar"))
         body = [
             *self._sums(function),
@@ -114,7 +115,7 @@ class WholeArrays:
         return replace(function, parameters=parameters, body=(*body, ir.Return(ir.Several(both))))
 
     def transposed_sums(self, functions: Sequence[ir.Function], name: str) -> ir.Function:
-        """Return the function that adds the cotangents of what bonds or pairs have read, from those of their sums."""
+        """Return the function that maps cotangents of sums over bonds or pairs to those of their arguments."""
         end = "here" if self.lattice.step.others.graph else AXIS.symbol.key[0]  # type: ignore[attr-defined]
         body: list[ir.Statement] = []
         for function in functions:
@@ -125,7 +126,7 @@ class WholeArrays:
         return replace(functions[0], name=name, parameters=parameters, body=(*body, ir.Return(BAR)))
 
     def _transposed_sums(self, function: ir.Function, source: ir.Value) -> Iterator[ir.Statement]:
-        """Yield the call that takes the cotangents of sums over bonds or pairs to what these have read."""
+        """Yield the call that maps cotangents of sums over bonds or pairs to those of their arguments."""
         for s in function.body:
             if isinstance(s, ir.GatherSums):
                 stores = [c for c in _stores(_loop(function)) if c.array.storage is Storage.SUM_COTANGENT]
@@ -136,7 +137,7 @@ class WholeArrays:
                 yield ir.Assign(BAR, ir.Called(called, (source, X, ir.Listed(tuple(listed)), *rest)))
 
     def _added_cotangents(self, loop: ir.Loop) -> Iterator[ir.Statement]:
-        """Yield the statements that add cotangents where their values were read."""
+        """Yield the statements that add cotangents at the places that the values were read from."""
         for s in loop.body:
             match s:
                 case ir.Reduce(source, number, name, value):
@@ -164,7 +165,7 @@ class WholeArrays:
         return value
 
     def _everywhere(self, loop: ir.Loop, value: ir.Value) -> ir.Value:
-        """Return a value at all sites, bonds or pairs, where it may be the same at all of them."""
+        """Return a value as an array over all sites, bonds or pairs; it may be a single number."""
         match loop.kind:
             case "bonds":
                 return ir.Called("broadcast_to", (value, ir.Member(ir.fixed("here"), "shape")), NP)
@@ -230,7 +231,7 @@ class WholeArrays:
         return value
 
     def _load(self, array: ir.Array, offset: Sequence[int], end: str) -> ir.Value:
-        """Return an array at the sites that are read."""
+        """Return an array at the sites that a function reads."""
         fields, increments = self.lattice.program.coordinates, self.lattice.step.sites.increments
         storage, number = ir.fixed(_ARRAYS.get(array.storage, array.name)), ir.Constant(array.number)
         whole: ir.Value = ir.Entry(storage, number)
@@ -246,7 +247,7 @@ class WholeArrays:
 
 
 def identical(functions: Sequence[ir.Function]) -> Iterator[ir.Function]:
-    """Yield the functions; one that differs from an earlier one in its colour or window only calls that one."""
+    """Yield the functions; one that equals an earlier one but for its colour or window calls the earlier one."""
     first: dict[ir.Block, ir.Function] = {}
     for function in functions:
         known = first.setdefault(function.body, function)
@@ -282,7 +283,7 @@ def _copied(name: ir.Name, value: ir.Value) -> Iterator[ir.Statement]:
 
 
 def _unless_beside(loop: ir.Loop, unchanged: ir.Value) -> Iterator[ir.Statement]:
-    """Yield the statement that leaves out a sweep on boundary seams where colours fit the sizes."""
+    """Yield the statement that skips a sweep on boundary seams where the colours fit the sizes."""
     if loop.selection.window is not None:
         beside = ir.Called("any", (), ir.Member(SITES, "beside"))
         yield ir.If(ir.Prefix("not", beside), (ir.Return(unchanged),))
@@ -299,7 +300,7 @@ def _chosen(selection: ir.Selection, new: ir.Value, old: ir.Value) -> ir.Value:
 
 
 def _argument(selection: ir.Selection) -> tuple[str, ...]:
-    """Return the parameter that says at which sites a sweep updates, with its default."""
+    """Return the parameter that selects the sites that a sweep updates, with its default."""
     if selection.window is not None:
         return (f"window={selection.window}",)
     return () if selection.colour is None else (f"colour={selection.colour}",)

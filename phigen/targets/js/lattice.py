@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Sequence
 
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops, bounds
+from phigen.ir.lattice_loops import LatticeLoops, bounds
 from phigen.ir.passes.by_tables import by_tables
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries

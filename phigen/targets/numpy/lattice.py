@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 
 from phigen.ir import nodes as ir
-from phigen.ir.lattice import LatticeLoops
+from phigen.ir.lattice_loops import LatticeLoops
 from phigen.ir.passes.temporaries import temporaries
 from phigen.ir.passes.whole_arrays import WholeArrays, identical, transposed_sums_name
 from phigen.scheme.kernel import Kernel

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from phigen.ir.lattice import LatticeLoops, begins, weights
+from phigen.ir.lattice_loops import LatticeLoops, begins, weights
 from phigen.ir.passes.by_rows import RowLayout
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program

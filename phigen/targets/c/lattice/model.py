@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from phigen.ir.lattice import bounds
+from phigen.ir.lattice_loops import bounds
 from phigen.scheme.policies import LatticeNewtonPolicy, LatticeSweepPolicy
 from phigen.scheme.program import BOUND, Program
 from phigen.scheme.steps import Sweeps

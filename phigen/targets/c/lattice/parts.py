@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from phigen.ir.lattice import bounds
+from phigen.ir.lattice_loops import bounds
 from phigen.lanes.lowering import Rows
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program

@@ -1,7 +1,7 @@
 """Builder of the loops of a lattice: from kernels at a site to functions with loops over sites, bonds or pairs.
 
-The meaning of every symbol that kernels read is decided here, once for all targets. The functions are on the level of
-sites; their stores hold whole expression graphs until `phigen.ir.passes.temporaries`.
+The meaning of every symbol that kernels read is defined here, once for all targets. The functions are on the level of
+sites. Their stores hold whole expression graphs, which `phigen.ir.passes.temporaries` turns into statements.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from phigen.symbolic import symbols
 from phigen.symbolic.expression import Expression, number, symbol
 from phigen.symbolic.symbols import Symbol, kind_of
 
-#: The share of each of two sites in the energy between them.
+#: The share of each of two sites in the energy of their bond or pair.
 _HALF = number(Fraction(1, 2))
 
 
@@ -45,7 +45,7 @@ class LatticeLoops:
         return ir.Selection(sweep.colour if coloured else None, sweep.inside and coloured, sweep.window)
 
     def stage(self, kernel: Kernel) -> ir.Function:
-        """Return the function of a kernel of the equation of a stage, whose fields are those of y."""
+        """Return the function of a kernel of the equation of a stage; the fields that it reads are those of y."""
         gather = self.step.others.varied if kernel.reads_variations else self.step.others.field
         read = gather if kernel.inputs["gathered"] else None
         starts, varied = ["start"] * kernel.reads_start, ["varied"] * kernel.reads_variations
@@ -87,18 +87,21 @@ class LatticeLoops:
         return self._over_sites(kernel, role, ("coef",), stores, sweep.gather, self._selection(sweep))
 
     def transposed_stage(self, kernel: Kernel, gather: Gather | None) -> ir.Function:
-        """Return the transpose of a kernel of the equation of a stage, which reads sums over bonds or pairs or not."""
+        """Return the transpose of a kernel of the equation of a stage; ``gather`` has the sums that it reads."""
         stores = self._cotangents(kernel, gather.names if gather else ())
         return self._over_sites(kernel, ir.LoopRole.TRANSPOSED_STAGE, ("coef",), stores, gather)
 
     def recomputing(self, kernel: Kernel, sums: Sequence[str], fields: Sequence[str]) -> ir.Function:
-        """Return either, which reads ``sums`` that are there already and recomputes ``fields`` before a sweep."""
+        """Return the transpose of a sweep or of a stage.
+
+        It reads ``sums`` that are stored already, and recomputes ``fields`` before a sweep by the inverse flow.
+        """
         once, reads = self._reads(kernel, sums)
         loop = ir.Loop("sites", (*reads, *self._cotangents(kernel, sums, fields)))
         return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.TRANSPOSED_SWEEP, ("coef",), (*once, loop))
 
     def transposed_sums(self, ends: Ends, kernel: Kernel) -> ir.Function:
-        """Return the transpose of the function that sums over bonds or pairs, by their transposed kernel."""
+        """Return the transpose of the function that sums over bonds or pairs; ``kernel`` is the transposed kernel."""
         once, reads = self._reads(kernel, ())
         source = "params" if "params" in kernel.inputs else "coef"
         body = (*reads, *self._cotangents(kernel))
@@ -106,7 +109,7 @@ class LatticeLoops:
         return ir.Function(kernel.name, kernel.purpose, ir.LoopRole.TRANSPOSED_GATHER, (source,), (*once, loop))
 
     def _cotangents(self, kernel: Kernel, sums: Sequence[str] = (), fields: Sequence[str] = ()) -> Iterator[ir.Update]:
-        """Yield what a transposed kernel stores, zeros left out; ``fields`` are those that it recomputes."""
+        """Yield the stores of a transposed kernel, without zeros; ``fields`` are the fields that it recomputes."""
         for output in kernel.outputs:
             array = output.name.removesuffix("_bar")
             names = fields if array == UNDONE else kernel.inputs.get(array, [""] * len(output.values))
@@ -152,13 +155,13 @@ class LatticeLoops:
         return [ir.Store(ir.Array(storage, k), e, adds) for k, e in enumerate(values)]
 
     def _reads(self, kernel: Kernel, sums: Sequence[str]) -> tuple[list[ir.Statement], list[ir.Statement]]:
-        """Return the declarations of what is read once, and of what is read at each site, in the order of inputs."""
+        """Return the declarations of values read once, and of values read at each site, in the order of inputs."""
         once: list[ir.Statement] = []
         reads: list[ir.Statement] = []
-        for s in _symbols(kernel):
-            meaning = self.meaning(s, sums)
+        for name in _symbols(kernel):
+            meaning = self.meaning(name, sums)
             at_all_sites = isinstance(meaning, ir.Coefficient | ir.SystemParameter | ir.Time)
-            (once if at_all_sites else reads).append(ir.real(s, meaning))
+            (once if at_all_sites else reads).append(ir.real(name, meaning))
         return once, reads
 
     def meaning(self, s: str, sums: Sequence[str] = ()) -> ir.Value:
@@ -231,16 +234,16 @@ def _symbols(kernel: Kernel) -> Iterator[str]:
 
 
 def begins(step: Sweeps) -> tuple[Symbol, ...]:
-    """Return the symbols that are 1 where a site at an offset has a colour and lies on the seams of a sweep."""
+    """Return the symbols that are 1 at sites of a colour on the boundary seams of a sweep, for all sweeps."""
     read = (s for sweep in step.sweeps for s in sweep.kernel.inputs["present"])
     return tuple(dict.fromkeys(s for s in read if isinstance(s, Symbol) and kind_of(s) == symbols.BEGINS))
 
 
 def weights(program: Program, step: Sweeps) -> tuple[Symbol, ...]:
-    """Return the symbols that are 1 for terms of H that lie within the open ends, in the order of kernels."""
-    own = (*(sweep.kernel for sweep in step.sweeps), *(step.equation.kernels if step.equation else ()))
-    read = (w for kernel in (*own, *program.observables.kernels) for w in kernel.inputs["present"])
-    return tuple(dict.fromkeys(w for w in read if isinstance(w, Symbol) and kind_of(w) == symbols.PRESENT))
+    """Return the symbols that are 1 for terms of H within the open ends, in the order of kernels."""
+    kernels = (*(sweep.kernel for sweep in step.sweeps), *(step.equation.kernels if step.equation else ()))
+    present = (w for kernel in (*kernels, *program.observables.kernels) for w in kernel.inputs["present"])
+    return tuple(dict.fromkeys(w for w in present if isinstance(w, Symbol) and kind_of(w) == symbols.PRESENT))
 
 
 def bounds(key: Sequence[str | int]) -> list[tuple[int, int]]:
