@@ -175,7 +175,6 @@ def lattice_facts(name: str) -> dict[str, Any]:
     """What is measured of a lattice, whose figure is drawn."""
     found = source(name)
     compilation = compilation_of(found)
-    assert compilation.cell is not None
     solver, run = lattice_solver_of(compilation), longest_run(found)
     start = start_of_lattice(found, run)
     about: dict[str, Any] = {"seed": seed_of(found, run), "t0": float(run.start) if found.time else None}

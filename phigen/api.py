@@ -105,7 +105,7 @@ def compile(
         runnable = ", ".join(registry.LOADABLE)
         raise ValueError(f"Python cannot run the target {target!r}; it can run {runnable}")
     compilation = compilation_of(source, order=order, scheme=scheme, tangent=tangent, adjoint=adjoint, profile=profile)
-    return lattice_solver_of(compilation, target) if compilation.cell else solver_of(compilation, target)
+    return (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target)
 
 
 def formulas(source: Source, order: int | None = None, *, terms: int | None = None) -> SympyFormulas:
@@ -129,7 +129,7 @@ def compilation_of(source: Source, **options: Unpack[Overrides]) -> Compilation:
     _expect_valid(**options)
     if isinstance(source, Compilation):
         spec = source.spec.overridden(**options)
-        return source if spec == source.spec else compile_proved(spec, system=None if source.cell else source.system)
+        return source if spec == source.spec else compile_proved(spec, system=source.known_system)
     if isinstance(source, System):
         return compile_proved((source.spec or _spec_of(source)).for_running(**options), system=source)
     if not isinstance(source, Spec | str | PathLike) and isinstance(getattr(source, "spec", None), Spec):
@@ -156,7 +156,7 @@ def solver_of(compilation: Compilation, target: str = "auto") -> Solver:
     """The loaded solver of a compilation. Raises `ToolchainError` if C was asked for and cannot be compiled."""
     from phigen.runtime.solver import Solver
 
-    if compilation.cell:
+    if compilation.spec.lattice:
         raise system_of_lattice(compilation.spec)
     return Solver(*_loaded(compilation.program, target), compilation.spec)
 

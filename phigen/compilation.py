@@ -1,13 +1,20 @@
-"""What compiling one spec made, stage by stage."""
+"""The results of compiling one spec: ``Compilation = CompiledSeries | CompiledSplitting | CompiledGauss |
+CompiledLattice``.
+
+All four share what `_Compiled` declares, and a ``system``: that of a lattice of any size raises `SpecError`. Where one
+kind is expected, `by_series`, `by_splitting`, `by_gauss` and `by_sweeps` return the compilation as that kind.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Self, TypeVar, cast
 
 from phigen.display import display
 from phigen.gauss.realisation import Realisation
+from phigen.gauss.tableau import Tableau, tableau
 from phigen.geometry.system import System, system_of_lattice
 from phigen.realisations.protocol import BiRealisation
 from phigen.scheme.discretisation import Discretisation
@@ -23,70 +30,66 @@ if TYPE_CHECKING:
     from phigen.lattice.cell import Cell
     from phigen.lattice.sweep_plans import LatticePlan
 
-
-class NoSystem:
-    """What a lattice has in place of a system of a fixed number of coordinates: whoever asks for one is told so."""
-
-    def __init__(self, spec: Spec) -> None:
-        self._spec = spec
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        raise system_of_lattice(self._spec)
+T = TypeVar("T")
 
 
-@dataclass(frozen=True, repr=False)
-class Compilation:
-    """Everything that compiling one spec made, stage by stage; ``seconds`` maps stages to their time.
-
-    A lattice has a ``cell``, and its system is a `NoSystem`.
-    """
+@dataclass(frozen=True, kw_only=True, repr=False)
+class _Compiled(ABC):
+    """The part that all compilations share; ``seconds`` maps stages of the compiler to their time."""
 
     spec: Spec
-    system: System
-    realisation: BiRealisation | None
     order: Order
     program: Program
-    gauge: Gauge = field(default_factory=Gauge)
     seconds: Mapping[str, float] = field(default_factory=dict)
-    splitting: Splitting | None = None
-    gauged: Gauged | None = None
-    scheme: Discretisation | None = None
-    cell: Cell | None = None
-    sweeps: LatticePlan | None = None
-    gauss: Realisation | None = None
 
     def __repr__(self) -> str:
         return f"<Compilation of {self.spec.name}: order {self.order.order}, {self.label}>"
 
     @property
-    def in_double(self) -> Compilation:
+    @abstractmethod
+    def scheme_name(self) -> str:
+        """The scheme, as in specs."""
+
+    @property
+    @abstractmethod
+    def label(self) -> str:
+        """The kind of the method, for every place that names it to the user."""
+
+    @property
+    @abstractmethod
+    def exact(self) -> bool:
+        """Whether a step starts and ends at the ends of one p to round-off, or has exact structure; see `poisson`."""
+
+    @property
+    @abstractmethod
+    def poisson(self) -> bool:
+        """Whether a step is a Poisson map to round-off: one of exact structure, without forces."""
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether a step of −h undoes one of h."""
+        return True
+
+    @property
+    def degree(self) -> int | None:
+        """The degree d of a truncation, with a Poisson defect of O(h^(d+1)); None where none is known."""
+        return None
+
+    @property
+    def kind(self) -> str:
+        """The kind of the bi-realisation, or the scheme where steps have none."""
+        return self.scheme_name
+
+    @property
+    def birealisation(self) -> str | None:
+        """The kind of the bi-realisation that the compiler chose or was asked for; None where steps have none."""
+        return None
+
+    @property
+    def in_double(self) -> Self:
         """The same in double precision."""
         program = self.program
         return replace(self, program=replace(program, extras=replace(program.extras, real="double")))
-
-    @property
-    def chart(self) -> BiRealisation:
-        """The bi-realisation; a splitting has none, and must not be asked."""
-        if self.realisation is None:
-            raise ValueError(f"{self.spec.name} is compiled to {self.label}, which has no bi-realisation")
-        return self.realisation
-
-    @property
-    def label(self) -> str:
-        """The kind of the method, for every place that names it to the user."""
-        if self.realisation:
-            return self.realisation.label
-        if self.gauss:
-            return self.gauss.label
-        if self.sweeps is None:
-            return "splitting"
-        from phigen.lattice.series import SeriesPlan
-
-        if isinstance(self.sweeps, SeriesPlan):
-            return f"{self.sweeps.realisation.kind}, on a lattice"
-        return "splitting of a lattice"
 
     @property
     def method(self) -> str:
@@ -97,63 +100,33 @@ class Compilation:
 
     @property
     def described(self) -> dict[str, Any]:
-        """The method for machines; of a lattice its colours too, and why it is the series, or has more of them, where
-        sizes of runs ask it."""
-        if self.sweeps is None:
-            return {"scheme": self.scheme_name} | ({"structure": self.structure} if self.gauss else {})
-        from phigen.lattice.series import SeriesPlan
-
-        scheme = "series" if isinstance(self.sweeps, SeriesPlan) else "splitting"
-        return {"scheme": scheme, "colours": self.sweeps.colouring.count, "since": self.sweeps.since or None}
+        """The method for machines."""
+        return {"scheme": self.scheme_name}
 
     @property
-    def scheme_name(self) -> str:
-        """The scheme of a system of a few coordinates, as in specs."""
-        return "gauss" if self.gauss else "splitting" if self.splitting else "series"
-
-    @property
-    def structure(self) -> str:
-        """The structure of a Gauss method, as in specs."""
-        return "to truncation" if self.gauss and not self.gauss.exact else "exact"
-
-    def told(self, method: str) -> str:
-        """A line that names the method, and why it is the series, or has more colours, where sizes of runs ask it."""
-        if self.sweeps is None or not self.sweeps.since:
-            return method
-        colours = self.sweeps.colouring.count
-        seam = " and a seam" * bool(self.sweeps.colouring.seams)
-        return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
+    def reasons(self) -> Mapping[str, str]:
+        """The choices of the compiler that have a reason of their own, with it."""
+        return {}
 
     @property
     def notes(self) -> list[str]:
         """Decisions of the compiler that the user may not expect, a line each."""
-        return [note for note in (self.order.note, *self.gauge.notes) if note]
+        return [self.order.note] if self.order.note else []
 
     @property
-    def exact(self) -> bool:
-        """Whether a step starts and ends at the ends of one p to round-off, or has exact structure; see `poisson`."""
-        method = self.gauss or self.realisation
-        return method is None or method.exact
+    def monitor(self) -> Expression | None:
+        """dt/dτ, where steps are equal in τ."""
+        return None
 
     @property
-    def degree(self) -> int | None:
-        """The degree d of a truncation, with a Poisson defect of O(h^(d+1)); None where none is known."""
-        return self.order.order if self.gauss else self.chart.degree
+    def has_series(self) -> bool:
+        """Whether the step comes from S_1, S_2, … and a bi-realisation."""
+        return False
 
     @property
-    def poisson(self) -> bool:
-        """Whether a step is a Poisson map to round-off: that of an exact bi-realisation, without forces."""
-        return self.exact and self.system.forces is None
-
-    @property
-    def symmetric(self) -> bool:
-        """Whether a step of −h undoes one of h."""
-        return self.realisation is None or self.realisation.symmetric
-
-    @property
-    def discretised(self) -> System:
-        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
-        return self.gauged.system if self.gauged else self.gauge.applied(self.system)
+    def is_composed(self) -> bool:
+        """Whether a step is composed of several maps."""
+        return len(self.program.fractions) > 1
 
     @property
     def stage(self) -> Order:
@@ -161,23 +134,347 @@ class Compilation:
         return self.order if len(self.program.fractions) == 1 else Order(2, 1)
 
     @property
+    def known_system(self) -> System | None:
+        """The system, for another compilation of it; None for a lattice, whose cell is built anew."""
+        return None
+
+    def named(self, method: str) -> str:
+        """A line that names the method, with the reason for a choice that depends on the runs of the spec."""
+        return method
+
+    def by_series(self) -> CompiledSeries:
+        """The compilation to a series. Raises `ValueError` for others."""
+        raise self._not("generating function")
+
+    def by_splitting(self) -> CompiledSplitting:
+        """The compilation to a splitting. Raises `ValueError` for others."""
+        raise self._not("parts with flows")
+
+    def by_gauss(self) -> CompiledGauss:
+        """The compilation to Gauss collocation. Raises `ValueError` for others."""
+        raise self._not("stages of collocation")
+
+    def by_sweeps(self) -> CompiledLattice:
+        """The compilation of a lattice of any size. Raises `ValueError` for others."""
+        raise self._not("sweeps over sites")
+
+    def _not(self, part: str) -> ValueError:
+        return ValueError(f"{self.spec.name} is compiled to {self.label}, which has no {part}")
+
+    def _repr_html_(self) -> str:
+        """The system and its method, for notebooks."""
+        return cast(str, display("page of a compilation")(self))
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class _CompiledSystem(_Compiled, ABC):
+    """A system of a fixed number of coordinates."""
+
+    system: System
+    gauge: Gauge = field(default_factory=Gauge)
+
+    @property
+    def poisson(self) -> bool:
+        """Whether a step is a Poisson map to round-off: one of exact structure, without forces."""
+        return self.exact and self.system.forces is None
+
+    @property
+    def discretised(self) -> System:
+        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
+        return self.gauge.applied(self.system)
+
+    @property
+    def notes(self) -> list[str]:
+        """Decisions of the compiler that the user may not expect, a line each."""
+        return [*super().notes, *filter(None, self.gauge.notes)]
+
+    @property
     def monitor(self) -> Expression | None:
         """dt/dτ, where steps are equal in τ."""
         return self.gauge.monitor
 
+    @abstractmethod
+    def by_kind(
+        self,
+        series: Callable[[CompiledSeries], T],
+        splitting: Callable[[CompiledSplitting], T],
+        gauss: Callable[[CompiledGauss], T],
+    ) -> T:
+        """The result of the function for this kind of compilation."""
+
+    @property
+    def known_system(self) -> System | None:
+        """The system."""
+        return self.system
+
+    def _repr_latex_(self) -> str:
+        """The formulas of the system and of the method, for notebooks."""
+        return cast(str, display("formulas of a compilation")(self))
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CompiledSeries(_CompiledSystem):
+    """A step from S_1, S_2, … and the bi-realisation, with what is discretised and its generating function."""
+
+    realisation: BiRealisation
+    gauged: Gauged
+    scheme: Discretisation
+
+    @property
+    def scheme_name(self) -> str:
+        """The scheme, as in specs."""
+        return "series"
+
+    @property
+    def label(self) -> str:
+        """The bi-realisation."""
+        return self.realisation.label
+
+    @property
+    def exact(self) -> bool:
+        """Whether a step starts and ends at the ends of one p to round-off."""
+        return self.realisation.exact
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether a step of −h undoes one of h."""
+        return self.realisation.symmetric
+
+    @property
+    def degree(self) -> int | None:
+        """The degree of a truncated bi-realisation."""
+        return self.realisation.degree
+
+    @property
+    def kind(self) -> str:
+        """The kind of the bi-realisation."""
+        return self.realisation.kind
+
+    @property
+    def birealisation(self) -> str | None:
+        """The kind of the bi-realisation."""
+        return self.realisation.kind
+
+    @property
+    def reasons(self) -> Mapping[str, str]:
+        """The reason for the bi-realisation."""
+        why, automatic = self.realisation.explanation, f"auto picked {self.realisation.kind}, "
+        if why.startswith(automatic):
+            why = "chosen by phigen, " + why.removeprefix(automatic)
+        return {"bi-realisation": f"{self.label}, {why}"}
+
+    @property
+    def has_series(self) -> bool:
+        """Whether the step comes from S_1, S_2, … and a bi-realisation."""
+        return True
+
+    @property
+    def discretised(self) -> System:
+        """The system with the Hamiltonian that is discretised: H less the Casimirs of the gauge."""
+        return self.gauged.system
+
     @property
     def series(self) -> HamiltonJacobi:
         """The series of `discretised`; the symbol ``gauge:C`` is the multiple of C that the solver chooses."""
-        if self.gauged is None:
-            raise ValueError(f"{self.spec.name} is compiled to {self.label}, which has no generating function")
         return self.gauged.series
 
-    def _repr_latex_(self) -> str:
-        """The formulas of the system and of the method, of a lattice those of the cell, for notebooks."""
-        if self.cell:
-            return cast(str, display("formulas of a cell")(self.cell))
-        return cast(str, display("formulas of a compilation")(self))
+    def by_series(self) -> CompiledSeries:
+        """The compilation itself."""
+        return self
 
-    def _repr_html_(self) -> str:
-        """The system and what it was compiled to, for notebooks."""
-        return cast(str, display("page of a compilation")(self))
+    def by_kind(
+        self,
+        series: Callable[[CompiledSeries], T],
+        splitting: Callable[[CompiledSplitting], T],
+        gauss: Callable[[CompiledGauss], T],
+    ) -> T:
+        """The result of the function for a series."""
+        return series(self)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CompiledSplitting(_CompiledSystem):
+    """A step by the exact flows of the parts of H."""
+
+    splitting: Splitting
+
+    @property
+    def scheme_name(self) -> str:
+        """The scheme, as in specs."""
+        return "splitting"
+
+    @property
+    def label(self) -> str:
+        """The scheme."""
+        return "splitting"
+
+    @property
+    def exact(self) -> bool:
+        """Flows are Poisson maps."""
+        return True
+
+    @property
+    def is_composed(self) -> bool:
+        """A step is composed of flows."""
+        return True
+
+    def by_splitting(self) -> CompiledSplitting:
+        """The compilation itself."""
+        return self
+
+    def by_kind(
+        self,
+        series: Callable[[CompiledSeries], T],
+        splitting: Callable[[CompiledSplitting], T],
+        gauss: Callable[[CompiledGauss], T],
+    ) -> T:
+        """The result of the function for a splitting."""
+        return splitting(self)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CompiledGauss(_CompiledSystem):
+    """A step by Gauss collocation, of the unknowns of ``gauss``."""
+
+    gauss: Realisation
+
+    @property
+    def scheme_name(self) -> str:
+        """The scheme, as in specs."""
+        return "gauss"
+
+    @property
+    def label(self) -> str:
+        """The unknowns, and whether the structure is exact."""
+        return self.gauss.label
+
+    @property
+    def exact(self) -> bool:
+        """Whether the step has exact structure."""
+        return self.gauss.exact
+
+    @property
+    def degree(self) -> int | None:
+        """The order, which is that of the Poisson defect too."""
+        return self.order.order
+
+    @property
+    def structure(self) -> str:
+        """The structure of the method, as in specs."""
+        return "exact" if self.gauss.exact else "to truncation"
+
+    @property
+    def tableau(self) -> Tableau:
+        """The coefficients of the stages."""
+        return tableau(self.order.terms)
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """The method for machines."""
+        return {"scheme": self.scheme_name, "structure": self.structure}
+
+    def by_gauss(self) -> CompiledGauss:
+        """The compilation itself."""
+        return self
+
+    def by_kind(
+        self,
+        series: Callable[[CompiledSeries], T],
+        splitting: Callable[[CompiledSplitting], T],
+        gauss: Callable[[CompiledGauss], T],
+    ) -> T:
+        """The result of the function for collocation."""
+        return gauss(self)
+
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class CompiledLattice(_Compiled):
+    """A lattice of any size: its ``cell``, and the plan of the ``sweeps`` of a step."""
+
+    cell: Cell
+    sweeps: LatticePlan
+
+    @property
+    def system(self) -> System:
+        """Raise `SpecError`: the number of coordinates is not known before a run."""
+        raise system_of_lattice(self.spec)
+
+    @property
+    def discretised(self) -> System:
+        """Raise `SpecError`, as `system`."""
+        return self.system
+
+    @property
+    def gauge(self) -> Gauge:
+        """Nothing is subtracted from H."""
+        return Gauge()
+
+    @property
+    def scheme_name(self) -> str:
+        """The scheme, as in specs."""
+        return self.sweeps.scheme
+
+    @property
+    def label(self) -> str:
+        """The bi-realisation, or that H is split."""
+        return self.sweeps.label
+
+    @property
+    def kind(self) -> str:
+        """The kind of the bi-realisation, or the scheme where steps have none."""
+        return self.sweeps.kind
+
+    @property
+    def birealisation(self) -> str | None:
+        """The kind of the bi-realisation, where it is one of a site."""
+        return self.sweeps.site_kind
+
+    @property
+    def is_composed(self) -> bool:
+        """Whether a step is composed of several maps: of flows, or of stages."""
+        return not self.sweeps.is_implicit or len(self.program.fractions) > 1
+
+    @property
+    def exact(self) -> bool:
+        """Flows and implicit stages are Poisson maps."""
+        return True
+
+    @property
+    def poisson(self) -> bool:
+        """Whether a step is a Poisson map to round-off: one without forces."""
+        return not self.cell.forces
+
+    @property
+    def described(self) -> dict[str, Any]:
+        """The method for machines, with the colours, and the reason where sizes of runs ask for the series, or for more
+        colours."""
+        plan = self.sweeps
+        return {"scheme": plan.scheme, "colours": plan.colouring.count, "since": plan.since or None}
+
+    def named(self, method: str) -> str:
+        """A line that names the method, and why it is the series, or has more colours, where sizes of runs ask it."""
+        if not self.sweeps.since:
+            return method
+        colours = self.sweeps.colouring.count
+        seam = " and a seam" * bool(self.sweeps.colouring.seams)
+        return f"{method}: {f'{colours} colours{seam}' if colours > 1 else 'the series'}, since {self.sweeps.since}"
+
+    def by_sweeps(self) -> CompiledLattice:
+        """The compilation itself."""
+        return self
+
+    def by_kind(
+        self,
+        series: Callable[[CompiledSeries], T],
+        splitting: Callable[[CompiledSplitting], T],
+        gauss: Callable[[CompiledGauss], T],
+    ) -> T:
+        """Raise `SpecError`, as `system`."""
+        raise system_of_lattice(self.spec)
+
+    def _repr_latex_(self) -> str:
+        """The formulas of the cell, for notebooks."""
+        return cast(str, display("formulas of a cell")(self.cell))
+
+
+Compilation = CompiledSeries | CompiledSplitting | CompiledGauss | CompiledLattice

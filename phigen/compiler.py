@@ -16,10 +16,10 @@ import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar, Unpack
+from typing import TYPE_CHECKING, TypeVar, Unpack
 
 from phigen import progress, registry
-from phigen.compilation import Compilation, NoSystem
+from phigen.compilation import Compilation, CompiledGauss, CompiledLattice, CompiledSeries, CompiledSplitting
 from phigen.errors import CheckError, Diagnostic, LimitError, PhigenWarning, SpecError
 from phigen.gauss.gauge import slowest
 from phigen.geometry.system import System, system_from_spec
@@ -221,12 +221,13 @@ def _compiled(spec: Spec, source: System, clock: _Clock, early: BiRealisation | 
         program = clock.timed(
             "program", lambda: build_program(source, realisation, plan, gauged, reached, spec, group=group)
         )
-    return Compilation(
-        spec, source, realisation, plan, program, gauged.gauge, clock.seconds, gauged=gauged, scheme=reached
-    )
+    return CompiledSeries(
+        spec=spec, system=source, order=plan, program=program, gauge=gauged.gauge, seconds=clock.seconds,
+        realisation=realisation, gauged=gauged, scheme=reached,
+    )  # fmt: skip
 
 
-def _split(spec: Spec, source: System, clock: _Clock) -> Compilation:
+def _split(spec: Spec, source: System, clock: _Clock) -> CompiledSplitting:
     """Compile to a splitting."""
     gauge = Gauge() if isinstance(spec.gauge, str) else given(source, spec.gauge)
     discretised = gauge.applied(source)
@@ -250,7 +251,10 @@ def _split(spec: Spec, source: System, clock: _Clock) -> Compilation:
         flows = by_angles(discretised, group, choice.splitting.flows, put_back=uniform(source))
         choice = replace(choice, splitting=replace(choice.splitting, flows=flows))
     program = clock.timed("program", lambda: build_splitting(source, choice, gauge, spec, monitor=monitor, group=group))
-    return Compilation(spec, source, None, choice.order, program, gauge, clock.seconds, choice.splitting)
+    return CompiledSplitting(
+        spec=spec, system=source, order=choice.order, program=program, gauge=gauge, seconds=clock.seconds,
+        splitting=choice.splitting,
+    )  # fmt: skip
 
 
 def _parts(spec: Spec, system: System) -> Splitting:
@@ -262,7 +266,7 @@ def _parts(spec: Spec, system: System) -> Splitting:
     return split(system, motions=False) if alone and spec.composition != "auto" else parts
 
 
-def _collocated(spec: Spec, source: System, clock: _Clock) -> Compilation:
+def _collocated(spec: Spec, source: System, clock: _Clock) -> CompiledGauss:
     """Compile to Gauss collocation."""
     expect_offered(spec)
     plan = plan_gauss(spec)
@@ -272,25 +276,25 @@ def _collocated(spec: Spec, source: System, clock: _Clock) -> Compilation:
     else:
         gauge = given(source, spec.gauge)
     program = clock.timed("program", lambda: build_gauss(source, gauge, realisation, plan, spec))
-    return Compilation(spec, source, None, plan, program, gauge, clock.seconds, gauss=realisation)
+    return CompiledGauss(
+        spec=spec, system=source, order=plan, program=program, gauge=gauge, seconds=clock.seconds, gauss=realisation
+    )
 
 
-def _swept(spec: Spec, cell: Cell, clock: _Clock) -> Compilation:
+def _swept(spec: Spec, cell: Cell, clock: _Clock) -> CompiledLattice:
     """Compile a lattice, of any sizes, to sweeps over its sites."""
     if spec.scheme == "gauss":
         expect_offered(spec)
     from phigen.lattice.cell_building import expect_coloured
-    from phigen.lattice.series import SeriesPlan
     from phigen.lattice.sweep_plans import build_sweeps, plan_sweeps
 
     plan = clock.timed("plan", lambda: plan_sweeps(cell, spec))
-    if spec.solver.compensated and (isinstance(plan, SeriesPlan) or spec.extras.adjoint):
+    if spec.solver.compensated and (plan.is_implicit or spec.extras.adjoint):
         message = "solver: compensated is for lattices whose H splits, without adjoint"
         raise SpecError([Diagnostic(message, spec.locations.get(("solver",)))])
     program = clock.timed("program", lambda: build_sweeps(cell, plan, spec))
     expect_coloured(spec, cell, plan.colouring.periods(cell.boundary))
-    nothing: Any = NoSystem(spec)
-    return Compilation(spec, nothing, None, plan.order, program, seconds=clock.seconds, cell=cell, sweeps=plan)
+    return CompiledLattice(spec=spec, order=plan.order, program=program, seconds=clock.seconds, cell=cell, sweeps=plan)
 
 
 def _group(spec: Spec, source: System, kind: str) -> Group | None:

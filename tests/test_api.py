@@ -126,7 +126,7 @@ def test_an_order_takes_the_place_of_terms_and_reaches_truncations():
     text = "coordinates: [x, y, z]\npoisson: {nambu: [x**2 + y**2 + z**4]}\nhamiltonian: x*y + z\n"
     truncated = spec.loads(f"phigen: 1\nname: t\nterms: 3\nbirealisation: {{kind: spray, spray: flat}}\n{text}")
     chosen = [compile_spec(truncated), compile_spec(truncated, order=2)]
-    assert [(c.order.order, c.order.terms, c.chart.degree) for c in chosen] == [(4, 3, 5), (2, 1, 3)]
+    assert [(c.order.order, c.order.terms, c.realisation.degree) for c in chosen] == [(4, 3, 5), (2, 1, 3)]
 
 
 def test_refuted_mathematics_is_not_compiled():

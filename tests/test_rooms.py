@@ -1,4 +1,4 @@
-"""Figures of the architecture that may fall and must not rise: circles of imports, and conditions in the C runtime."""
+"""Figures of the architecture that may fall and must not rise: circles of imports, conditions, tests on kinds."""
 
 import ast
 import re
@@ -15,6 +15,18 @@ LARGEST_CIRCLE = 10
 
 #: Lines of preprocessor conditions among the non-blank lines of the runtime in C, in percent; the aim is 8.
 CONDITIONS = 17.0
+
+#: Tests on the kind of a step or of a compilation: ``isinstance`` and class patterns. What kinds differ in belongs into
+#: their records and methods.
+KIND_TESTS = 108
+
+#: The kinds that are counted, by the modules that define them.
+KINDS = {
+    "phigen.scheme.steps": {"Newton", "Explicit", "Path", "Gauss", "Splitting", "Sweeps", "Implicit"},
+    "phigen.compilation": {"CompiledSeries", "CompiledSplitting", "CompiledGauss", "CompiledLattice"},
+    "phigen.lattice.series": {"SeriesPlan"},
+    "phigen.lattice.sweep_plans": {"SplittingPlan"},
+}
 
 
 def imports() -> dict[str, set[str]]:
@@ -71,6 +83,25 @@ def conditions() -> tuple[int, int]:
     return counted, total
 
 
+def kind_tests(tree: ast.AST) -> list[int]:
+    """The lines of a module that ask for the kind of a step, a plan, or a compilation."""
+    imported = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module in KINDS)
+    kinds = {a.asname or a.name for node in imported for a in node.names if a.name in KINDS[node.module or ""]}
+    asked = []
+    for node in ast.walk(tree):
+        is_call = isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance"
+        listed = node.args[1:] if is_call else [node.cls] if isinstance(node, ast.MatchClass) else []
+        asked += [node.lineno for part in listed if kinds & {ast.unparse(n) for n in ast.walk(part)}]
+    return asked
+
+
+def all_kind_tests() -> dict[str, list[int]]:
+    """The same for all modules that have any, by their names."""
+    files = sorted((ROOT / "phigen").rglob("*.py"))
+    asked = {str(p.relative_to(ROOT)): kind_tests(ast.parse(p.read_text(encoding="utf-8"))) for p in files}
+    return {name: lines for name, lines in asked.items() if lines}
+
+
 def test_circles_of_imports_do_not_grow():
     (largest, *_) = circles(imports())
     assert len(largest) <= LARGEST_CIRCLE, sorted(largest)
@@ -86,6 +117,27 @@ def test_circles_are_found():
     assert circles(graph) == [{"a", "b", "c"}]
 
 
+def test_tests_on_kinds_do_not_grow():
+    asked = all_kind_tests()
+    assert sum(map(len, asked.values())) <= KIND_TESTS, asked
+
+
+def test_tests_on_kinds_are_found():
+    source = """
+from phigen.scheme.steps import Newton, Path as Traced, Sweep
+def f(step):
+    if isinstance(step, Newton | Traced) or isinstance(step, Sweep):
+        return 1
+    match step:
+        case Traced(recurrences=r):
+            return r
+        case Sweep():
+            return 2
+"""
+    assert kind_tests(ast.parse(source)) == [4, 7]
+
+
 if __name__ == "__main__":
     print([len(circle) for circle in circles(imports())], "modules in circles")
+    print(sum(map(len, all_kind_tests().values())), "tests on kinds of steps and compilations")
     print("{} of {} lines of the runtime in C are conditions".format(*conditions()))

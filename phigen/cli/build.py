@@ -281,7 +281,7 @@ def _report(console: Console, folder: Path, compilation: Compilation, changes: S
     said = [f"wrote {', '.join(written)}"] if written else []
     said += [f"removed {', '.join(removed)}, which the spec no longer gives"] if removed else []
     program = compilation.program
-    method = compilation.told(f"order {program.order}, {compilation.label}")
+    method = compilation.named(f"order {program.order}, {compilation.label}")
     console.note(f"{folder}: {'; '.join(said) or 'unchanged'} ({method})")
     library = folder / _library(compilation.spec.name)
     if written and library.exists():

@@ -103,13 +103,13 @@ def _compared(
     compilation, comparisons = examination.compilation, []
     if compilation is None:
         return []
-    if compilation.realisation is None:
+    if not compilation.has_series:
         console.warn(f"{examination.spec.file}: {compilation.label} has no S_i to derive a second time")
         return []
     if shown:
         out("  Second derivation, by sympy alone")
     with collector.collecting():
-        for comparison in compare(compilation, terms, seconds or SECONDS):
+        for comparison in compare(compilation.by_series(), terms, seconds or SECONDS):
             comparisons.append(comparison)
             if shown:
                 out("\n".join(_lines(comparison.timed)))
@@ -163,7 +163,7 @@ def _print(examination: Examination, console: Console) -> None:
         shown = [s for s in statements if not (console.quiet and s.holds)]
         if shown:
             named = group.startswith((METHOD, SPLITTING, GAUSS))
-            out(f"  {compilation.told(group) if compilation and named else group}")
+            out(f"  {compilation.named(group) if compilation and named else group}")
         for statement in shown:
             out("\n".join(_lines(statement)))
             for part, residual in statement.failing if console.verbose else ():

@@ -77,8 +77,8 @@ def run_lattice(
         from phigen.drawing.films import expect_writer
 
         expect_writer(plot)
-    compilation = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
-    assert compilation.cell is not None
+    compiled = compilation_of(spec, order=order, scheme=scheme, profile=profile, tangent=lyapunov)
+    compilation = compiled.by_sweeps()
     run, start = begun_at(run, start_of(spec, run), source, timed=bool(spec.time))
     run, parameters = until_time(run, until), parameters_of(spec, start, settings)
     solver = lattice_solver_of(compilation, chosen_target(target, console.note))
@@ -120,8 +120,8 @@ def run_lattice(
         out_json(finite(description | ({"lyapunov": described_spectrum(spectrum)} if spectrum else {})))
     else:
         target = f"target {solver.target}, {counted(threads, 'thread')}"
-        told_method = compilation.told(f"{compilation.method}, {target}")
-        _print(spec, run, start, told_method, trajectory, largest, units)
+        named_method = compilation.named(f"{compilation.method}, {target}")
+        _print(spec, run, start, named_method, trajectory, largest, units)
         if observables:
             print_averages(observables, averages)
         if spectrum:

@@ -66,7 +66,7 @@ def command(
     written = command_of(spec_file, target, name, order, scheme, lyapunov, quick)
     if spec.lattice:
         cell, failures = gathered_of_lattice(
-            examination, examination.compilation, run, written, scheme, lyapunov, quick, console
+            examination, examination.compilation.by_sweeps(), run, written, scheme, lyapunov, quick, console
         )
         page, figures = lattice_document(cell), cell.trajectory is not None
     else:

@@ -8,7 +8,7 @@ from phigen.cli.console import Console
 from phigen.errors import PhigenError, StepError
 
 if TYPE_CHECKING:
-    from phigen.compilation import Compilation
+    from phigen.compilation import CompiledLattice
     from phigen.proofs.examination import Examination
     from phigen.report.lattice import LatticeMaterial
     from phigen.spec.model import Run
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def gathered_of_lattice(
     examination: Examination,
-    compilation: Compilation,
+    compilation: CompiledLattice,
     run: Run | None,
     written: str,
     scheme: str | None,
@@ -36,7 +36,7 @@ def gathered_of_lattice(
 
 def _measured(
     material: LatticeMaterial,
-    compilation: Compilation,
+    compilation: CompiledLattice,
     run: Run,
     scheme: str | None,
     lyapunov: bool,
@@ -75,7 +75,6 @@ def _measured(
         )
     except StepError as error:
         failure, trajectory = error, error.trajectory
-    assert compilation.cell is not None
     energies = np.array(
         [
             solver.density(x, t if spec.time else None, parameters=start.arguments)

@@ -118,7 +118,7 @@ def described_run(compilation: Compilation, recorder: Recorder, summaries: Seque
         "run": experiment.run.name,
         "target": solver.target,
         "order": solver.order,
-        "birealisation": compilation.realisation.kind if compilation.realisation else None,
+        "birealisation": compilation.birealisation,
         **compilation.described,
         "profile": compilation.program.profile,
         "exact": compilation.exact,

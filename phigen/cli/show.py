@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import textwrap
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -15,7 +16,7 @@ from phigen.cli.sections import assignments, section
 from phigen.cli.sources import load_one
 
 if TYPE_CHECKING:
-    from phigen.compilation import Compilation
+    from phigen.compilation import Compilation, CompiledGauss, CompiledSeries, CompiledSplitting
     from phigen.geometry.system import System
     from phigen.spec.model import Spec
     from phigen.symbolic.expression import Expression
@@ -106,8 +107,6 @@ def _show_cell(spec: Spec, most: int | None, *, as_latex: bool, as_json: bool) -
 
 
 def _print(compilation: Compilation, modified: int, most: int | None) -> None:
-    from phigen.notation import collocation, flows
-
     spec, system = compilation.spec, compilation.system
     corrected = _modified(compilation, modified, most)
     out(heading(f"{spec.name}: {spec.title}" if spec.title else spec.name))
@@ -124,17 +123,24 @@ def _print(compilation: Compilation, modified: int, most: int | None) -> None:
         section("Casimirs", assignments(_casimirs(system, most)))
     if system.invariants:
         section("Invariants", assignments(_named(system.invariants, most)))
-    if compilation.splitting:
-        lines = assignments(flows.formulas(compilation, most))
-        section(f"Splitting: {flows.method(compilation)}", [*lines, *_unfamiliar(lines)])
-    elif compilation.gauss:
-        said = [*assignments(collocation.equations()), *collocation.lines(compilation)]
-        section(f"Gauss collocation: {collocation.method(compilation)}", said)
-    else:
-        _print_series(compilation, most)
+    compilation.by_kind(partial(_print_series, most), partial(_print_splitting, most), _print_collocation)
     if corrected:
         section("Modified Hamiltonian", assignments(corrected))
     section("Generated code", _code(compilation))
+
+
+def _print_splitting(most: int | None, compilation: CompiledSplitting) -> None:
+    from phigen.notation import flows
+
+    lines = assignments(flows.formulas(compilation, most))
+    section(f"Splitting: {flows.method(compilation)}", [*lines, *_unfamiliar(lines)])
+
+
+def _print_collocation(compilation: CompiledGauss) -> None:
+    from phigen.notation import collocation
+
+    said = [*assignments(collocation.equations()), *collocation.lines(compilation)]
+    section(f"Gauss collocation: {collocation.method(compilation)}", said)
 
 
 def _unfamiliar(lines: Sequence[str]) -> list[str]:
@@ -163,14 +169,14 @@ def _forces(system: System, most: int | None) -> list[tuple[str, str]]:
     return [*_named(listed, most), *damping]
 
 
-def _print_series(compilation: Compilation, most: int | None) -> None:
+def _print_series(most: int | None, compilation: CompiledSeries) -> None:
     from phigen.notation import generating
 
-    why = textwrap.wrap(compilation.chart.explanation, 100)
+    why = textwrap.wrap(compilation.realisation.explanation, 100)
     maps = assignments(_maps(compilation, most))
     if any("φ" in line for line in maps):
         maps.append("where φ(s) = (1 − (√s/2) cot(√s/2))/s = 1/12 + s/720 + …")
-    section(f"Bi-realisation: {compilation.chart.kind}", [*why, *maps])
+    section(f"Bi-realisation: {compilation.realisation.kind}", [*why, *maps])
     series = [*_gauged(compilation), *assignments(_series(compilation, most))]
     section(f"Generating function: {generating.method(compilation)}", series)
 
@@ -204,11 +210,11 @@ def _casimirs(system: System, most: int | None) -> list[tuple[str, str]]:
     return [(name, as_powers(e) or readable_one(e, most)) for name, e in system.casimirs.items()]
 
 
-def _maps(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+def _maps(compilation: CompiledSeries, most: int | None) -> list[tuple[str, str]]:
     """α and β, of a symmetric pair α alone and what β is; of a path they are series, of which this is the beginning."""
     from phigen.notation.parts import texts
 
-    realisation, names = compilation.chart, compilation.system.coordinates
+    realisation, names = compilation.realisation, compilation.system.coordinates
     more = " + …" if realisation.path else ""
     maps = {f"α_{c}": e for c, e in zip(names, realisation.alpha, strict=True)}
     if not realisation.symmetric:
@@ -226,14 +232,14 @@ def _modified(compilation: Compilation, count: int, most: int | None) -> list[tu
     return [("H̃", " + ".join(names)), *((f"H_{j}", str(f)) for j, f in listed)] if listed else []
 
 
-def _gauged(compilation: Compilation) -> list[str]:
+def _gauged(compilation: CompiledSeries) -> list[str]:
     """Hamiltonian that S_h belongs to, if Casimirs are subtracted."""
     gauge = compilation.gauge
     subtracted = [f"λ_{c} {c}" for c in gauge.free] + [f"({value}) {c}" for c, value in gauge.fixed.items()]
     return [f"of H - {' - '.join(subtracted)}, which has the same flow as H"] if subtracted else []
 
 
-def _series(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+def _series(compilation: CompiledSeries, most: int | None) -> list[tuple[str, str]]:
     from phigen.notation.generating import series_formulas
 
     formulas = series_formulas(compilation, most)
@@ -286,16 +292,14 @@ def _described(compilation: Compilation) -> dict[str, object]:
 def _described_method(compilation: Compilation) -> dict[str, object]:
     from phigen.notation import collocation, flows
 
-    if compilation.gauss:
-        return collocation.described(compilation)
-    return flows.described(compilation) if compilation.splitting else _described_series(compilation)
+    return compilation.by_kind(_described_series, flows.described, collocation.described)
 
 
-def _described_series(compilation: Compilation) -> dict[str, object]:
+def _described_series(compilation: CompiledSeries) -> dict[str, object]:
     from phigen.notation.generating import series_formulas
     from phigen.symbolic.readable import readable
 
-    realisation, plan = compilation.chart, compilation.order
+    realisation, plan = compilation.realisation, compilation.order
     formulas = series_formulas(compilation, None)
     return {
         "scheme": "series",

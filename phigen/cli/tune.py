@@ -135,14 +135,14 @@ def problem_of(compilation: Compilation, experiment: Experiment, horizon: float 
     import numpy as np
 
     from phigen.cli.endings import ended, length
-    from phigen.tuning.problem import Problem
+    from phigen.tuning.problem import SystemProblem
 
     run, start = experiment.run, np.array(experiment.initial)
     if horizon is None and (run.until is not None or run.stop is not None):
         solver = loaded(compilation, "auto", console)
         horizon = length(ended(experiment, solver, console), solver)
     clock = "t" if compilation.spec.monitor is None else "τ"
-    return Problem(compilation.system, start, experiment.parameters, *_times(run, horizon), clock=clock)
+    return SystemProblem(start, experiment.parameters, *_times(run, horizon), clock=clock, system=compilation.system)
 
 
 def _of_lattice(

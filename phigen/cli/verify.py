@@ -173,7 +173,9 @@ def verified_lattice(
     begin = float(run.start) if spec.time else None
     seed = run.seed if spec.noise else None
     asked: dict[str, Any] = {"t0": begin, "seed": seed, "quick": quick, "single": single}
-    return verify_lattice(compilation, solvers, run.name, start_of(spec, run), float(run.step), run.steps, **asked)
+    return verify_lattice(
+        compilation.by_sweeps(), solvers, run.name, start_of(spec, run), float(run.step), run.steps, **asked
+    )
 
 
 def fallen_short(verification: Verification) -> CheckError:

@@ -6,16 +6,17 @@ covectors written out, both are formulas of a site and its neighbourhood, for al
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
+from typing import TYPE_CHECKING, ClassVar, TypeVar
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.cell import Cell
 from phigen.lattice.cell_realisation import CellRealisation, realise_cell
 from phigen.lattice.graphs import sums_by_field
 from phigen.lattice.site_kernels import site_kernel
-from phigen.lattice.site_parts import Colouring, SiteFields
+from phigen.lattice.site_parts import CellFlow, Colouring, SiteFields
 from phigen.lattice.variations import along, along_start
 from phigen.scheme.alternation import Schedule
 from phigen.scheme.composition import find, orders
@@ -23,10 +24,15 @@ from phigen.scheme.kernel import Role
 from phigen.scheme.order import Order
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Equation
-from phigen.spec.model import Spec
+from phigen.spec.model import Spec, SpecForces
 from phigen.splitting.ring import TIME
 from phigen.symbolic.expression import Expression, number, substitute, symbol, symbols_of
 from phigen.symbolic.symbols import MOMENTUM, Symbol, initial
+
+if TYPE_CHECKING:
+    from phigen.lattice.sweep_plans import SplittingPlan
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -44,6 +50,26 @@ class SeriesPlan:
     middle: Mapping[str, Expression]
     increment: Mapping[str, Expression]
     since: str = field(default="", kw_only=True)  # reason for the series although H splits
+
+    #: The scheme, as in specs; a stage solves an equation, and H is in no parts.
+    scheme = "series"
+    is_implicit, weak_order = True, 1
+    flows: ClassVar[tuple[CellFlow, ...]] = ()
+
+    @property
+    def label(self) -> str:
+        """The kind of the method, for the user."""
+        return f"{self.kind}, on a lattice"
+
+    @property
+    def kind(self) -> str:
+        """The kind of the bi-realisation."""
+        return self.realisation.kind
+
+    @property
+    def site_kind(self) -> str | None:
+        """The kind of the bi-realisation, where it is one of a site and does not couple sites."""
+        return self.kind if self.realisation.site else None
 
     @property
     def colouring(self) -> Colouring:
@@ -70,6 +96,37 @@ class SeriesPlan:
             *composed,
         ]
 
+    def acting(self, forces: SpecForces) -> str:
+        """The words of the header on forces, which are in the covector, or given by halves."""
+        return "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(forces.vector)
+
+    def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
+        """No flows."""
+        yield from ()
+
+    def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> Equation:
+        """The kernels of a stage, and those of its derivative if they are asked for."""
+        size = len(self.middle)
+        values = coefficients.hoist([*self.middle.values(), *self.increment.values()])
+        relax = site_kernel(
+            cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients, Role.RELAX
+        )
+        purpose = "what a stage adds to x at a site, from y around it"
+        advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
+        slopes = coefficients.hoist(along(cell, values[:size]))
+        slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients, Role.SLOPE)
+        if not tangent:
+            return Equation(relax, advance, slope)
+        starts, ends = (coefficients.hoist(e) for e in (along_start(values[:size]), along(cell, values[size:])))
+        side = site_kernel(cell, "side", "how y at a site follows x there", starts, "v", coefficients, Role.SIDE)
+        purpose = "how what a stage adds to x at a site follows y around it"
+        follow = site_kernel(cell, "follow", purpose, ends, "v", coefficients, Role.FOLLOW)
+        return Equation(relax, advance, slope, (side, follow))
+
+    def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
+        """The result of the second function, which takes series."""
+        return series(self)
+
     def schedule(self) -> Schedule:
         """Return the stages of a step, as flows of one part."""
         return Schedule(self.fractions, len(self.fractions) - 1, ((0, 0),))
@@ -95,26 +152,6 @@ def plan_series(cell: Cell, spec: Spec) -> SeriesPlan:
         raise SpecError([Diagnostic(d.message, d.location or place, d.hint) for d in error.diagnostics]) from None
     maps = _with_impulse(cell, realisation) if cell.forces.vector else (realisation.middle, realisation.increment)
     return SeriesPlan(realisation, *stages, *(_at_covectors(cell, m) for m in maps))
-
-
-def equation(cell: Cell, plan: SeriesPlan, coefficients: Coefficients, *, tangent: bool = False) -> Equation:
-    """Return the kernels of a stage; with ``tangent`` those of its derivative too."""
-    size = len(plan.middle)
-    values = coefficients.hoist([*plan.middle.values(), *plan.increment.values()])
-    relax = site_kernel(
-        cell, "relax", "y at a site from x there and y around it", values[:size], "y", coefficients, Role.RELAX
-    )
-    purpose = "what a stage adds to x at a site, from y around it"
-    advance = site_kernel(cell, "increment", purpose, values[size:], "change", coefficients, Role.ADVANCE)
-    slopes = coefficients.hoist(along(cell, values[:size]))
-    slope = site_kernel(cell, "slope", "how y at a site follows y around it", slopes, "v", coefficients, Role.SLOPE)
-    if not tangent:
-        return Equation(relax, advance, slope)
-    starts, ends = (coefficients.hoist(e) for e in (along_start(values[:size]), along(cell, values[size:])))
-    side = site_kernel(cell, "side", "how y at a site follows x there", starts, "v", coefficients, Role.SIDE)
-    purpose = "how what a stage adds to x at a site follows y around it"
-    follow = site_kernel(cell, "follow", purpose, ends, "v", coefficients, Role.FOLLOW)
-    return Equation(relax, advance, slope, (side, follow))
 
 
 def _at_covectors(cell: Cell, maps: Mapping[str, Expression]) -> dict[str, Expression]:

@@ -6,8 +6,9 @@ Each sweep has a kernel that is evaluated at every site.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 from phigen.errors import Diagnostic, SpecError
 from phigen.lattice.cell import GRAPH, GRID, PAIRS, PERIODIC, Cell
@@ -25,7 +26,7 @@ from phigen.lattice.damping import TogetherError
 from phigen.lattice.forcing import force_flows, noise_flows, pushed_casimirs
 from phigen.lattice.graphs import GraphSearch, energies, site_sums
 from phigen.lattice.observable_kernels import observables, observed_sums
-from phigen.lattice.series import SeriesPlan, equation, plan_series
+from phigen.lattice.series import SeriesPlan, plan_series
 from phigen.lattice.site_kernels import site_kernel
 from phigen.lattice.site_parts import (
     BondSum,
@@ -52,12 +53,14 @@ from phigen.scheme.order import Order
 from phigen.scheme.program import About, Noise, Program
 from phigen.scheme.staging import Coefficients
 from phigen.scheme.steps import Ends, Gather, Partners, Seam, Sites, Sweep, Sweeps
-from phigen.spec.model import Spec
+from phigen.spec.model import Spec, SpecForces
 from phigen.splitting.flow import Flow
 from phigen.splitting.kicks import Kick
 from phigen.splitting.parts import Splitting
 from phigen.splitting.ring import KICK, TIME
 from phigen.symbolic.neighbours import steps
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,12 @@ class SplittingPlan:
     choice: Choice
     noise: tuple[CellFlow, ...] = ()
     since: str = ""  # reason for more colours than the fewest
+
+    #: The scheme, as in specs, and the name of the method for the user; a step is one stage of explicit flows.
+    scheme = kind = "splitting"
+    label = "splitting of a lattice"
+    is_implicit, site_kind, weak_order = False, None, 2
+    fractions = (1.0,)
 
     @property
     def order(self) -> Order:
@@ -94,6 +103,43 @@ class SplittingPlan:
         """For each flow whether it belongs to one colour of a graph; empty if none does."""
         return tuple(flow.by_colour for flow in self.flows) if any(flow.by_colour for flow in self.flows) else ()
 
+    @property
+    def facts(self) -> list[str]:
+        """The lines of the header about the method."""
+        choice = self.choice
+        count, method = len(choice.splitting.flows), choice.method
+        marked = [f"H_{k}" for k, flow in enumerate(self.flows, 1) if flow.by_colour]
+        if count == 1 and not marked:
+            return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
+        parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
+        why = f", since {choice.why}" if choice.why else ""
+        flows = (
+            f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
+        )
+        return [
+            f"scheme: splitting, H = {parts}, with the exact flow of each",
+            f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
+            "step: explicit",
+        ]
+
+    def acting(self, forces: SpecForces) -> str:
+        """The words of the header on forces; flows of their own need none."""
+        return ""
+
+    def flows_named(self, cell: Cell) -> Iterator[tuple[CellFlow, str]]:
+        """All flows, those of the noise first, each with the name of its generator."""
+        for flow, name in zip(self.noise, cell.noise, strict=True):
+            yield flow, f"the noise {name}"
+        for k, flow in enumerate(self.flows, 1):
+            yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = sum of {flow.hamiltonian}"
+
+    def equation(self, cell: Cell, coefficients: Coefficients, *, tangent: bool) -> None:
+        """No equation: all flows are explicit."""
+
+    def either(self, splitting: Callable[[SplittingPlan], T], series: Callable[[SeriesPlan], T]) -> T:
+        """The result of the first function, which takes splittings."""
+        return splitting(self)
+
     def schedule(self) -> Schedule:
         """Return the flows of a step, part by part."""
         if self.by_colour:
@@ -102,7 +148,7 @@ class SplittingPlan:
         return with_noise(schedule, len(self.noise)) if self.noise else schedule
 
 
-#: The method of a step of a lattice.
+#: The plan of a step of a lattice; both have the same properties and methods.
 LatticePlan = SplittingPlan | SeriesPlan
 
 
@@ -228,17 +274,12 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
     """Return the solver of a lattice as a program."""
     extras = spec.extras
     coefficients = Coefficients([*(p.name for p in cell.parameters if p.at == "all"), TIME, KICK], cell.times)
-    schedule, swept, solved = plan.schedule(), tuple[tuple[Sweep, ...], ...](), None
-    if isinstance(plan, SeriesPlan):
-        solved = equation(cell, plan, coefficients, tangent=extras.tangent)
-    else:
-        swept = tuple(
-            tuple(
-                _sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent)
-                for motion in flow.every_motion
-            )
-            for k, (flow, what) in enumerate(_named(cell, plan), 1)
-        )
+    schedule = plan.schedule()
+    solved = plan.equation(cell, coefficients, tangent=extras.tangent)
+    swept = tuple(
+        tuple(_sweep(cell, flow, motion, k, coefficients, what, tangent=extras.tangent) for motion in flow.every_motion)
+        for k, (flow, what) in enumerate(plan.flows_named(cell), 1)
+    )
     if extras.adjoint and cell.noise:
         raise SpecError([Diagnostic("adjoint is not offered for lattices with noise")])
     plain_names = tuple(p.name for p in cell.parameters if p.at == "all")
@@ -275,7 +316,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         adjoint=adjoint,
     )
     step = coefficients.settled(sweeps)
-    facts = [_lattice_fact(cell, plan.colouring), *_facts(plan), *_acting_facts(cell, plan), plan.order.note]
+    facts = [_lattice_fact(cell, plan.colouring), *plan.facts, *_acting_facts(cell, plan), plan.order.note]
     return Program(
         name=cell.name,
         about=About(spec.title, spec.license, spec.source_sha256, tuple(f for f in facts if f), _operations(step)),
@@ -290,7 +331,7 @@ def build_sweeps(cell: Cell, plan: LatticePlan, spec: Spec) -> Program:
         forced=bool(cell.forces),
         pushed=pushed_casimirs(cell),
         noise=noise,
-        fractions=plan.fractions if isinstance(plan, SeriesPlan) else (1.0,),
+        fractions=plan.fractions,
         extras=extras,
         lanes=spec.solver.lanes,
         compensated=spec.solver.compensated,
@@ -321,14 +362,6 @@ def _expect_supported(cell: Cell, spec: Spec) -> None:
     diagnostics += [Diagnostic(f"{name} is not offered for lattices", locations.get((name,))) for name in unsupported]
     if diagnostics:
         raise SpecError(diagnostics)
-
-
-def _named(cell: Cell, plan: SplittingPlan) -> Iterator[tuple[CellFlow, str]]:
-    """Yield all flows, those of the noise first, each with the name of its Hamiltonian."""
-    for flow, name in zip(plan.noise, cell.noise, strict=True):
-        yield flow, f"the noise {name}"
-    for k, flow in enumerate(plan.flows, 1):
-        yield flow, f"F_{k}, a force" if flow.force else f"H_{k} = sum of {flow.hamiltonian}"
 
 
 def _sweep(
@@ -440,31 +473,10 @@ def _lattice_fact(cell: Cell, colouring: Colouring) -> str:
     )
 
 
-def _facts(plan: LatticePlan) -> Sequence[str]:
-    """Return the lines of the header on the method."""
-    if isinstance(plan, SeriesPlan):
-        return plan.facts
-    choice = plan.choice
-    count, method = len(choice.splitting.flows), choice.method
-    marked = [f"H_{k}" for k, flow in enumerate(plan.flows, 1) if flow.by_colour]
-    if count == 1 and not marked:
-        return ["scheme: the exact flow of H, which is elementary", "step: explicit"]
-    parts = " + ".join(f"H_{k}" for k in range(1, count + 1))
-    why = f", since {choice.why}" if choice.why else ""
-    flows = f"{len(choice.schedule().flows)} flows" if not marked else f"{', '.join(marked)} for each colour of sites"
-    return [
-        f"scheme: splitting, H = {parts}, with the exact flow of each",
-        f"composition: {method.name}, {method.stages} stage{'s' * (method.stages > 1)}, {flows}{why}",
-        "step: explicit",
-    ]
-
-
 def _acting_facts(cell: Cell, plan: LatticePlan) -> Iterator[str]:
     """Yield the lines of the header on forces and noise."""
-    series = isinstance(plan, SeriesPlan)
-    how = "p = h (grad H + zeta)" + ", impulse h f by halves before and after" * bool(cell.forces.vector)
-    yield from forces_said(bool(cell.forces), pushed_casimirs(cell), how if series else "")
-    yield from noise_said(tuple(cell.noise), weak=1 if series else 2)
+    yield from forces_said(bool(cell.forces), pushed_casimirs(cell), plan.acting(cell.forces))
+    yield from noise_said(tuple(cell.noise), weak=plan.weak_order)
 
 
 def _operations(step: Sweeps) -> dict[str, int]:

@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from phigen.compilation import Compilation
-from phigen.gauss.realisation import Plain, Realisation
+from phigen.compilation import CompiledGauss
+from phigen.gauss.realisation import Plain
 from phigen.symbolic.readable import readable
 
 
-def method(compilation: Compilation) -> str:
+def method(compilation: CompiledGauss) -> str:
     """``order 8, 4 stages, exact``."""
     stages, note = compilation.order.terms, compilation.order.note
     said = f"order {compilation.order.order}, {stages} stage{'s' * (stages > 1)}, structure {compilation.structure}"
     return said + (f" ({note})" if note else "")
-
-
-def realisation_of(compilation: Compilation) -> Realisation:
-    """Return the formulas of a compilation by Gauss collocation."""
-    if compilation.gauss is None:
-        raise ValueError(f"{compilation.spec.name} is not compiled to Gauss collocation")
-    return compilation.gauss
 
 
 def equations() -> list[tuple[str, str]]:
@@ -31,10 +24,10 @@ def equations() -> list[tuple[str, str]]:
     ]
 
 
-def lines(compilation: Compilation) -> list[str]:
+def lines(compilation: CompiledGauss) -> list[str]:
     """Describe the unknowns, one line for each part, and the step."""
     listed_lines, names = [], compilation.system.coordinates
-    for part in realisation_of(compilation).parts:
+    for part in compilation.gauss.parts:
         listed = ", ".join(names[i] for i in part.indices)
         if isinstance(part, Plain):
             listed_lines.append(f"{listed}: themselves")
@@ -44,14 +37,14 @@ def lines(compilation: Compilation) -> list[str]:
         listed_lines.append(
             f"{shown}: x̃(G E_a G*) with G in an algebra of dimension {part.algebra.dimension}, G = 1 at the start"
         )
-    exact = realisation_of(compilation).exact
+    exact = compilation.gauss.exact
     listed_lines.append(
         "the step is a Poisson map" if exact else "the step is a Poisson map to truncation only, that is: none"
     )
     return listed_lines
 
 
-def described(compilation: Compilation) -> dict[str, object]:
+def described(compilation: CompiledGauss) -> dict[str, object]:
     """The method for machines."""
     return {
         "scheme": "gauss",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.compilation import Compilation
+from phigen.compilation import CompiledSplitting
 from phigen.notation import parts
 from phigen.scheme.steps import Splitting, Step
 from phigen.splitting.flow import Flow
@@ -12,16 +12,11 @@ from phigen.symbolic.expression import Expression, symbol
 from phigen.symbolic.readable import readable
 
 
-def method(compilation: Compilation) -> str:
+def method(compilation: CompiledSplitting) -> str:
     """``order 4, 2 parts with exact flows``."""
-    count = len(flows_of(compilation))
+    count = len(compilation.splitting.flows)
     note = f" ({compilation.order.note})" if compilation.order.note else ""
     return f"order {compilation.order.order}, {count} part{'s' * (count > 1)} with exact flows{note}"
-
-
-def flows_of(compilation: Compilation) -> tuple[Flow, ...]:
-    """The flows of a splitting; none of a series."""
-    return compilation.splitting.flows if compilation.splitting else ()
 
 
 def images(flow: Flow, coordinates: Sequence[str]) -> dict[str, Expression]:
@@ -36,13 +31,13 @@ def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expre
     return [(c, f) for c, f in zip(coordinates, flow.force, strict=True) if not f.is_zero]
 
 
-def formulas(compilation: Compilation, most: int | None) -> list[tuple[str, str]]:
+def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str, str]]:
     """The parts of H and the images of the coordinates under the flow of each, as pairs of a name and a text.
 
     Parts that occur more than once in long formulas have names, σ with a number, and come last.
     """
     listed: list[tuple[str, str]] = []
-    for k, flow in enumerate(flows_of(compilation), 1):
+    for k, flow in enumerate(compilation.splitting.flows, 1):
         moved = images(flow, compilation.system.coordinates)
         named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
         local = [e for _, e in definitions(flow, compilation.system.coordinates)]
@@ -58,10 +53,10 @@ def schedule(step: Step) -> list[tuple[int, float]]:
     return [(part, step.schedule.times[row]) for part, row in step.schedule.flows]
 
 
-def described(compilation: Compilation) -> dict[str, object]:
+def described(compilation: CompiledSplitting) -> dict[str, object]:
     """The parts, and the flows of a step as pairs of a part, counted from 1, and a fraction of the step."""
     parts = []
-    for flow in flows_of(compilation):
+    for flow in compilation.splitting.flows:
         moved = images(flow, compilation.system.coordinates)
         local = definitions(flow, compilation.system.coordinates)
         texts = readable([*(e for _, e in local), *moved.values()], None)

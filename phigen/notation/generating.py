@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, CompiledSeries
 from phigen.errors import Diagnostic, SpecError
 from phigen.scheme.modified import corrections, expect_modified, powers
 from phigen.symbolic.readable import Formula, of_polynomial
@@ -13,7 +13,7 @@ from phigen.symbolic.readable import Formula, of_polynomial
 _MODIFIED_UP_TO = 6
 
 
-def method(compilation: Compilation) -> str:
+def method(compilation: CompiledSeries) -> str:
     """``order 6 from S_1 … S_5, symmetric: the even terms vanish``."""
     plan, stage = compilation.order, compilation.stage
     terms = "S_1" if stage.terms == 1 else f"S_1 … S_{stage.terms}"
@@ -46,7 +46,7 @@ class Generating:
         return f"from S_{self.beyond} on there are too many terms to be written out; the code shares their parts"
 
 
-def series_formulas(compilation: Compilation, most: int | None) -> Generating:
+def series_formulas(compilation: CompiledSeries, most: int | None) -> Generating:
     """The generating function of a series, as far as it can be written out; at most so many terms of each are shown."""
     plan = compilation.stage
     pushed = compilation.system.forces or compilation.system.noise
@@ -66,12 +66,12 @@ def modified_formulas(compilation: Compilation, count: int, most: int | None) ->
     approximate bi-realisation if more are asked for.
     """
     if not count:
-        leading = None if compilation.realisation is None else series_formulas(compilation, most).leading
+        leading = series_formulas(compilation.by_series(), most).leading if compilation.has_series else None
         return [] if leading is None else [(compilation.order.order, leading)]
-    if compilation.realisation is None:
+    if not compilation.has_series:
         message = f"the modified Hamiltonian is not computed for a step by {compilation.label}"
         raise SpecError([Diagnostic(message, hint="scheme: series has it")])
-    system, chart = compilation.system, compilation.chart
+    system, chart = compilation.system, compilation.by_series().realisation
     expect_modified(system, chart, len(compilation.program.fractions))
     series = corrections(system, chart, compilation.order, count, compilation.gauge)
     listed = powers(compilation.order, count, symmetric=chart.symmetric)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, CompiledSeries, CompiledSplitting
 from phigen.geometry.system import System
 from phigen.notation import flows, mathml, parts
 from phigen.notation.generating import modified_formulas, series_formulas
@@ -42,12 +42,11 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
     `SpecError` where they are asked for and not computed.
     """
     blocks = system_blocks(compilation.system)
-    if compilation.splitting:
-        blocks += [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
-    elif compilation.gauss:
-        blocks.append(_COLLOCATION)
-    else:
-        blocks += [*_maps(compilation), aligned(_series(compilation, most))]
+    blocks += compilation.by_kind(
+        lambda series: [*_maps(series), aligned(_series(series, most))],
+        lambda splitting: [_flow(splitting, k) for k in range(1, len(splitting.splitting.flows) + 1)],
+        lambda gauss: [_COLLOCATION],
+    )
     if listed := modified_formulas(compilation, modified, most):
         sums = ["<mi>H</mi>", *(_PLUS + _scaled("H", j) for j, _ in listed), _DOTS]
         tilde = '<mover accent="true"><mi>H</mi><mo>~</mo></mover>'
@@ -77,9 +76,9 @@ def _tensor(system: System) -> str:
     return aligned(_equations(left, [system.poisson[i][j] for i, j in pairs]))
 
 
-def _flow(compilation: Compilation, k: int) -> str:
+def _flow(compilation: CompiledSplitting, k: int) -> str:
     """A part of H, and the images of the coordinates that its flow changes, after the time h."""
-    flow = flows.flows_of(compilation)[k - 1]
+    flow = compilation.splitting.flows[k - 1]
     moved = flows.images(flow, compilation.system.coordinates)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
     local = flows.definitions(flow, compilation.system.coordinates)
@@ -87,9 +86,9 @@ def _flow(compilation: Compilation, k: int) -> str:
     return aligned(_equations(left, [*(e for _, e in local), *moved.values()]))
 
 
-def _maps(compilation: Compilation) -> Iterator[str]:
+def _maps(compilation: CompiledSeries) -> Iterator[str]:
     """α and β, and φ if they contain it; of a path they are series, of which this is the beginning."""
-    realisation, names = compilation.chart, compilation.system.coordinates
+    realisation, names = compilation.realisation, compilation.system.coordinates
     more = [_DOTS] if realisation.path else []
     letters = {"α": realisation.alpha} if realisation.symmetric else {"α": realisation.alpha, "β": realisation.beta}
     for letter, maps in letters.items():
@@ -101,7 +100,7 @@ def _maps(compilation: Compilation) -> Iterator[str]:
         yield _align([_BETA])
 
 
-def _gauged(compilation: Compilation) -> str:
+def _gauged(compilation: CompiledSeries) -> str:
     """The Hamiltonian of the series, if Casimirs are subtracted; precedes the formula of S_1."""
     gauge = compilation.gauge
     factors = [mathml.name(s) for s in gauge.multiples] + [mathml.grouped(value) for value in gauge.fixed.values()]
@@ -110,7 +109,7 @@ def _gauged(compilation: Compilation) -> str:
     return f"<mi>H</mi>{subtracted}{_EQUALS}" if subtracted else ""
 
 
-def _series(compilation: Compilation, most: int | None) -> Iterator[Equation]:
+def _series(compilation: CompiledSeries, most: int | None) -> Iterator[Equation]:
     series = series_formulas(compilation, most)
     listed = [_PLUS * (n > 0) + _scaled("S", i) for n, (i, _) in enumerate(series.listed)]
     yield _indexed("S", "h"), [*listed, *([f"{_PLUS}<mo>…</mo>"] if series.beyond else [])]

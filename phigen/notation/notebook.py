@@ -45,7 +45,7 @@ def compilation_html(compilation: Compilation) -> str:
     """The system and its method."""
     program = compilation.program
     said = f"compiled to order {program.order}: {compilation.label}, {program.step.manner}"
-    about = _cell_html(compilation.cell) if compilation.cell else system_html(compilation.system)
+    about = _cell_html(compilation.by_sweeps().cell) if compilation.spec.lattice else system_html(compilation.system)
     return about.removesuffix("</div>") + f"<p>{escape(said)}</p></div>"
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import prod
 from typing import Any
 
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, CompiledSeries
 from phigen.errors import Diagnostic, LimitError, SpecError
 from phigen.geometry.sympy_bridge import SympySystem, closed_function, free_symbols, symbols_in_sympy, to_sympy
 from phigen.realisations import karasev
@@ -62,19 +62,20 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 
     Raises `SpecError` for a splitting, `LimitError` if the terms are too many to be written out.
     """
-    if compilation.realisation is None:
+    if not compilation.has_series:
         raise SpecError(
             [Diagnostic(f"{compilation.label} has no bi-realisation and no S_i", hint="ask for scheme series")]
         )
-    dictionary, chart = Dictionary(compilation), compilation.chart
+    series_step = compilation.by_series()
+    dictionary, chart = Dictionary(compilation), series_step.realisation
     terms = terms or compilation.stage.terms
     try:
-        series = compilation.series.polynomial(terms)
+        series = series_step.series.polynomial(terms)
     except OverflowError as error:
         raise LimitError([Diagnostic(f"S_1 … S_{terms} are too large to be written out: {error}")]) from None
     degree = max(terms - 1, karasev.DEGREE) if chart.path else chart.degree
     if chart.path and degree:
-        alpha, beta = _ends_of_paths(compilation, dictionary, degree)
+        alpha, beta = _ends_of_paths(series_step, dictionary, degree)
     else:
         alpha, beta = (tuple(dictionary.expression(e) for e in maps) for maps in (chart.alpha, chart.beta))
     return SympyFormulas(
@@ -90,10 +91,10 @@ def sympy_formulas(compilation: Compilation, terms: int | None = None) -> SympyF
 
 
 def _ends_of_paths(
-    compilation: Compilation, dictionary: Dictionary, degree: int
+    compilation: CompiledSeries, dictionary: Dictionary, degree: int
 ) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """α and β = α(x, −p) up to a degree in p; the compiler's terms of higher degree do not belong to the series."""
-    formal = formal_alpha(compilation.discretised, compilation.chart, degree + 1)
+    formal = formal_alpha(compilation.discretised, compilation.realisation, degree + 1)
     parts = closed_form([dictionary.expression(e) for e in formal], dictionary.covector)(degree)
 
     def summed(x: Any, part: Coefficients, sign: int) -> Any:

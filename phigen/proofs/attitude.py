@@ -10,13 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
+from functools import partial
 from itertools import combinations, islice
 
 from phigen.attitude.elements import cross, direction, dot, element, product, rotated, with_phi
 from phigen.attitude.group import Group
 from phigen.attitude.matrices import multiplied
 from phigen.attitude.parts import Turning, constancy, factor_elements, joined, turnings
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, CompiledSeries, CompiledSplitting
 from phigen.geometry.lie_algebra import LieAlgebra, Representation
 from phigen.geometry.system import System, hamiltonian_vector_field
 from phigen.realisations.cayley import trilinear
@@ -49,21 +50,25 @@ BEFORE = tuple(symbol(Symbol("attitude", i)) for i in range(4))
 
 def check(compilation: Compilation) -> Iterator[Statement]:
     """The statements about the attitude of a method."""
-    attitude, system = compilation.program.attitude, compilation.system
-    if attitude is None:
-        return
-    group = attitude.group
+    attitude = compilation.program.attitude
+    if attitude is not None:
+        yield from compilation.by_kind(
+            partial(_series_statements, attitude), partial(_splitting_statements, attitude), lambda gauss: iter(())
+        )
+
+
+def _series_statements(attitude: Attitude, compilation: CompiledSeries) -> Iterator[Statement]:
+    """Statements on the element of an implicit or explicit step, and on its gradient."""
+    system, group, chart = compilation.system, attitude.group, compilation.realisation
     # A covector is in the p that moves x, and not in that of the element.
     pushed = system.forces is not None and any(not z.is_zero for z in system.forces.covector)
-    if compilation.splitting:
-        yield from _splitting_statements(compilation, group)
-    elif group.matrices:
-        yield from _matrix_statements(system, compilation.chart, attitude)
-    elif compilation.chart.path:
+    if group.matrices:
+        yield from _matrix_statements(system, chart, attitude)
+    elif chart.path:
         if not pushed:
             yield path_statement(system, group)
     else:
-        chart, p = compilation.chart, covector_symbols(system.coordinates)
+        p = covector_symbols(system.coordinates)
         group_element = element(
             [p[i] for i in group.rotation], [p[i] for i in group.translation], cayley=attitude.cayley
         )
@@ -71,12 +76,11 @@ def check(compilation: Compilation) -> Iterator[Statement]:
             group, group_element, p, chart.alpha, chart.beta, cayley=attitude.cayley, positive=system.positive
         )
         yield from islice(stated, 1 if pushed else None)
-    if not compilation.splitting:
-        slope = gradient(_first_term(compilation), system.coordinates)
-        yield rate_statement(system, attitude, slope, None if system.forces else compilation.monitor)
+    slope = gradient(_first_term(compilation), system.coordinates)
+    yield rate_statement(system, attitude, slope, None if system.forces else compilation.monitor)
 
 
-def _first_term(compilation: Compilation) -> Expression:
+def _first_term(compilation: CompiledSeries) -> Expression:
     """S_1, unexpanded where it has too many terms."""
     try:
         first = compilation.series.polynomial(1)
@@ -120,10 +124,9 @@ def path_statement(system: System, group: Group) -> Statement:
     return decide_zero(name, residuals, system.positive, "so τ = exp(p) for the path of p")
 
 
-def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[Statement]:
+def _splitting_statements(attitude: Attitude, compilation: CompiledSplitting) -> Iterator[Statement]:
     """Statements on the parts: the gradient of each is constant along its flow; their sum with Casimirs is H."""
-    system, splitting = compilation.system, compilation.splitting
-    assert splitting is not None
+    system, splitting, group = compilation.system, compilation.splitting, attitude.group
     turned = turnings(compilation.discretised, group, splitting.flows, put_back=uniform(system))
     order = "exp(t∇H_{k}) g₀" if group.spatial else "g₀ exp(t∇H_{k})"
     for k, (turning, flow) in enumerate(zip(turned, splitting.flows, strict=True), 1):
@@ -147,8 +150,6 @@ def _splitting_statements(compilation: Compilation, group: Group) -> Iterator[St
             listed = _residuals(group, [ONE + step_element[0], *step_element[1:4]], step_element[4:], start, end)
             yield decide_zero(name, listed, system.positive, "any g₀")
     put_back = [turning.left for turning in turned if not turning.left.is_zero]
-    attitude = compilation.program.attitude
-    assert attitude is not None
     plain = substitute([f.hamiltonian for f in splitting.flows], {KICK: ZERO})
     slope = gradient(total(plain) - total(put_back), system.coordinates)
     yield rate_statement(system, attitude, slope)

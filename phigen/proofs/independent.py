@@ -15,7 +15,7 @@ import mpmath
 import sympy
 
 from phigen import progress
-from phigen.compilation import Compilation
+from phigen.compilation import CompiledSeries
 from phigen.errors import Diagnostic, LimitError
 from phigen.geometry.shapes import LogCanonical
 from phigen.geometry.sympy_bridge import expanded_function
@@ -71,10 +71,10 @@ class OutOfTimeError(BaseException):
     """The time limit is reached. Not an `Exception`, so that no handler in between catches it."""
 
 
-def compare(compilation: Compilation, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
+def compare(compilation: CompiledSeries, terms: int | None = None, seconds: float = SECONDS) -> Iterator[Comparison]:
     """S_1 … S_terms, by default those of the method, then ∇S_h, α and β: each when it is derived.
 
-    The compilation is not that of a splitting. ∇S_h, as the program has it, is compared if it needs no further S_i.
+    ∇S_h, as the program has it, is compared if it needs no further S_i.
     Where steps follow paths, α and β are in the S_i alone. Raises `LimitError` when all has taken so many ``seconds``,
     or when a polynomial has too many terms.
     """
@@ -91,15 +91,15 @@ def compare(compilation: Compilation, terms: int | None = None, seconds: float =
         yield comparison
 
 
-def _steps(compilation: Compilation, terms: int) -> list[str]:
+def _steps(compilation: CompiledSeries, terms: int) -> list[str]:
     """The steps of the comparison, by name."""
     steps = [f"S_{i}" for i in range(1, terms + 1)]
-    if compilation.scheme and compilation.scheme.terms <= terms:
+    if compilation.scheme.terms <= terms:
         steps.append(GRADIENT)
-    return steps if compilation.chart.path else [*steps, MAPS]
+    return steps if compilation.realisation.path else [*steps, MAPS]
 
 
-def _limit(compilation: Compilation, step: str, reached: int, reason: str) -> LimitError:
+def _limit(compilation: CompiledSeries, step: str, reached: int, reason: str) -> LimitError:
     reason = reason or "the time was up"
     before = ["nothing was compared", "S_1 was compared", f"S_1 … S_{reached} were compared"][min(reached, 2)]
     message = f"{compilation.spec.file}: {step} was not derived a second time: {reason}; {before}"
@@ -135,11 +135,11 @@ def time_limit(seconds: float) -> Iterator[None]:
 class _Derivation:
     """Both derivations of one compilation, as far as they have come."""
 
-    def __init__(self, compilation: Compilation, terms: int) -> None:
+    def __init__(self, compilation: CompiledSeries, terms: int) -> None:
         self._compilation, self._terms = compilation, terms
         self._dictionary = Dictionary(compilation)
         self._positive = compilation.system.positive
-        system, chart = compilation.discretised, compilation.chart
+        system, chart = compilation.discretised, compilation.realisation
         self._poisson = sympy.Matrix([[self._dictionary.expression(e) for e in row] for row in system.poisson])
         self._alpha, self._beta = self._given(chart.alpha), self._given(chart.beta)
         source = self._path(0) if chart.path or chart.kind == exponential.KIND else self._alpha
@@ -166,7 +166,7 @@ class _Derivation:
     @property
     def _degree(self) -> int:
         """The degree in p up to which the maps are compared: that needed for S_1 … S_terms, at least 2."""
-        degree, chart = max(self._terms - 1, 2), self._compilation.chart
+        degree, chart = max(self._terms - 1, 2), self._compilation.realisation
         return degree if chart.exact or chart.degree is None else min(degree, chart.degree)
 
     @property
@@ -187,7 +187,7 @@ class _Derivation:
         start = time.perf_counter()
         mine = next(self._mine)
         middle = time.perf_counter()
-        hamilton_jacobi(compilation.discretised, compilation.chart, i, compilation.gauge.symbols).polynomial(i)
+        hamilton_jacobi(compilation.discretised, compilation.realisation, i, compilation.gauge.symbols).polynomial(i)
         end = time.perf_counter()
         self._taken += middle - start
         used = compilation.series.polynomial(i)
@@ -200,7 +200,6 @@ class _Derivation:
     def _gradient(self) -> Comparison:
         """∇S_h of one stage, coefficients written out."""
         scheme, h = self._compilation.scheme, self._dictionary.step
-        assert scheme is not None
         start = time.perf_counter()
         slope = scheme.generating.coefficients.written_out(scheme.generating.slope)
         pairs: list[Pair] = []
@@ -225,14 +224,14 @@ class _Derivation:
         return pushes
 
     def _are_ends(self) -> bool:
-        chart, choice = self._compilation.chart, self._compilation.spec.birealisation
+        chart, choice = self._compilation.realisation, self._compilation.spec.birealisation
         natural = choice.spray == "auto" and isinstance(self._compilation.system.shape, LogCanonical)
         flat = chart.kind == spray.KIND and not chart.exact and choice.spray in ("flat", "auto") and not natural
         return chart.kind == exponential.KIND or flat
 
     def _at_origin(self) -> list[Pair]:
         """α(x, 0) and β(x, 0) beside x, which the coefficients of higher degree leave out."""
-        chart, origin = self._compilation.chart, dict.fromkeys(self._dictionary.covector, 0)
+        chart, origin = self._compilation.realisation, dict.fromkeys(self._dictionary.covector, 0)
         return [
             (f"{name}_{x} at p = 0", e.subs(origin), x)
             for name, maps in (("α", self._maps(chart.alpha)), ("β", self._maps(chart.beta)))

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from phigen.compilation import Compilation
+from functools import partial
+
+from phigen.compilation import CompiledLattice
 from phigen.lattice import flow_proofs, forcing, proofs, series_proofs
 from phigen.lattice.cell import Cell
-from phigen.lattice.series import SeriesPlan
 from phigen.proofs.statements import CASIMIRS, FORCES, INVARIANTS, METHOD, NOISE, SPLITTING
 from phigen.symbolic.verdict import REFUTED, Statement
 
@@ -25,11 +26,9 @@ def lattice(cell: Cell) -> dict[str, tuple[Statement, ...]]:
     return groups | {group: listed for group, listed in statements.items() if listed}
 
 
-def sweeps(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
+def sweeps(compilation: CompiledLattice) -> dict[str, tuple[Statement, ...]]:
     """The parts of H of a lattice and their flows, or its bi-realisation and the equation of a stage."""
     cell, plan = compilation.cell, compilation.sweeps
-    if cell is None or plan is None:
-        return {}
-    if isinstance(plan, SeriesPlan):
-        return {f"{METHOD} ({plan.realisation.kind})": tuple(series_proofs.check(cell, plan))}
-    return {SPLITTING: tuple(flow_proofs.check(cell, plan))}
+    group = f"{METHOD} ({plan.kind})" if plan.is_implicit else SPLITTING
+    statements = plan.either(partial(flow_proofs.check, cell), partial(series_proofs.check, cell))
+    return {group: tuple(statements)}

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, CompiledGauss, CompiledSeries, CompiledSplitting
 from phigen.gauss.statements import check as check_gauss
 from phigen.geometry import checks
 from phigen.geometry.definedness import undefined_parts, undefined_starts
@@ -15,7 +15,6 @@ from phigen.geometry.positivity import not_negative, positivity
 from phigen.geometry.system import System
 from phigen.realisations import axioms
 from phigen.scheme.noise import noise_flows
-from phigen.scheme.steps import Gauss
 from phigen.series.hamilton_jacobi import residual
 from phigen.spec.model import Run, Spec
 from phigen.splitting.statements import check as check_splitting
@@ -114,23 +113,29 @@ def _attitude(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
 
 def method(compilation: Compilation) -> dict[str, tuple[Statement, ...]]:
     """The flows of a splitting; or the axioms of the bi-realisation and the Hamilton–Jacobi equation."""
-    last = _attitude(compilation)
-    if compilation.splitting:
-        flows = zip((s.name for s in compilation.system.noise), noise_flows(compilation.system), strict=True)
-        return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting, list(flows)))} | last
-    if compilation.gauss and isinstance(compilation.program.step, Gauss):
-        tableau = compilation.program.step.tableau
-        proved = check_gauss(compilation.system, compilation.discretised, compilation.gauss, tableau)
-        return {compilation.label: tuple(proved)} | last
-    axiom_statements = axioms.check(compilation.system, compilation.chart)
+    return compilation.by_kind(_method_by_series, _method_by_splitting, _method_by_gauss) | _attitude(compilation)
+
+
+def _method_by_splitting(compilation: CompiledSplitting) -> dict[str, tuple[Statement, ...]]:
+    flows = zip((s.name for s in compilation.system.noise), noise_flows(compilation.system), strict=True)
+    return {SPLITTING: tuple(check_splitting(compilation.discretised, compilation.splitting, list(flows)))}
+
+
+def _method_by_gauss(compilation: CompiledGauss) -> dict[str, tuple[Statement, ...]]:
+    proved = check_gauss(compilation.system, compilation.discretised, compilation.gauss, compilation.tableau)
+    return {compilation.label: tuple(proved)}
+
+
+def _method_by_series(compilation: CompiledSeries) -> dict[str, tuple[Statement, ...]]:
+    axiom_statements = axioms.check(compilation.system, compilation.realisation)
     stripped = [replace(s, name=s.name.removeprefix(PREFIX)) for s in axiom_statements]
-    label = f"{METHOD} ({compilation.chart.kind})"
-    return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))} | last
+    label = f"{METHOD} ({compilation.realisation.kind})"
+    return {label: tuple(stripped), "Hamilton–Jacobi series": tuple(series_statements(compilation))}
 
 
-def series_statements(compilation: Compilation) -> Iterator[Statement]:
+def series_statements(compilation: CompiledSeries) -> Iterator[Statement]:
     """S_1 … S_k solve the Hamilton–Jacobi equation; the S_i of even index vanish where the order rests on it."""
-    system, realisation, plan = compilation.discretised, compilation.chart, compilation.stage
+    system, realisation, plan = compilation.discretised, compilation.realisation, compilation.stage
     terms = plan.terms + (1 if realisation.symmetric else 0)  # S_{k+1} = 0 is what makes the order k + 1
     equation = "∂_t S_t = H(α(x, ∇S_t))" if not system.time else "∂_t S_t = H(τ − t/2, α(x, ∇S_t)) + ½ ∂_τ S_t"
     name = f"{equation} for S_t = {sum_of_terms(plan.terms)}"

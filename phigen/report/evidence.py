@@ -9,7 +9,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from markupsafe import Markup
 
 from phigen.compilation import Compilation
-from phigen.realisations.protocol import BiRealisation
 from phigen.registry import TARGETS
 from phigen.report import page
 from phigen.report.material import Material
@@ -42,11 +41,7 @@ def choices_section(compilation: Compilation) -> Markup:
     program = compilation.program
     pairs = [
         ("Poisson tensor", str(compilation.system.shape)),
-        *(
-            [("bi-realisation", f"{compilation.label}, {_reason(compilation.chart)}")]
-            if compilation.realisation
-            else []
-        ),
+        *compilation.reasons.items(),
         ("order", str(compilation.order.order) + (f", {compilation.order.note}" if compilation.order.note else "")),
     ]
     for fact in program.about.facts:
@@ -57,11 +52,6 @@ def choices_section(compilation: Compilation) -> Markup:
             pairs.append(("note", fact))
     pairs.append((f"one {program.step.unit}", program.about.counts or "nothing to compute"))
     return page.facts((name, page.typeset(text)) for name, text in pairs)
-
-
-def _reason(realisation: BiRealisation) -> str:
-    said, automatic = realisation.explanation, f"auto picked {realisation.kind}, "
-    return "chosen by phigen, " + said.removeprefix(automatic) if said.startswith(automatic) else said
 
 
 def proofs_section(material: Material) -> Markup:

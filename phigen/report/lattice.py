@@ -8,10 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from markupsafe import Markup
 
-from phigen.compilation import Compilation
+from phigen.compilation import CompiledLattice
 from phigen.drawing.lattices import lattice_figure, places_of, sites_figure
 from phigen.lattice.cell import Cell
-from phigen.lattice.sweep_plans import SplittingPlan
 from phigen.notation import mathml
 from phigen.notation.lattices import described, formulas
 from phigen.proofs.examination import Examination
@@ -36,7 +35,7 @@ class LatticeMaterial:
     """
 
     examination: Examination
-    compilation: Compilation
+    compilation: CompiledLattice
     command: str
     run: Run | None = None
     trajectory: LatticeTrajectory | None = None
@@ -58,7 +57,6 @@ def lattice_document(material: LatticeMaterial) -> str:
 
 def _sections(material: LatticeMaterial) -> Iterator[tuple[str, str, Markup]]:
     compilation, verification = material.compilation, material.verification
-    assert compilation.cell is not None
     notes = (material.failure,) if material.failure else ()
     whole = Material(material.examination, compilation, material.command, verification=verification, notes=notes)
     if material.live:
@@ -92,11 +90,11 @@ def _cell(cell: Cell) -> Iterator[Markup]:
         yield page.table("Parameters", [("", "name"), ("number", "default"), ("", ""), ("", "meaning")], rows)
 
 
-def _method(compilation: Compilation) -> Iterator[Markup]:
+def _method(compilation: CompiledLattice) -> Iterator[Markup]:
     facts = [fact.partition(": ") for fact in compilation.program.about.facts]
     yield page.facts((name if colon else "note", page.typeset(text or name)) for name, colon, text in facts)
-    if isinstance(compilation.sweeps, SplittingPlan):
-        rows = [(page.typeset(f"H_{k}"), [("", flow.manner)]) for k, flow in enumerate(compilation.sweeps.flows, 1)]
+    if flows := compilation.sweeps.flows:
+        rows = [(page.typeset(f"H_{k}"), [("", flow.manner)]) for k, flow in enumerate(flows, 1)]
         yield page.table("The parts of H, and how their flows move a site", [("", "part"), ("", "flow")], rows)
 
 

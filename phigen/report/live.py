@@ -77,14 +77,13 @@ def solvers(compilation: Compilation, scheme: str | None, orders: Sequence[int])
     """JavaScript by order: of the order of the page and those of ``orders`` below it, of lattices any; or why not."""
     page_order = compilation.order.order
     spec = replace(compilation.spec, reconstruct="", extras=_PRIVATE)
-    system = None if spec.lattice else compilation.system
     by_order: dict[int, str] = {}
     for order in (page_order, *(o for o in orders if o < page_order or (spec.lattice and o > page_order))):
         try:
             if order == page_order and emits(compilation):
                 variant = compilation
             else:
-                variant = compile_spec(spec, order=order, scheme=scheme, system=system)
+                variant = compile_spec(spec, order=order, scheme=scheme, system=compilation.known_system)
             (text,) = emit(variant.program, "").values()
         except PhigenError as error:
             if order == page_order:

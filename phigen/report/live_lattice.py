@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from phigen.compilation import Compilation
+from phigen.compilation import CompiledLattice
 from phigen.lattice.cell import PAIRS
 from phigen.lattice.placing import MOST_PLACED, placed
 from phigen.lattice.states import Start
@@ -61,7 +61,7 @@ class LatticeLive(Live):
 
 
 def gathered_lattice(
-    compilation: Compilation, scheme: str | None, run: Run, start: Start, orders: Sequence[int] = ORDERS
+    compilation: CompiledLattice, scheme: str | None, run: Run, start: Start, orders: Sequence[int] = ORDERS
 ) -> LatticeLive:
     """The panel for a run of a lattice."""
     if compilation.spec.noise:
@@ -77,10 +77,10 @@ def lattice_script(live: LatticeLive) -> str:
     return f"{script(live)}\nconst liveValues = {{ {live.formulas} }};"
 
 
-def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
+def lattice_live_section(compilation: CompiledLattice, live: LatticeLive) -> Markup:
     """The panel, or why there is none."""
     run, start, cell = live.run, live.start, compilation.cell
-    if not live.solvers or run is None or start is None or cell is None:
+    if not live.solvers or run is None or start is None:
         return page.paragraph(f"There is no live panel: {live.why_not}.", "note")
     spec, picture = compilation.spec, _picture(compilation, start)
     places = placed(start.bonds, start.sizes[0]) if picture == "graph" else None
@@ -126,17 +126,17 @@ def lattice_live_section(compilation: Compilation, live: LatticeLive) -> Markup:
     )
 
 
-def _picture(compilation: Compilation, start: Start) -> str:
+def _picture(compilation: CompiledLattice, start: Start) -> str:
     """The kind of picture of a lattice: see fields.js."""
     cell = compilation.cell
     if start.graph and start.sizes[0] <= MOST_PLACED:
         return "graph"
-    if cell and cell.relation == PAIRS and len(cell.fields) > 1:
+    if cell.relation == PAIRS and len(cell.fields) > 1:
         return "moving"
-    return "plane" if cell and len(cell.axes) > 1 else "diagram"
+    return "plane" if len(cell.axes) > 1 else "diagram"
 
 
-def _groups(compilation: Compilation, picture: str) -> list[tuple[str, str, list[int]]]:
+def _groups(compilation: CompiledLattice, picture: str) -> list[tuple[str, str, list[int]]]:
     """The quantities that can be drawn: name, kind, and the numbers of the fields."""
     fields = compilation.spec.coordinates
     if picture == "moving":
@@ -148,10 +148,9 @@ def _groups(compilation: Compilation, picture: str) -> list[tuple[str, str, list
     return [*views, ("energy of each site", "energy", [])]
 
 
-def _sizes(compilation: Compilation, run: Run, start: Start) -> list[list[int]]:
+def _sizes(compilation: CompiledLattice, run: Run, start: Start) -> list[list[int]]:
     """The sizes that a panel offers; those of the run alone where its start is a list."""
     choices, cell = [list(start.sizes)], compilation.cell
-    assert cell is not None
     arrays = (*_initial(compilation.spec, run).values(), *(_source(run, p) for p in compilation.spec.parameters))
     if start.graph or any(v and (v.listed or v.file) for v in arrays):
         return choices
@@ -254,10 +253,9 @@ def _sign(spec: Spec, start: Start) -> str:
 # -- what is said
 
 
-def _quantities(compilation: Compilation) -> list[dict[str, Any]]:
+def _quantities(compilation: CompiledLattice) -> list[dict[str, Any]]:
     """The conserved quantities: the energy, unless time or forces act, and the conserved Casimirs as one."""
     cell, pushed = compilation.cell, compilation.program.pushed
-    assert cell is not None
     quantities: list[dict[str, Any]] = [] if cell.driven else [{"name": "energy error", "casimirs": None}]
     casimirs = {name: k for k, name in enumerate(cell.casimirs) if name not in pushed}
     if casimirs:
@@ -270,7 +268,7 @@ def _quantities(compilation: Compilation) -> list[dict[str, Any]]:
     return quantities
 
 
-def _say(compilation: Compilation) -> str:
+def _say(compilation: CompiledLattice) -> str:
     said = "Two solvers take the same steps from the same start, in your browser, now. "
     conserved_words = " and ".join("its Casimirs" if q["casimirs"] else "its energy" for q in _quantities(compilation))
     if not conserved_words:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from phigen.compilation import Compilation
+from phigen.compilation import Compilation, CompiledGauss, CompiledSeries, CompiledSplitting
 from phigen.notation import collocation, flows, generating, mathml
 from phigen.report import page
 from phigen.report.equations import equation, group, polynomial
@@ -20,17 +20,13 @@ FLOWS = 12
 
 def method_section(compilation: Compilation) -> Markup:
     """The formulas of a step."""
-    if compilation.gauss:
-        said, blocks = collocation.method(compilation), _collocation(compilation)
-    elif compilation.splitting:
-        said, blocks = flows.method(compilation), _splitting(compilation)
-    else:
-        said, blocks = generating.method(compilation), _series(compilation)
+    said = compilation.by_kind(generating.method, flows.method, collocation.method)
+    blocks = compilation.by_kind(_series, _splitting, _collocation)
     lead = page.paragraph(page.typeset(f"{said[0].upper()}{said[1:]}."))
     return page.joined([lead, *_gauge(compilation), *blocks])
 
 
-def _collocation(compilation: Compilation) -> list[Markup]:
+def _collocation(compilation: CompiledGauss) -> list[Markup]:
     """The equations of a Gauss step, and what its unknowns are."""
     listed = [page.paragraph(page.typeset(f"{left} = {right}")) for left, right in collocation.equations()]
     said = [page.paragraph(page.typeset(f"{line}.")) for line in collocation.lines(compilation)]
@@ -50,8 +46,8 @@ def _gauge(compilation: Compilation) -> list[Markup]:
     return [page.heading("Gauge"), page.equations([[gauged]]), page.paragraph(said, "note")]
 
 
-def _series(compilation: Compilation) -> list[Markup]:
-    realisation, names = compilation.chart, compilation.system.coordinates
+def _series(compilation: CompiledSeries) -> list[Markup]:
+    realisation, names = compilation.realisation, compilation.system.coordinates
     blocks = [page.heading("One step"), page.equations(PATH_STEP if realisation.path else STEP)]
     blocks.append(page.heading(f"Bi-realisation: {realisation.label}"))
     if realisation.path:
@@ -68,7 +64,7 @@ def _series(compilation: Compilation) -> list[Markup]:
     return [*blocks, *_generating_function(compilation)]
 
 
-def _generating_function(compilation: Compilation) -> list[Markup]:
+def _generating_function(compilation: CompiledSeries) -> list[Markup]:
     series = generating.series_formulas(compilation, None)
     scaled = [f"{_power('h', i)}<mo>&#x2062;</mo>{_indexed('S', i)}" for i, _ in series.listed]
     terms = "<mo>+</mo>".join([*scaled, *(["<mo>…</mo>"] if series.beyond else [])])
@@ -87,8 +83,8 @@ def _generating_function(compilation: Compilation) -> list[Markup]:
     return [*blocks, page.equations([[mathml.math(MODIFIED + leading)]]), polynomial(first, correction)]
 
 
-def _splitting(compilation: Compilation) -> list[Markup]:
-    parts = flows.flows_of(compilation)
+def _splitting(compilation: CompiledSplitting) -> list[Markup]:
+    parts = compilation.splitting.flows
     sum_of_parts = "<mo>+</mo>".join(_indexed("H", k) for k, flow in enumerate(parts, 1) if not flow.force)
     blocks = [page.heading("Parts of H and their flows over a time h")]
     blocks.append(page.equations([[mathml.math(f"<mi>H</mi><mo>=</mo>{sum_of_parts}")]]))
@@ -97,7 +93,7 @@ def _splitting(compilation: Compilation) -> list[Markup]:
     return [*blocks, _schedule(compilation.program.step, [flow.letter for flow in parts])]
 
 
-def _flow(compilation: Compilation, k: int, flow: Flow) -> list[Markup]:
+def _flow(compilation: CompiledSplitting, k: int, flow: Flow) -> list[Markup]:
     moved = flows.images(flow, compilation.system.coordinates)
     left = [mathml.name(c) for c in moved]
     local = flows.definitions(flow, compilation.system.coordinates)

@@ -17,8 +17,9 @@ def panel_page(compilation: Compilation, run: Run) -> str | None:
     """
     spec = compilation.spec
     if spec.lattice:
-        fields = gathered_lattice(compilation, None, run, start_of(spec, run), ())
-        body, code, panel = lattice_live_section(compilation, fields), lattice_script(fields), page.FIELDS
+        lattice = compilation.by_sweeps()
+        fields = gathered_lattice(lattice, None, run, start_of(spec, run), ())
+        body, code, panel = lattice_live_section(lattice, fields), lattice_script(fields), page.FIELDS
         has_solver = bool(fields.solvers)
     else:
         live = gathered(compilation, None, run, spec.parameters_of(run), ())

@@ -71,9 +71,9 @@ class Modified:
 def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: Floats | None) -> Modified:
     """The modified Hamiltonian of a method with `CORRECTIONS` corrections. Raises `NotOfferedError`."""
     system, order = compilation.system, compilation.order
-    if compilation.splitting or len(compilation.program.fractions) > 1:
+    if compilation.is_composed:
         raise NotOfferedError("a step is composed of several maps")
-    if compilation.gauss:
+    if not compilation.has_series:
         raise NotOfferedError("it is not computed for Gauss methods")
     if system.time:
         raise NotOfferedError("it depends on the time, and is not constant")
@@ -86,10 +86,11 @@ def modified(compilation: Compilation, parameters: Mapping[str, float], gauge: F
     if order.order > MOST_ORDER:
         raise NotOfferedError(f"it is computed for orders up to {MOST_ORDER}")
     # With numbers for the parameters there are fewer terms; but the series may have no place for their roots.
+    chart = compilation.by_series().realisation
     exact = {name: Fraction(repr(value)) for name, value in parameters.items()}
     for known in (exact, {}):
         try:
-            series = corrections(system, compilation.chart, order, CORRECTIONS, compilation.gauge, known)
+            series = corrections(system, chart, order, CORRECTIONS, compilation.gauge, known)
             break
         except (LimitError, ArithmeticError):
             continue

@@ -15,14 +15,13 @@ from typing import Any
 import numpy as np
 
 from phigen import progress
-from phigen.compilation import Compilation
+from phigen.compilation import CompiledLattice
 from phigen.errors import StepError
 from phigen.geometry.checks import COMMUTING
 from phigen.lattice.cell import PAIRS, Cell
 from phigen.lattice.expansion import Expansion, expand, ring
 from phigen.lattice.forcing import noise_statements
 from phigen.lattice.observing import BALANCE, CHANGE, ENERGY, MAX_BALANCED_SITE_STEPS, errors_of, units_of, works
-from phigen.lattice.series import SeriesPlan
 from phigen.lattice.states import Start
 from phigen.runtime.lattice import LatticeSolver, LatticeTrajectory
 from phigen.scheme.steps import Sweeps
@@ -51,7 +50,7 @@ WORST_SITE = "Casimirs of sites are those of the site where they changed most."
 class _Subject:
     """The subject of a verification: the compiled lattice, its solvers and its run."""
 
-    compilation: Compilation
+    compilation: CompiledLattice
     solvers: Mapping[str, LatticeSolver]
     start: Start
     h: float
@@ -78,7 +77,7 @@ class _Subject:
 
 
 def verify_lattice(
-    compilation: Compilation,
+    compilation: CompiledLattice,
     solvers: Mapping[str, LatticeSolver],
     run: str,
     start: Start,
@@ -97,9 +96,9 @@ def verify_lattice(
     measured against the others.
     Raises `StepError` where a step of the run fails.
     """
-    assert compilation.cell is not None
+    cell = compilation.cell
     subject = _Subject(compilation, solvers, start, h, t0, seed)
-    most = MAX_BALANCED_SITE_STEPS if compilation.cell.driven else MOST_UPDATES
+    most = MAX_BALANCED_SITE_STEPS if cell.driven else MOST_UPDATES
     steps = min(steps, max(20, (min(most, FEW_UPDATES) if quick else most) // int(np.prod(start.sizes))))
     name = compilation.spec.name
     with progress.stage(f"{name}: {steps} steps"):
@@ -107,19 +106,19 @@ def verify_lattice(
             start.state, h, steps, max(1, steps // FRAMES), t0=t0, seed=seed, parameters=start.arguments
         )
     checks = [_order(subject if seed is None else _without_noise(subject), quiet=seed is not None)]
-    checks += _conserved(compilation.cell, trajectory)
+    checks += _conserved(cell, trajectory)
     with progress.stage(f"{name}: single steps"):
         checks += [_reversal(subject, trajectory), *_agreement(subject, trajectory)]
-        checks += _identity(compilation.cell, subject, trajectory)
+        checks += _identity(cell, subject, trajectory)
     if compilation.program.extras.adjoint:
         with progress.stage(f"{name}: gradients"):
-            checks += _gradients(compilation.cell, subject, trajectory)
+            checks += _gradients(cell, subject, trajectory)
     if seed is not None:
         with progress.stage(f"{name}: paths of the noise"):
-            checks += _noise(compilation.cell, subject, quick=quick)
-    checks += _single(compilation.cell, subject, single, trajectory) if single else []
-    label = compilation.told(compilation.method)
-    said = f"{stated(units_of(compilation.cell, trajectory))} {WORST_SITE}"
+            checks += _noise(cell, subject, quick=quick)
+    checks += _single(cell, subject, single, trajectory) if single else []
+    label = compilation.named(compilation.method)
+    said = f"{stated(units_of(cell, trajectory))} {WORST_SITE}"
     return Verification(name, run, label, h, steps, tuple(solvers), (), tuple(checks), {}, said)
 
 
@@ -129,9 +128,10 @@ def _without_noise(subject: _Subject) -> _Subject:
     from phigen.compiler import compile_spec
 
     whole = subject.compilation
-    scheme = None if isinstance(whole.sweeps, SeriesPlan) else "splitting"
-    quiet = compile_spec(replace(whole.spec, noise={}), order=whole.order.order, scheme=scheme or "series")
-    return replace(subject, compilation=quiet, solvers={"numpy": lattice_solver_of(quiet, "numpy")}, seed=None)
+    quiet = compile_spec(replace(whole.spec, noise={}), order=whole.order.order, scheme=whole.scheme_name)
+    return replace(
+        subject, compilation=quiet.by_sweeps(), solvers={"numpy": lattice_solver_of(quiet, "numpy")}, seed=None
+    )
 
 
 def _order(subject: _Subject, *, quiet: bool = False) -> Check:
@@ -317,8 +317,7 @@ def _few_sizes(subject: _Subject) -> list[int]:
 
 def _with_seams(subject: _Subject, sizes: list[int]) -> list[int]:
     """Sizes from those on that have the seams of the run, and along one or two axes sites away from them."""
-    plan = subject.compilation.sweeps
-    seams = plan.colouring.seams if plan else ()
+    seams = subject.compilation.sweeps.colouring.seams
     for axis, (seam, size) in enumerate(zip(seams, subject.start.sizes, strict=False)):
         sizes[axis] += 2 * seam.near * (len(seams) < 3)
         sizes[axis] += (size - sizes[axis]) % seam.period

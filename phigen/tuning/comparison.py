@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from phigen.compilation import Compilation
-from phigen.errors import PhigenError, StepError
+from phigen.errors import StepError
 from phigen.runtime.solver import Solver
-from phigen.study import measures
 from phigen.study.methods import Method as Step
 from phigen.study.methods import of_classical, of_solver
-from phigen.symbolic.arrays import Floats, evaluate
+from phigen.symbolic.arrays import Floats
 from phigen.tuning.building import Built, Outcome, build_all, built
 from phigen.tuning.problem import Classical, Method, Problem, steps_in
 from phigen.tuning.references import orbit_error
@@ -133,7 +132,7 @@ def compare(
     seconds = REFERRING * budget
     first = _measured(candidates[0], problem, problem.step, peers.get("dop853"), seconds)
     if first.refusal:
-        raise StepError(f"{problem.system.name}: {first.refusal}", step=0, status="NOT_FINITE")
+        raise StepError(f"{problem.name}: {first.refusal}", step=0, status="NOT_FINITE")
     work = first.nanoseconds / first.step if equal == "work" else math.nan
     entries = [first]
     for candidate in candidates[1:]:
@@ -180,27 +179,10 @@ def _measured(candidate: _Candidate, problem: Problem, h: float, exact: Method |
         steps=steps,
         nanoseconds=nanoseconds_per_step(candidate.method, h, steps),
         error=float(np.max(problem.unit.errors(energies, float(energies[0])))),
-        casimirs=_casimir_error(problem, states),
+        casimirs=problem.casimir_error(states),
         orbit=orbit,
         defect=_defect(candidate.step, problem, states, h),
     )
-
-
-def _casimir_error(problem: Problem, states: Floats) -> float | None:
-    """Return the largest error of any Casimir, relative to what its value is the sum of; None without Casimirs."""
-    if problem.sizes or not problem.system.casimirs:
-        return None
-    from phigen.study.conservation import units
-
-    system, casimirs = problem.system, problem.system.casimirs
-    columns: Mapping[str, object] = {c: states[:, i] for i, c in enumerate(system.coordinates)}
-    values = evaluate([*casimirs.values()], {**problem.parameters, **columns})
-    sizes = units(casimirs.values(), system.coordinates, problem.parameters, problem.start)
-    errors = [
-        np.max(u.errors(np.broadcast_to(v, len(states)), float(np.ravel(v)[0])))
-        for u, v in zip(sizes, values, strict=True)
-    ]
-    return float(max(errors))
 
 
 def _defect(step: Step | None, problem: Problem, states: Floats, h: float) -> float | None:
@@ -208,10 +190,4 @@ def _defect(step: Step | None, problem: Problem, states: Floats, h: float) -> fl
     if step is None:
         return None
     chosen = states[np.linspace(0, len(states) - 1, STATES, dtype=int)]
-    try:
-        defects = [
-            measures.poisson_defect(problem.system, problem.parameters, step, x, problem.direction * h) for x in chosen
-        ]
-    except PhigenError:
-        return None
-    return max(defects)
+    return problem.defect(step, chosen, h)

@@ -101,6 +101,11 @@ class LatticeProblem(Problem):
     seer: FlatLattice = field(kw_only=True)
 
     @property
+    def name(self) -> str:
+        """The name of the lattice."""
+        return self.cell.name
+
+    @property
     def unit(self) -> Unit:
         """The unit of errors of the energy."""
         energy = float(self.seer.energies(self.start[None], self.parameters)[0])
@@ -162,8 +167,7 @@ def lattice_problem(
 
     Raises `SpecError` where the run cannot begin at all.
     """
-    spec, cell = compilation.spec, compilation.cell
-    assert cell is not None
+    spec, cell = compilation.spec, compilation.by_sweeps().cell
     solver = lattice_solver_of(compilation)
     start = start_of(spec, run)
     about = solver.interface
@@ -172,7 +176,7 @@ def lattice_problem(
     flat = FlatLattice(solver.backend, begun.state.shape)
     values = solver.values({**begun.arguments, **settings}, {}, begun.sizes)
     return LatticeProblem(
-        compilation.system, begun.state.reshape(-1), values, step, span, direction, begun.sizes,
+        begun.state.reshape(-1), values, step, span, direction, begun.sizes,
         cell=cell, whole=start.sizes, seer=flat,
     )  # fmt: skip
 

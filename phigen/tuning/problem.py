@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
 from phigen.api import chosen_target, solver_of
 from phigen.compilation import Compilation
+from phigen.errors import PhigenError
 from phigen.geometry.system import System
 from phigen.runtime.backend import Backend
 from phigen.runtime.interface import BackendError, row_steps
 from phigen.runtime.session import rows_along
-from phigen.study import race
+from phigen.study import measures, race
 from phigen.study.conservation import Unit, units
+from phigen.study.methods import Method as Step
 from phigen.symbolic.arrays import Floats, evaluate
 from phigen.tuning.settings import Setting, charts
 
@@ -24,14 +27,13 @@ ROWS = 8_000
 
 
 @dataclass(frozen=True)
-class Problem:
+class Problem(ABC):
     """The problem: the numbers of a run and its time. ``step`` is that of the run, a first guess.
 
     Steps and times are positive here; ``direction`` is −1 for a run back in time. ``sizes`` are those of a lattice. All
     times are those of the ``clock``: of τ where there is a monitor, which all methods have then.
     """
 
-    system: System
     start: Floats
     parameters: Mapping[str, Any]
     step: float
@@ -41,10 +43,14 @@ class Problem:
     clock: str = "t"
 
     @property
+    @abstractmethod
+    def name(self) -> str:
+        """The name of the system."""
+
+    @property
+    @abstractmethod
     def unit(self) -> Unit:
         """The unit of errors of the energy."""
-        (unit,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
-        return unit
 
     @property
     def most_rows(self) -> int:
@@ -52,16 +58,59 @@ class Problem:
         return ROWS
 
     @property
+    @abstractmethod
     def evens_out(self) -> bool:
         """Whether monitors may be tried, which make uneven motion even."""
-        return not self.system.driven
 
     def method(self, solver: Backend) -> Candidate:
         """A solver as a method."""
         return Candidate(solver, self)
 
+    @abstractmethod
     def guesses(self, current: Setting) -> list[Setting]:
         """Settings to begin with."""
+
+    @abstractmethod
+    def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
+        """Classical methods from a ``state`` that may change."""
+
+    @abstractmethod
+    def energies(self, states: Floats) -> Floats:
+        """H of states (rows, DIM)."""
+
+    def casimir_error(self, states: Floats) -> float | None:
+        """Return the largest error of any Casimir along states (rows, DIM); None where it is not measured."""
+        return None
+
+    def defect(self, step: Step, states: Floats, h: float) -> float | None:
+        """Return the largest Poisson defect at states (rows, DIM); None where the derivative is not to be had."""
+        return None
+
+
+@dataclass(frozen=True)
+class SystemProblem(Problem):
+    """The problem of a ``system`` of a few coordinates."""
+
+    system: System = field(kw_only=True)
+
+    @property
+    def name(self) -> str:
+        """The name of the system."""
+        return self.system.name
+
+    @property
+    def unit(self) -> Unit:
+        """The unit of errors of the energy."""
+        (unit,) = units([self.system.hamiltonian], self.system.coordinates, self.parameters, self.start)
+        return unit
+
+    @property
+    def evens_out(self) -> bool:
+        """Whether monitors may be tried: where nothing drives the system."""
+        return not self.system.driven
+
+    def guesses(self, current: Setting) -> list[Setting]:
+        """Settings to begin with: one for each bi-realisation that might apply."""
         return charts(self.system, current)
 
     def classical(self, compilation: Compilation, names: Sequence[str], state: Floats) -> race.Race:
@@ -76,6 +125,28 @@ class Problem:
         values = {**self.parameters, **{c: states[:, i] for i, c in enumerate(self.system.coordinates)}}
         (energies,) = evaluate([self.system.hamiltonian], values)
         return np.broadcast_to(energies, (len(states),))
+
+    def casimir_error(self, states: Floats) -> float | None:
+        """Return the largest error of any Casimir, relative to what its value is the sum of; None without Casimirs."""
+        system, casimirs = self.system, self.system.casimirs
+        if not casimirs:
+            return None
+        columns: Mapping[str, object] = {c: states[:, i] for i, c in enumerate(system.coordinates)}
+        values = evaluate([*casimirs.values()], {**self.parameters, **columns})
+        sizes = units(casimirs.values(), system.coordinates, self.parameters, self.start)
+        errors = [
+            np.max(u.errors(np.broadcast_to(v, len(states)), float(np.ravel(v)[0])))
+            for u, v in zip(sizes, values, strict=True)
+        ]
+        return float(max(errors))
+
+    def defect(self, step: Step, states: Floats, h: float) -> float | None:
+        """Return the largest Poisson defect at states (rows, DIM); None where the derivative is not to be had."""
+        signed = self.direction * h
+        try:
+            return max(measures.poisson_defect(self.system, self.parameters, step, x, signed) for x in states)
+        except PhigenError:
+            return None
 
 
 class Method(Protocol):

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from phigen.compilation import Compilation
 from phigen.geometry.shapes import Affine, Canonical, Constant, LiePoisson
 from phigen.geometry.system import System
-from phigen.lattice.series import SeriesPlan
 from phigen.scheme import choosing
 from phigen.scheme.composition import COMPOSITIONS
 from phigen.spec import limits
@@ -128,28 +127,17 @@ def monitor_of(written: str, spec: Spec) -> str | Expression:
 
 def own_setting(compilation: Compilation) -> Setting:
     """The setting of a spec as it is now, with the kinds that ``auto`` chose."""
-    spec, realisation, order = compilation.spec, compilation.realisation, compilation.order.order
+    spec, order = compilation.spec, compilation.order.order
     gauge = spec.gauge if isinstance(spec.gauge, str) else OWN
-    if isinstance(compilation.sweeps, SeriesPlan):
-        return _of_series(spec, compilation.sweeps, order)
-    if compilation.gauss:
-        return Setting(GAUSS, order, gauge, "none")
-    if realisation is None:
-        return Setting(SPLITTING, order, gauge, spec.composition)
+    if compilation.scheme_name != "series":
+        return Setting(compilation.kind, order, gauge, spec.composition if compilation.is_composed else "none")
     choice = spec.birealisation
     plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
-    composed = len(compilation.program.fractions) > 1
-    return Setting(realisation.kind if plain else OWN, order, gauge, spec.composition if composed else "none")
-
-
-def _of_series(spec: Spec, plan: SeriesPlan, order: int) -> Setting:
-    """The setting of a lattice, whose series has order 2 and is composed for higher orders."""
-    composition = "auto" if spec.composition == "none" else spec.composition
-    if plan.realisation.site is None:
-        return Setting("auto", order, OWN, composition)
-    choice, kind = spec.birealisation, plan.realisation.kind
-    plain = choice == BirealisationChoice(choice.kind, order=choice.order) and choice.kind not in FORMULAS
-    return Setting(kind if plain else OWN, order, OWN, composition)
+    kind = compilation.kind if plain else OWN
+    if spec.lattice:  # its series has order 2 and is composed for higher orders
+        composition = "auto" if spec.composition == "none" else spec.composition
+        return Setting(kind if compilation.birealisation else "auto", order, OWN, composition)
+    return Setting(kind, order, gauge, spec.composition if compilation.is_composed else "none")
 
 
 def charts(system: System, current: Setting) -> list[Setting]:

@@ -237,7 +237,7 @@ def _unreachable(method: Candidate, problem: Problem) -> StepError:
     until, status = method.reach(h, steps_in(problem.horizon, h))
     clock = problem.clock
     return StepError(
-        f"{problem.system.name}: the run cannot be followed to {clock} = {problem.horizon:.6g}: with steps of {h:.3g} "
+        f"{problem.name}: the run cannot be followed to {clock} = {problem.horizon:.6g}: with steps of {h:.3g} "
         f"it ends at {clock} = {until:.6g} ({status})\n  hint: the solution itself may end there; see --horizon",
         step=round(until / h), status=status,
     )  # fmt: skip

@@ -10,7 +10,7 @@ from support import described
 
 from phigen import resources
 from phigen.tuning.building import build
-from phigen.tuning.problem import Candidate, Problem
+from phigen.tuning.problem import Candidate, SystemProblem
 from phigen.tuning.settings import SPLITTING, Setting
 from phigen.tuning.trials import energy_measure
 
@@ -31,7 +31,7 @@ def energy_error(name, kind, order, step, gauge="auto"):
     spec, system, _ = described(name)
     run = next(iter(spec.runs.values()))
     values = spec.parameters_of(run)
-    problem = Problem(system, np.array([float(v) for v in run.initial]), values, float(step), 1e4)
+    problem = SystemProblem(np.array([float(v) for v in run.initial]), values, float(step), 1e4, system=system)
     return energy_measure(problem)(Candidate(made.solver(), problem), float(step), 1e4).measured
 
 

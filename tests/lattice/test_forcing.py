@@ -151,7 +151,6 @@ def test_covectors_and_noise_keep_the_casimirs_of_every_site(name: str) -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_what_is_claimed_is_proved(name: str) -> None:
     made = compiled(name)
-    assert made.cell is not None
     groups = lattices.lattice(made.cell) | lattices.sweeps(made)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
     titles = [s.name for s in groups.get("Noise", ())]

@@ -202,7 +202,6 @@ def test_integrals_along_steps_are_those_of_polynomials() -> None:
 @pytest.mark.parametrize("name", TEXTS)
 def test_parts_flows_and_dated_invariants_are_proved(name: str) -> None:
     made = compiled(name)
-    assert made.cell is not None
     groups = lattices.lattice(made.cell) | lattices.sweeps(made)
     assert [str(s) for group in groups.values() for s in group if s.verdict != PROVED] == []
 

@@ -38,7 +38,7 @@ def test_long_flows_are_written_by_what_they_share(damped_spin):
     """In lines that a reader can take in, which together are the flow: each name by those before it."""
     names = damped_spin.system.coordinates
     listed = flows.formulas(damped_spin, None)
-    for k, flow in enumerate(flows.flows_of(damped_spin), 1):
+    for k, flow in enumerate(damped_spin.splitting.flows, 1):
         lines = [(name.removeprefix(f"Φ_{k}: "), text) for name, text in listed if name.startswith(f"Φ_{k}: ")]
         images = flows.images(flow, names)
         assert max(len(text) for _, text in lines) < 160
@@ -82,7 +82,7 @@ def test_terms_that_are_left_out_are_not_the_leading_ones(most):
     """What is shown of α(x, p) is x at p = 0."""
     compilation = compile_spec(loads(PENCIL))
     names = compilation.system.coordinates
-    maps = {f"α_{c}": e for c, e in zip(names, compilation.chart.alpha, strict=True)}
+    maps = {f"α_{c}": e for c, e in zip(names, compilation.realisation.alpha, strict=True)}
     listed = parts.texts(maps, most)
     assert any("…" in text for _, text in listed)
     known = {name: 0.3 + k for k, name in enumerate((*names, "mu"))} | {f"p_{c}": 0.0 for c in names}

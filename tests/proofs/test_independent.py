@@ -65,7 +65,7 @@ def expect_equal(compilation, terms):
     assert [c.term for c in found if c.term] == [*range(1, terms + 1)]
     others = {c.statement.name.split()[0] for c in found if not c.term}
     assert ("∇S_h" in others) == (compilation.scheme.terms <= terms)
-    assert bool(others & {"α", "axioms"}) != compilation.chart.path
+    assert bool(others & {"α", "axioms"}) != compilation.realisation.path
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_maps_that_do_not_begin_at_the_identity_are_refuted():
 
 def test_exchanged_ends_of_paths_are_refuted():
     compilation = compile_text(BODY + "hamiltonian: x**2 + y**2/2\nbirealisation: exponential\n")
-    chart = compilation.chart
+    chart = compilation.realisation
     wrong = replace(compilation, realisation=replace(chart, alpha=chart.beta, beta=chart.alpha))
     assert [k for k, verdict in verdicts(wrong, 3).items() if verdict == REFUTED] == ["α"]
 

@@ -82,7 +82,7 @@ order: 6
 def test_numbers_for_the_parameters_make_a_formula_that_would_be_too_large():
     compilation = compile_spec(spec.loads(GYROSTAT))
     with pytest.raises(LimitError):
-        corrections(compilation.system, compilation.chart, compilation.order, 2, compilation.gauge)
+        corrections(compilation.system, compilation.realisation, compilation.order, 2, compilation.gauge)
     values, x = {"J1": 1.0, "J2": 2.0, "J3": 3.5, "k": 0.7}, np.array([0.2, 1, 0.1])
     gauge = gauge_at(compilation, x, values)
     method = of_solver(solver_of(compilation, "c"), values, gauge)

@@ -47,7 +47,7 @@ def checked(text, change=None, target="numpy", **options):
     """The checks of gradients by name: whether they are passed. A ``change`` is made to what the back end gives."""
     compilation = compiled(text, adjoint=True, **options)
     run = next(iter(compilation.spec.runs.values()))
-    solver = (lattice_solver_of if compilation.cell else solver_of)(compilation, target)
+    solver = (lattice_solver_of if compilation.spec.lattice else solver_of)(compilation, target)
     if change:
         pullback = solver.backend.pullback
         solver.backend.pullback = lambda *given: change(given, *pullback(*given))
@@ -57,7 +57,7 @@ def checked(text, change=None, target="numpy", **options):
 def checks(compilation, solver, run):
     """The checks of gradients of one solver on a run."""
     h = float(run.step)
-    if compilation.cell:
+    if compilation.spec.lattice:
         subject = lattices._Subject(compilation, {solver.target: solver}, start_of(compilation.spec, run), h)
         made = solver.integrate(subject.start.state, h, 4, parameters=subject.start.arguments)
         return list(lattices._gradients(compilation.cell, subject, made))

@@ -14,7 +14,7 @@ from phigen.cli.tune_summary import print_monitors
 from phigen.compiler import compile_spec
 from phigen.geometry.system import system_from_spec
 from phigen.tuning import monitors, settings
-from phigen.tuning.problem import Problem
+from phigen.tuning.problem import SystemProblem
 from phigen.tuning.settings import Setting, own_setting
 
 KEPLER = """phigen: 1
@@ -91,7 +91,7 @@ def test_only_a_motion_that_is_fast_at_times_asks_for_one(states):
 def test_monitors_take_fewer_steps_for_the_same_error_and_say_how_they_are_written(states):
     spec = specs.loads(KEPLER)
     compilation = compile_spec(spec)
-    problem = Problem(compilation.system, START, {}, 0.01, 13.0)
+    problem = SystemProblem(START, {}, 0.01, 13.0, system=compilation.system)
     wanted = monitors.settings(own_setting(compilation), 2, [])
     wanted.append(Setting(wanted[0].kind, 2, "none", wanted[0].composition, monitor="(q1**2 + q2**2)**(3/4)"))
     found = monitors.compare(spec, compilation.system, wanted, problem, states, 13.0, 1e-3, time.perf_counter() + 60)

@@ -17,7 +17,7 @@ from phigen.realisations.catalogue import realise
 from phigen.targets.header import split
 from phigen.tuning import search
 from phigen.tuning.building import Built, Refusal, build, build_all
-from phigen.tuning.problem import Problem
+from phigen.tuning.problem import SystemProblem
 from phigen.tuning.references import agreed, orbit_error
 from phigen.tuning.search import Curve, cheapest_step, proposals, scan, step_for
 from phigen.tuning.settings import OWN, SPLITTING, Setting, charts, own_setting, variants
@@ -247,7 +247,7 @@ class Drifting:
 def oscillator(horizon):
     system = compiled("harmonic_oscillator", 2).system
     values = {p.name: 1.0 for p in system.parameters}
-    return Problem(system, np.array([1.0, 0.0]), values, 0.1, horizon)
+    return SystemProblem(np.array([1.0, 0.0]), values, 0.1, horizon, system=system)
 
 
 def test_bounded_energy_error_is_that_of_the_horizon_and_drift_is_extrapolated():
