@@ -57,10 +57,11 @@ format: $(STAMP)
 golden: $(STAMP)
 	$(BIN)/python tests/golden.py
 
-# The figures and numbers of docs/gallery.md and docs/paper.md. About two minutes.
+# The figures and numbers of the README, docs/gallery.md and docs/paper.md. About two minutes.
 figures: $(STAMP)
 	$(BIN)/python docs/make_gallery.py
 	$(BIN)/python docs/make_paper.py
+	$(BIN)/python docs/make_overview.py
 
 # The site of the documentation, in build/site.
 docs: export NO_MKDOCS_2_WARNING := 1

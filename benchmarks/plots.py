@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.measure import Result, Study
-from phigen.drawing.palette import SERIES, save, styled
+from phigen.drawing.palette import SERIES, save_for_pages, styled
 
 #: Peers that are drawn, with line styles; the rest is in the tables. phigen's methods are drawn as full lines.
 PEERS = {
@@ -65,7 +65,7 @@ def draw(studies: Sequence[Study], folder: Path) -> dict[str, str]:
     for study in studies:
         if any(r.orbit == r.orbit for r in study.scans):
             name = f"benchmark_{study.problem}.svg"
-            save(work_figure(study), folder / name)
+            save_for_pages(work_figure(study), folder / name)
             title = f"{study.title}: error of energy and orbit against time, T = {study.horizon:g}"
             shown[study.problem] = f"![{title}](figures/{name})\n"
     return shown

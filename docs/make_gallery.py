@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
 import sys
@@ -18,6 +19,7 @@ from phigen.cli.show import readable_one
 from phigen.drawing import figures
 from phigen.drawing.groups import groups
 from phigen.drawing.lattices import lattice_figure
+from phigen.drawing.palette import save_for_pages
 from phigen.drawing.phase_space import joins
 from phigen.lattice.observing import errors_of
 from phigen.lattice.states import start_of as start_of_lattice
@@ -41,25 +43,29 @@ DRAWN, CROSSINGS = 1500, 1500
 SHORTEST = 100
 #: Times of a diagram of a lattice, and of its errors.
 SMALL, FRAMES = 80, 200
+#: The width of the small pictures in pixels: four beside each other on a page of GitHub.
+THUMBNAIL = 190
 #: The longest formula that is shown.
 LONGEST = 160
 HEAD = """# Gallery
 
-The bundled specs, one run of each: the longest. The figures show how it begins, a dot where it starts, and the leaf
-if there is a Casimir of three coordinates. The tables have the largest errors over the whole run, relative to the
-value at the start unless that is nearly 0, of phigen's solver and of the classical method that the spec names, with
-the same step. `cp "$(phigen list --path kepler)" .` takes a spec as a start for your own; `phigen show` prints its
-formulas. How errors grow or do not grow is on the page that `phigen report` makes of any spec. There, and here where
-`make docs` has made the site, the system runs in the browser, beside RK4.
+The bundled systems; each picture leads to its system. `phigen run NAME` integrates one, `phigen show NAME` prints its
+formulas, and `cp "$(phigen list --path NAME)" .` copies its spec as a start for your own.
+"""
+SYSTEMS = """
+## Systems
 
-This page is made by `python docs/make_gallery.py`.
+One run of each, the longest of its spec. A dot marks where it starts; the surface is that on which the first Casimir
+is constant, where there is one of three coordinates. The tables have the largest errors over the whole run, of phigen
+and of the classical method that the spec names, with the same step. Errors are relative to the value at the start
+unless that is nearly 0.
 """
 LATTICES = """
 
 ## Lattices
 
-Systems of many like sites, of any size ([lattices.md](lattices.md)): one run of each, its fields over space and time,
-or at some times, and what it conserved. Errors of energy and invariants are relative to the value
+Systems of many identical sites, of any size ([lattices.md](lattices.md)): one run of each, its fields over space and
+time, or at some times, and what it conserved. Errors of energy and invariants are relative to the value
 at the start or, where that is nearly 0, to the magnitudes of its terms at all sites; those of Casimirs at sites are
 at the worst site.
 """
@@ -148,9 +154,9 @@ def draw(name: str) -> None:
     trajectory = solver.integrate(run.initial, float(run.step), steps, **about)
     while len(trajectory) > SHORTEST and not _is_curve(trajectory):
         trajectory = solver.integrate(run.initial, float(run.step), trajectory.steps // 2, **about)
-    figures.save(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
+    save_for_pages(figures.trajectory_figure(trajectory, casimirs), FIGURES / f"{name}.svg")
     if sections := _sections(found, solver):
-        figures.save(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")
+        save_for_pages(figures.section_figure(sections, solver.coordinates), FIGURES / f"{name}_section.svg")
 
 
 def _is_curve(trajectory: Trajectory) -> bool:
@@ -183,7 +189,7 @@ def lattice_facts(name: str) -> dict[str, Any]:
     thin = max(1, len(made) // FRAMES)
     few = replace(made, t=made.t[::thin], x=made.x[::thin], energy=made.energy[::thin])
     drawn = lattice_figure(few, {quantity: e[::thin] for quantity, e in errors.items()}, "", dots=SMALL)
-    figures.save(drawn, FIGURES / f"{name}.svg")
+    save_for_pages(drawn, FIGURES / f"{name}.svg")
     return {
         "sha256": found.source_sha256,
         "structure": described(compilation.cell),
@@ -206,10 +212,25 @@ def page(known: dict[str, dict[str, Any]]) -> str:
     return "\n".join([_systems(known), more, *entries])
 
 
+def thumbnail(name: str) -> str:
+    """The figure of a system in small, as a link to its entry."""
+    title = html.escape(source(name).title)
+    image = f'<img src="figures/gallery/{name}.svg" width="{THUMBNAIL}" alt="{title}" title="{title}">'
+    return f'<a href="#{name}">{image}</a>'
+
+
 def _systems(known: dict[str, dict[str, Any]]) -> str:
     rows = [f"| [{name}](#{name}) | {len(source(name).coordinates)} | {source(name).title} |" for name in names()]
     contents = "\n".join(["| spec | dimension | system |", "|---|---|---|", *rows])
-    return "\n".join([HEAD, contents, *(_entry(source(name), known[name]) for name in names())])
+    return "\n".join(
+        [
+            HEAD,
+            *map(thumbnail, [*names(), *lattices()]),
+            SYSTEMS,
+            contents,
+            *(_entry(source(name), known[name]) for name in names()),
+        ]
+    )
 
 
 def _lattice_entry(found: Spec, fact: dict[str, Any]) -> str:

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 
 from phigen.cli.reproduce import described, lines_of
-from phigen.drawing.palette import save
+from phigen.drawing.palette import save_for_pages
 from phigen.paper.plates import PLATES
 
 DOCS = Path(__file__).resolve().parent
@@ -32,7 +32,7 @@ def main(chosen: list[str]) -> None:
     for name in chosen or PLATES:
         print(name, file=sys.stderr)
         plate = PLATES[name]()
-        save(plate.figure, FIGURES / f"{name}.svg")
+        save_for_pages(plate.figure, FIGURES / f"{name}.svg")
         known |= {entry["figure"]: entry for entry in described({name: plate})}
     entries = [known[name] for name in PLATES]
     # Later digits differ from compiler to compiler.

@@ -6,10 +6,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
-from walkthrough import typed
+from walkthrough import labels_of, typed
 
 from phigen import resources
+from phigen.drawing.palette import DARK, PALETTE, svg
 
 ROOT = resources.bundled_specs().parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -111,3 +113,37 @@ def test_commands_and_exit_codes_are_documented():
     assert all(f"`phigen {command}" in text for command in COMMANDS)
     codes = {e.exit_code for e in vars(errors).values() if isinstance(e, type) and issubclass(e, errors.PhigenError)}
     assert all(f"| {code} |" in text for code in codes)
+
+
+OVERVIEW = ROOT / "docs" / "figures" / "overview.svg"
+
+
+@pytest.mark.slow
+def test_first_figure_is_that_of_the_readme_and_shows_what_it_says():
+    pytest.importorskip("matplotlib")
+    sys.path.insert(0, str(ROOT / "docs"))
+    try:
+        import make_overview as overview
+    finally:
+        sys.path.pop(0)
+    compilation = overview.compilation_of_readme()
+    runs = overview.courses(compilation, 1e6)
+    errors = {
+        label: [np.abs(values / values[0] - 1).max() for values in (whole.energy, whole.casimirs["C"])]
+        for label, (whole, _) in runs.items()
+    }
+    assert errors[overview.PHIGEN][0] < 1e-7
+    assert errors[overview.PHIGEN][1] < 1e-13
+    assert min(errors[overview.RK4]) > 1e-3
+    drawn, committed = svg(overview.figure(runs, compilation)), OVERVIEW.read_text(encoding="utf-8")
+    assert [label for label in labels_of(drawn) if "10" not in label] == [
+        label for label in labels_of(committed) if "10" not in label
+    ]
+
+
+def test_figures_of_pages_are_dark_on_dark_pages():
+    for path in (ROOT / "docs" / "figures").rglob("*.svg"):
+        text = path.read_text(encoding="utf-8")
+        assert "@media (prefers-color-scheme: dark)" in text, path
+        body = text.split("</style>", 1)[1]
+        assert [colour for role, colour in PALETTE.items() if role in DARK and colour in body] == [], path

@@ -35,6 +35,8 @@ PALETTE: Mapping[str, str] = {
     "series-5": "#a6761d",
     "series-6": "#7a7a7a",
 }
+#: The colours of these roles on a dark page; all others are seen on both.
+DARK: Mapping[str, str] = {"paper": "#0d1117", "ink": "#e6edf3", "muted": "#9198a1", "grid": "#30363d"}
 SERIES = tuple(colour for role, colour in PALETTE.items() if role.startswith("series"))
 
 #: The command that installs what the extra ``plot`` names: true in a checkout and of any release.
@@ -122,6 +124,27 @@ def save(figure: Figure, path: str | Path) -> None:
     if suffix not in SUFFIXES:
         raise ValueError(f"cannot draw {str(path)!r}: the suffix must be one of {', '.join(SUFFIXES)}")
     write(Path(path), _rendered(figure, suffix[1:]))
+
+
+@styled
+def save_for_pages(figure: Figure, path: Path) -> None:
+    """Write an SVG file for a page in a browser: dark where the reader prefers dark pages."""
+    write(path, in_both_themes(_rendered(figure, "svg").decode("utf-8")))
+
+
+def in_both_themes(svg_text: str) -> str:
+    """Replace the colours of an SVG file that depend on the theme by variables.
+
+    Browsers choose their values by the reader's preference. Other programs know no variables: files for them keep
+    the colours.
+    """
+    for role in DARK:
+        svg_text = svg_text.replace(PALETTE[role], f"var(--{role})")
+    light, dark = (
+        ":root{" + "; ".join(f"--{role}: {colours[role]}" for role in DARK) + "}" for colours in (PALETTE, DARK)
+    )
+    style = f"{light} @media (prefers-color-scheme: dark){{{dark}}}"
+    return svg_text.replace('<style type="text/css">', f'<style type="text/css">{style} ', 1)
 
 
 @styled
