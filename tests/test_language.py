@@ -17,6 +17,7 @@ CLEAN = (
     "fmu",
     "geometry",
     "ir",
+    "lanes",
     "lattice",
     "notation",
     "paper",

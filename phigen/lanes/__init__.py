@@ -1,1 +1,1 @@
-"""The lowering to lanes: what of a program is computed at several points at once, for targets that do so."""
+"""The lowering to lanes: the parts of a program that are evaluated at several points at once."""

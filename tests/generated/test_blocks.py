@@ -21,7 +21,7 @@ from support import (
 )  # fmt: skip
 
 from phigen.compiler import compile_spec, emit
-from phigen.lanes.lowering import Blocks, in_lanes
+from phigen.lanes.in_lanes import Blocks, in_lanes
 
 #: Where 300 steps multiply round-off. Elsewhere blocks and single steps agree to two units of the last place for each
 #: stage: with uncompensated sums they would be ten apart.

@@ -15,7 +15,7 @@ from support import precisely
 import phigen
 from phigen import SpecError, StepError
 from phigen.compiler import compile_spec
-from phigen.lanes.lowering import in_lanes
+from phigen.lanes.in_lanes import in_lanes
 from phigen.resources import bundled
 from phigen.runtime import c_lattice
 from phigen.scheme.sweep_inverse import can_be_undone, transposes
@@ -369,7 +369,7 @@ def test_fields_before_sweeps_are_found_again():
 def test_derivatives_that_transposes_call_have_the_short_way_of_their_functions():
     spec = phigen.spec.load(bundled()["ablowitz_ladik"])
     rows = in_lanes(compile_spec(spec, adjoint=True, profile="fast").program)
-    assert {"sinroot", "sinroot1"} <= {*rows.near} == {*rows.limited}
+    assert {"sinroot", "sinroot1"} <= {*rows.small_argument} == {*rows.limited}
 
 
 def test_functions_of_what_sweeps_keep_are_called_once_on_the_way_back():

@@ -9,7 +9,7 @@ from precise_path import by_paths, compile_paths
 from support import BODY, COMMAND, RawC, compiled
 
 from phigen.compiler import emit
-from phigen.lanes.lowering import Blocks, in_lanes
+from phigen.lanes.in_lanes import Blocks, in_lanes
 from phigen.scheme.assemble import MOST_IN_LANES
 
 POLE = "coordinates: [x, y]\npoisson: {brackets: {x: {y: x**2}}}\nhamiltonian: y + x*y/9\n"

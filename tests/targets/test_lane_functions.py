@@ -3,7 +3,7 @@
 import pytest
 from support import run, slow_but, tool, write
 
-from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS, with_formulas
+from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS, with_formulas
 from phigen.symbolic.special import SPECIAL
 from phigen.targets.c.amalgamation import Amalgam
 

@@ -10,7 +10,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
+from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Rows, Traces, in_lanes
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.path import Recurrences
 from phigen.scheme.policies import PredictorPolicy
@@ -305,7 +305,7 @@ def _packs_back(lanes: Lanes | None, has: Mapping[str, bool]) -> int:
     """How many members, in packs of lanes, are pulled back together; 0 where each is by itself."""
     if not has["ABREAST"]:
         return 0
-    return lanes.abreast if isinstance(lanes, Packs) else 1
+    return lanes.reverse_packs if isinstance(lanes, Packs) else 1
 
 
 def _model(program: Program, lanes: Lanes | None, has: Mapping[str, bool], others: Iterable[str]) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from phigen.lanes.lowering import Blocks, Lanes, Packs, Stages, Traces
+from phigen.lanes.in_lanes import Blocks, Lanes, Packs, Stages, Traces
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss, Implicit, Newton, Path, Splitting, Sweeps
 from phigen.targets import features
@@ -45,11 +45,11 @@ def _in_lanes(lanes: Lanes | None) -> Iterator[Feature]:
     yield Feature("NARROW", lambda p: isinstance(lanes, Stages | Traces) and lanes.narrow)
     yield Feature("ALONG", lambda p: isinstance(p.step, Path) and p.step.back and p.step.back.used, ("TRACED",))
     yield Feature("PACKS", lambda p: packs, ("ENSEMBLE",), "lanes")
-    yield Feature("FAR", lambda p: packs and packs.near, ("PACKS",))
+    yield Feature("FAR", lambda p: packs and packs.small_argument, ("PACKS",))
     yield Feature("GROUPS", lambda p: not p.time and grouped(p, lanes), ("BLOCKS", "ENSEMBLE"))
     together = "PACKS" if packs else "GROUPS"
-    yield Feature("ABREAST", lambda p: packs.back if packs else True, (together, "ADJOINT", "EACH"))
-    yield Feature("UNDONE", lambda p: packs and packs.undone, ("ABREAST",))
+    yield Feature("ABREAST", lambda p: packs.transposes if packs else True, (together, "ADJOINT", "EACH"))
+    yield Feature("UNDONE", lambda p: packs and packs.recomputed, ("ABREAST",))
     yield Feature("SPARSE", lambda p: blocks and blocks.factors, ("BLOCKS",))
     full = blocks and blocks.factors is None  # whether Newton matrices are inverted, not kept as factors
     yield Feature("SWEPT", lambda p: full, ("BLOCKS", "COMPOSED"))

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass
 from fractions import Fraction
 
-from phigen.lanes.functions import NEAR_FUNCTIONS
+from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
@@ -32,7 +32,7 @@ from phigen.targets.rendering import render
 from phigen.targets.special import entire_used
 
 #: The functions of the library that have a version here, under whose name flows call them.
-FLOW_FUNCTIONS = tuple(f for f in NEAR_FUNCTIONS if f not in ENTIRE and f != ANOMALY)
+FLOW_FUNCTIONS = tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f not in ENTIRE and f != ANOMALY)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from phigen.lanes.lowering import Lanes, Stages
+from phigen.lanes.in_lanes import Lanes, Stages
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Gauss

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from phigen.lanes.functions import LANE_FORMULAS, LANE_FUNCTIONS
+from phigen.lanes.lane_functions import LANE_FORMULAS, LANE_FUNCTIONS
 from phigen.scheme.kernel import EXPONENTS, SCALARS, Kernel
 from phigen.scheme.lowering import Assignment
 from phigen.scheme.program import Program

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import accumulate
 from math import prod
 
-from phigen.lanes.functions import NEAR_FUNCTIONS, operations
-from phigen.lanes.lowering import LANES, Blocks, Lanes, Packs, Stages, Traces
+from phigen.lanes.in_lanes import LANES, Blocks, Lanes, Packs, Stages, Traces
+from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS, operations
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Splitting
 from phigen.targets.c import functions, splitting
@@ -75,20 +75,22 @@ def printed_back(program: Program, packs: Packs) -> str:
     """The transposes of the flows of packs."""
     assert isinstance(program.step, Splitting)
     return "\n".join(
-        splitting.adjoint_in_lanes(program, program.step, packs.back, _short(program), lane_calls(program))
+        splitting.adjoint_in_lanes(program, program.step, packs.transposes, _short(program), lane_calls(program))
     )
 
 
 def _short(program: Program) -> dict[str, str]:
     """What loops over lanes call where arguments are small."""
-    return {**lane_calls(program), **{f: f"{program.name}_{f}_near" for f in NEAR_FUNCTIONS}}
+    return {**lane_calls(program), **{f: f"{program.name}_{f}_near" for f in SMALL_ARGUMENT_FUNCTIONS}}
 
 
 def _packs(program: Program, packs: Packs) -> list[str]:
     if not isinstance(program.step, Splitting):
         found = [function(program, kernel, lanes=True, alike=["coef"]) for kernel in packs.kernels]
-        return found + [function(program, kernel, lanes=True) for kernel in packs.back]
-    called = operations([*packs.kernels, *packs.back])
-    found = functions.near(program, [f for f in NEAR_FUNCTIONS if f in called])
+        return found + [function(program, kernel, lanes=True) for kernel in packs.transposes]
+    called = operations([*packs.kernels, *packs.transposes])
+    found = functions.near(program, [f for f in SMALL_ARGUMENT_FUNCTIONS if f in called])
     found += splitting.in_lanes(program, program.step, "", _short(program))
-    return found + (splitting.in_lanes(program, program.step, "_far", lane_calls(program)) if packs.near else [])
+    return found + (
+        splitting.in_lanes(program, program.step, "_far", lane_calls(program)) if packs.small_argument else []
+    )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 
-from phigen.lanes.functions import NEAR_FUNCTIONS, operations
+from phigen.lanes.lane_functions import SMALL_ARGUMENT_FUNCTIONS, operations
 from phigen.scheme.kernel import Kernel, Output
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Adjoint, Splitting
@@ -109,7 +109,7 @@ def _linked(text: str, linkage: str) -> str:
 
 def reaches_far(kernel: Kernel) -> bool:
     """Whether there is another way in lanes to compute a kernel where arguments are large."""
-    return not operations([kernel]).isdisjoint(NEAR_FUNCTIONS)
+    return not operations([kernel]).isdisjoint(SMALL_ARGUMENT_FUNCTIONS)
 
 
 def _transposed(program: Program, step: Splitting, back: Sequence[Kernel]) -> tuple[list[Kernel], dict[str, object]]:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 from phigen.ir.passes.row_transposes import Handed
-from phigen.lanes.lowering import Rows
+from phigen.lanes.in_lanes import Rows
 from phigen.scheme.kernel import Kernel
 from phigen.scheme.program import Program
 from phigen.scheme.steps import BACK, Adjoint, Ends, Gather, Sweep, Sweeps

@@ -11,7 +11,7 @@ from phigen.ir.passes import row_loops
 from phigen.ir.passes.by_rows import ROW
 from phigen.ir.passes.simultaneous import simultaneous
 from phigen.ir.passes.temporaries import temporaries
-from phigen.lanes.functions import REACHING
+from phigen.lanes.lane_functions import FULL_RANGE_FUNCTIONS
 from phigen.scheme.kernel import Kernel, Output, Role
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep
@@ -106,7 +106,7 @@ def in_loops(program: Program) -> dict[str, str]:
 def far_calls(program: Program) -> dict[str, str]:
     """What flows and stages call where arguments may be very large: libm where versions for lanes have no value."""
     lanes = lane_calls(program)
-    return _called(program, {**FUNCTIONS, **{f: lanes[f] for f in REACHING if f in lanes}})
+    return _called(program, {**FUNCTIONS, **{f: lanes[f] for f in FULL_RANGE_FUNCTIONS if f in lanes}})
 
 
 def seen_calls(program: Program) -> dict[str, str]:

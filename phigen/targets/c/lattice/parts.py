@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from phigen.ir.lattice_loops import bounds
-from phigen.lanes.lowering import Rows
+from phigen.lanes.in_lanes import Rows
 from phigen.scheme.kernel import Kernel, Role
 from phigen.scheme.program import Program
 from phigen.scheme.steps import Sweep, Sweeps
@@ -38,9 +38,9 @@ def sweeps(program: Program, step: Sweeps, rows: Rows) -> str:
     layout = layout_of(program, step)
     found = [
         *functions.called(program, [step.equation.slope] if step.equation and not layout.slopes else ()),
-        *functions.phi_lanes(program, set(rows.near)),
+        *functions.phi_lanes(program, set(rows.small_argument)),
     ]
-    found += functions.near_rows(program, [f for f in rows.near if f not in SPECIAL])
+    found += functions.near_rows(program, [f for f in rows.small_argument if f not in SPECIAL])
     if step.parts:
         found += _parts(program, layout, rows, step.parts)
         found += _parts(program, layout, None, step.tangents) if program.extras.tangent else []
@@ -80,7 +80,7 @@ def call_forms(program: Program, rows: Rows | None, kernels: Sequence[Kernel]) -
     calls = in_loops(program)
     if rows is None or not any(rows.calls_limited(kernel) for kernel in kernels):
         return {"": calls}
-    lanes = {f: f"{program.name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.near}
+    lanes = {f: f"{program.name}_{f}_{'lane' if f in SPECIAL else 'near'}" for f in rows.small_argument}
     return {"_near": {**calls, **lanes}, "_far": far_calls(program)}
 
 

@@ -1,4 +1,4 @@
-"""Paths in lanes: the kernels at one point, and the room that expansions take."""
+"""Paths in lanes: the kernels at one point, and the stack that expansions need."""
 
 from __future__ import annotations
 
@@ -10,40 +10,40 @@ from phigen.scheme.steps import Path, PathAdjoint, PathLanes
 from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.symbols import FIXED, SERIES, Symbol, momentum
 
-#: Most terms of the expansion of a path from its middle, as in the runtime.
-TERMS = 16
+#: Largest number of terms in the expansion of a path about its middle; the runtime has the same number.
+MAX_TERMS = 16
 
-#: Most terms of the expansion of its derivatives, fewer where the stack is too small. Transposed steps need them all.
+#: Numbers of terms to try in the expansion of its derivatives: the first that fits on the stack is taken.
 SLOPE_TERMS = (12, 8)
-SLOPE_TERMS_BACK = (TERMS, 12, 8)
+SLOPE_TERMS_BACK = (MAX_TERMS, 12, 8)
 
 
 def stack(step: Path, slopes: PathSlopes, dimension: int, slope_terms: int) -> tuple[int, int]:
-    """Values in each lane on the stack: of a model, beside those of any step, and of an expansion."""
+    """Return the values in each lane on the stack: of a model, beyond those of any step, and of an expansion."""
     n, path, used = (
         dimension,
         step.recurrences,
         len(step.back.used) if step.back else 0,
     )
-    series = len(path.series) * (TERMS + 3) + len(slopes.series) * (slope_terms + 2)
+    series = len(path.series) * (MAX_TERMS + 3) + len(slopes.series) * (slope_terms + 2)
     fixed = len(path.fixed) + len(slopes.fixed)
     return n + 2 * n * n, series + fixed + n * (2 * n + used) * (slope_terms + 4) + 2 * n * n + 8 * n
 
 
 def kernels(step: Path, lanes: PathLanes, coordinates: Sequence[str]) -> list[Kernel]:
-    """The kernels of blocks at one point."""
+    """Return the kernels of blocks at one point."""
     momentum = Kernel("momentum", "p = grad S_h(y)", lanes.curvature.inputs, lanes.curvature.outputs[:1])
     curvature, *further = traced(step, lanes.slopes, lanes.curvature, coordinates)
     return [curvature, momentum, *further, lanes.along_mean, lanes.invert]
 
 
 def back(path: PathAdjoint) -> list[Kernel]:
-    """What transposed steps need besides, at one point."""
+    """Return the further kernels of transposed steps, at one point."""
     return [path.slope]
 
 
 def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Sequence[str]) -> list[Kernel]:
-    """The kernels of expansions at one point: p = ∇S_h with its derivative, and first coefficients of all series."""
+    """Return the kernels of expansions at one point: p = ∇S_h with its derivative, first coefficients of all series."""
     path = step.recurrences
     coef, covector = curvature.inputs["coef"], tuple(momentum(c) for c in coordinates)
     values = _resolved(path.series, path.fixed, {})
@@ -72,7 +72,7 @@ def traced(step: Path, slopes: PathSlopes, curvature: Kernel, coordinates: Seque
 
 
 def _symbols(kind: str, values: Sequence[object]) -> tuple[Symbol, ...]:
-    """A symbol for each of the values."""
+    """Return a symbol for each of the values."""
     return tuple(Symbol(kind, i) for i in range(len(values)))
 
 
@@ -83,11 +83,11 @@ def _resolved(
     first: int = 0,
     first_fixed: int = 0,
 ) -> tuple[tuple[Expression, ...], tuple[Expression, ...]]:
-    """The first coefficients as expressions in what is known, with no symbols for one another."""
-    found = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
+    """Return the first coefficients as expressions in known symbols, without symbols for one another."""
+    values_by_symbol = dict(known) | {Symbol(FIXED, first_fixed + i): e for i, e in enumerate(fixed)}
     values = []
     for i, q in enumerate(series):
-        (value,) = substitute([q.first], found)
-        found[Symbol(SERIES, first + i)] = value
+        (value,) = substitute([q.first], values_by_symbol)
+        values_by_symbol[Symbol(SERIES, first + i)] = value
         values.append(value)
     return tuple(values), tuple(fixed)

@@ -3,7 +3,7 @@
 import pytest
 from support import BODY, compile_text, compiled
 
-from phigen.lanes.lowering import LANES, MOST_STACK, Blocks, Packs, in_lanes
+from phigen.lanes.in_lanes import LANES, MAX_STACK_BYTES, Blocks, Packs, in_lanes
 
 PAIR = "coordinates: [q, p]\npoisson: {canonical: {q: [q], p: [p]}}\n"
 EULER = f"{PAIR}birealisation: {{kind: canonical-euler, side: q}}\norder: 1\n"
@@ -57,14 +57,14 @@ def test_sparse_matrices_keep_their_factors():
 )
 def test_members_with_explicit_steps_are_packed_if_every_function_has_a_version_for_lanes(text, near):
     found = lowered(text)
-    assert found is None if near is None else isinstance(found, Packs) and found.near == near
+    assert found is None if near is None else isinstance(found, Packs) and found.small_argument == near
 
 
 def test_flows_take_polynomials_near_zero():
     found = in_lanes(compiled("toda3", 4, "splitting").program)
     assert isinstance(found, Packs)
     assert len(found.kernels) == len(compiled("toda3", 4, "splitting").program.step.flows)
-    assert found.near
+    assert found.small_argument
 
 
 @pytest.mark.parametrize(("dimension", "able"), [(3, True), (40, False)])
@@ -76,4 +76,4 @@ def test_what_needs_too_much_room_is_not_computed_in_lanes(dimension, able):
     assert isinstance(found, Blocks) is able
     if able:
         assert found.grouped(0)
-        assert not found.grouped(MOST_STACK // (8 * LANES))
+        assert not found.grouped(MAX_STACK_BYTES // (8 * LANES))

@@ -11,8 +11,8 @@ from support import compile_text
 
 from phigen import spec
 from phigen.compiler import compile_spec
-from phigen.lanes.lowering import in_lanes
-from phigen.lanes.undoing import undoing
+from phigen.lanes.in_lanes import in_lanes
+from phigen.lanes.inverse_flows import recomputing_transposes
 from phigen.scheme.lowering import operation_counts, with_numbers_shared
 from phigen.symbolic.expression import ZERO, number, symbol, topological
 from phigen.symbolic.functions import FUNCTIONS
@@ -40,7 +40,7 @@ def test_transposes_at_the_end_of_a_flow_are_those_at_its_start_which_they_find(
     """The coefficients are those of some time; cotangents are any."""
     program, rng = made(name), np.random.default_rng(5)
     step, n = program.step, program.dimension
-    found = undoing(program, step)
+    found = recomputing_transposes(program, step)
     values = {**{p.name: p.value for p in program.parameters}, **dict.fromkeys(step.prepare.inputs["h"], 0.3)}
     values |= dict.fromkeys(step.prepare.inputs.get("kick", ()), 0.01)
     coef = {coefficient(k): value for k, value in enumerate(evaluate(step.prepare.roots, values))}
@@ -63,7 +63,9 @@ def test_flows_are_undone_with_the_functions_that_their_transposes_call(name):
         return {e for e in topological(kernel.roots) if e.op in FUNCTIONS}
 
     step = made(name).step
-    for flow, back, undone in zip(step.flows, step.adjoint.steps, undoing(made(name), step), strict=True):
+    for flow, back, undone in zip(
+        step.flows, step.adjoint.steps, recomputing_transposes(made(name), step), strict=True
+    ):
         assert Counter(e.op for e in calls(undone)) <= Counter(e.op for e in calls(flow) | calls(back))
 
 
@@ -84,6 +86,6 @@ def test_products_with_one_number_share_it():
 
 def test_flows_that_damp_are_not_undone():
     program = compile_text(TOP).program
-    assert len(undoing(program, program.step)) == 2
+    assert len(recomputing_transposes(program, program.step)) == 2
     program = compile_text(f"{TOP}damping: 1/9\n").program
-    assert undoing(program, program.step) == ()
+    assert recomputing_transposes(program, program.step) == ()

@@ -1,0 +1,356 @@
+"""The parts of a program that are computed in lanes: blocks of implicit steps, or packs of members.
+
+A lane is one of `LANES` points at which kernels are evaluated at once. An integration with implicit steps solves a
+block of `LANES` steps together, an ensemble groups of members. Members with explicit steps form packs of `LANES`.
+This stage decides whether lanes are possible and fit on the stack, and which kernels they need; targets print them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from phigen.lanes import path_kernels
+from phigen.lanes.inverse_flows import recomputing_transposes
+from phigen.lanes.lane_functions import (
+    FULL_RANGE_FUNCTIONS,
+    LANE_FORMULAS,
+    LANE_FUNCTIONS,
+    SMALL_ARGUMENT_FUNCTIONS,
+    library_calls,
+    library_powers,
+    operations,
+    with_formulas,
+)
+from phigen.scheme.kernel import Kernel
+from phigen.scheme.path import PathSlopes
+from phigen.scheme.program import Program
+from phigen.scheme.steps import Explicit, Factorisation, Gauss, Implicit, Newton, Path, PathLanes, Splitting, Sweeps
+from phigen.symbolic.expression import topological
+from phigen.symbolic.special import SPECIAL
+
+#: Points at which a kernel for lanes is evaluated at once: the doubles in one vector of AVX-512.
+LANES = 8
+
+#: Largest working arrays of a block, or of a group of members: macOS gives threads stacks of 512 KiB.
+MAX_STACK_BYTES = 256 * 1024
+
+#: Largest number of packs in a group; the runtime has the same number.
+PACKS_PER_GROUP = 4
+
+_DOUBLE = 8
+
+
+@dataclass(frozen=True)
+class LaneKernel:
+    """A kernel in lanes: inputs that are ``shared`` have one value for all lanes.
+
+    A ``single`` kernel is evaluated at one lane, and its outputs are numbers. A ``sparse`` kernel does not store
+    entries that are always zero.
+    """
+
+    kernel: Kernel
+    shared: tuple[str, ...] = ()
+    single: bool = False
+    sparse: bool = False
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Implicit steps in lanes.
+
+    ``calls`` are the functions that the kernels call; the loops are ``vectorised`` if no library function is among
+    them. ``factors`` are those of the Newton matrix, stored in place of its inverse where the matrix is sparse.
+    ``path`` has the derivatives of paths, with at most ``slope_terms`` terms. ``room`` is the number of values in
+    each lane that a group of members needs, without those of its predictors.
+    """
+
+    kernels: tuple[LaneKernel, ...]
+    calls: frozenset[str]
+    vectorised: bool
+    room: int
+    factors: Factorisation | None = None
+    path: PathSlopes | None = None
+    slope_terms: int = 0
+
+    def grouped(self, stored: int) -> bool:
+        """Whether members are integrated in groups; the predictor of a member has this number of ``stored`` values."""
+        return _DOUBLE * LANES * (self.room + stored) <= MAX_STACK_BYTES
+
+
+@dataclass(frozen=True)
+class Packs:
+    """Members with explicit steps, one in each lane.
+
+    ``kernels`` are those of a step, or of the flows of a splitting. ``small_argument`` are the functions with a
+    small-argument form, a polynomial; beyond its range the full-range form is called. ``transposes`` are those of the
+    kernels, if cotangents are pulled back in packs too, ``reverse_packs`` of them together. Where states are
+    ``recomputed``, the transposes compute the state before a flow by the inverse flow.
+    """
+
+    kernels: tuple[Kernel, ...]
+    calls: frozenset[str]
+    small_argument: tuple[str, ...]
+    transposes: tuple[Kernel, ...] = ()
+    reverse_packs: int = 0
+    recomputed: bool = False
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Sites of a lattice, side by side in rows; ``small_argument`` as in `Packs`.
+
+    ``limited`` are functions of flows and stages that have no value where arguments are very large: functions with a
+    small-argument form, and functions with a vector version.
+    """
+
+    calls: frozenset[str]
+    small_argument: tuple[str, ...]
+    limited: frozenset[str]
+
+    def calls_limited(self, kernel: Kernel) -> bool:
+        """Whether a kernel calls a limited function."""
+        return not operations([kernel]).isdisjoint(self.limited)
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Paths in lanes in the reverse pass of an integration that makes one step at a time; see `Blocks`.
+
+    If all lanes would need too much of the stack, there are half as many (``narrow``).
+    """
+
+    kernels: tuple[LaneKernel, ...]
+    calls: frozenset[str]
+    path: PathSlopes
+    slope_terms: int
+    narrow: bool
+
+
+@dataclass(frozen=True)
+class Stages:
+    """The stages of a Gauss method, one in each lane; ``narrow`` where half of the lanes suffice."""
+
+    kernels: tuple[LaneKernel, ...]
+    calls: frozenset[str]
+    narrow: bool
+
+    @property
+    def lanes(self) -> int:
+        """The number of lanes."""
+        return LANES // 2 if self.narrow else LANES
+
+
+Lanes = Blocks | Packs | Rows | Stages | Traces
+
+
+def in_lanes(program: Program) -> Lanes | None:
+    """Return the parts of a program that are computed in lanes.
+
+    None where the spec excludes lanes, the program has no such parts, or they would need too much of the stack.
+    """
+    if isinstance(program.step, Sweeps):
+        return _rows(program, program.step)
+    if not program.lanes:
+        return None
+    lanes = _of_steps(program) if program.offers("lanes") else None
+    if lanes or program.single or not isinstance(program.step, Path):
+        return lanes  # lanes hold numbers of 64 bits
+    return _traces(program, program.step)
+
+
+def _of_steps(program: Program) -> Blocks | Packs | Stages | None:
+    if isinstance(program.step, Gauss):
+        return _stages(program.step)
+    if program.noise:
+        return None  # every step has different coefficients, so predictors from earlier steps fail
+    if program.time and (program.monitor or not isinstance(program.step, Implicit)):
+        return None  # members in packs would share coefficients that differ from step to step
+    match program.step:
+        case Newton() as step if program.offers("recurrences"):  # the predictor of blocks needs them
+            return _newton(program, step)
+        case Path() as step if step.lanes and (program.offers("recurrences") or not step.adjoint):
+            return _paths(program, step, step.lanes)
+        case Explicit() as step:
+            transposes = step.adjoint.steps if step.adjoint else ()
+            return _with_transposes(program, _packs(program, (step.increment,), ()), transposes, 0)
+        case Splitting() as step:
+            used = operations(step.flows)
+            packs = _packs(program, step.flows, tuple(f for f in SMALL_ARGUMENT_FUNCTIONS if f in used))
+            segment_bytes = 2 * _DOUBLE * LANES**2 * program.dimension  # of the stored states of one pack
+            inverse_transposes = recomputing_transposes(program, step) if packs else ()
+            if packs and inverse_transposes:
+                return _with_transposes(program, replace(packs, recomputed=True), inverse_transposes, 0)
+            return _with_transposes(program, packs, step.adjoint.steps if step.adjoint else (), segment_bytes)
+    return None
+
+
+def _rows(program: Program, step: Sweeps) -> Rows:
+    """Return the lanes of a lattice: sites are in rows in any case.
+
+    Most vector versions, and the small-argument forms, are for speed. Observables are evaluated rarely and call libm,
+    whose functions take any argument.
+    """
+    swept = [sweep.kernel for part in step.parts for sweep in part]
+    swept += step.equation.kernels if step.equation else ()
+    gathers = (step.partners.energy, step.partners.field, step.partners.observed) if step.partners else ()
+    observable_names = {kernel.name for gather in gathers for kernel in gather.kernels}
+    reverse_coefficients = (step.adjoint.prepare, step.adjoint.refresh) if step.adjoint else ()
+    of_coefficients = {
+        id(kernel) for kernel in (step.prepare, step.refresh, *reverse_coefficients)
+    }  # their loops run over coefficients, not sites
+    looped = [
+        kernel for kernel in step.kernels if id(kernel) not in of_coefficients and kernel.name not in observable_names
+    ]
+    if program.profile == "small":
+        if not (program.extras.tangent or step.adjoint):  # variations are differences of sweeps there
+            varied_names = {kernel.name for kernel in (step.partners.varied.kernels if step.partners else ())}
+            looped = [kernel for kernel in looped if not kernel.reads_variations and kernel.name not in varied_names]
+        return Rows(with_formulas(operations(looped) & set(FULL_RANGE_FUNCTIONS)), (), frozenset())
+    called_with_forms = _called_in_forms(step)
+    called = operations(swept) & called_with_forms
+    # transposes call the derivatives of these functions, at the same small arguments
+    called |= {f for f in SMALL_ARGUMENT_FUNCTIONS if f in called_with_forms and f.removesuffix("1") in called}
+    small_argument = tuple(f for f in (*SMALL_ARGUMENT_FUNCTIONS, *SPECIAL) if f in called) if program.lanes else ()
+    limited = frozenset({*small_argument, *LANE_FUNCTIONS, *LANE_FORMULAS} & called)
+    return Rows(with_formulas(operations(looped)), small_argument, limited)
+
+
+def _called_in_forms(step: Sweeps) -> set[str]:
+    """Return the functions called by kernels whose loops have a small-argument and a full-range form.
+
+    Derivatives of a stage along variations, and the transposes of sums over bonds or pairs, have one form.
+    """
+    kernels = [sweep.kernel for part in step.parts for sweep in part]
+    kernels += [step.equation.relax, step.equation.advance] if step.equation else []
+    transposes = step.adjoint.steps if step.adjoint else ()
+    return operations([*kernels, *(kernel for kernel in transposes if "sums_bar" not in kernel.inputs)])
+
+
+def _stages(step: Gauss) -> Stages:
+    """The vector field of a Gauss method at all stages; what lies where a step starts is the same for all of them."""
+    kernels = [LaneKernel(step.slope, ("coef", "x"))]
+    kernels += [LaneKernel(step.frame, ("coef", "z"))] if step.frame else []
+    return Stages(tuple(kernels), with_formulas(operations([step.slope])), step.tableau.stages <= LANES // 2)
+
+
+def _newton(program: Program, step: Newton) -> Blocks | None:
+    if _block(program) > MAX_STACK_BYTES:
+        return None
+    centred = step.centred and len(program.fractions) > 1 and step.factors is None
+    linearise = _without(step.linearise, "increment_jacobian") if centred else step.linearise
+    kernels = [LaneKernel(linearise, sparse=step.factors is not None)]
+    kernels.append(LaneKernel(_without_matrices(step.linearise)))
+    if step.factors:
+        substitute = step.factors.substitute
+        kernels += [LaneKernel(step.factors.factorise), LaneKernel(substitute)]
+        kernels.append(LaneKernel(substitute, shared=("side",), single=True))
+    elif step.invert:
+        kernels.append(LaneKernel(_without(step.invert, "slope", "gain") if centred else step.invert))
+    kernels += _elapsed(program)
+    kernels += _turns(program)
+    ops = operations([step.linearise, *(k.kernel for k in _turns(program))])
+    transposes = step.adjoint.steps if step.adjoint else ()
+    kernels += map(LaneKernel, transposes)
+    called = with_formulas(ops | operations(transposes))
+    return Blocks(tuple(kernels), called, not library_calls(ops), _group(program), step.factors)
+
+
+def _paths(program: Program, step: Path, lanes: PathLanes) -> Blocks | None:
+    term_counts = path_kernels.SLOPE_TERMS_BACK if step.adjoint else path_kernels.SLOPE_TERMS
+    room = {k: path_kernels.stack(step, lanes.slopes, program.dimension, k) for k in term_counts}
+    terms = next((k for k, values in room.items() if _block(program, *values) <= MAX_STACK_BYTES), None)
+    if terms is None:
+        return None
+    kernels = [*path_kernels.kernels(step, lanes, program.coordinates), *(k.kernel for k in _turns(program))]
+    kernels += path_kernels.back(step.back) if step.back else []
+    ops = operations(kernels)
+    needed = _group(program) + sum(room[terms])
+    lane_kernels = (*(LaneKernel(kernel) for kernel in kernels), *_elapsed(program))
+    return Blocks(
+        lane_kernels, with_formulas(ops), not library_calls(ops), needed, path=lanes.slopes, slope_terms=terms
+    )
+
+
+def _traces(program: Program, step: Path) -> Traces | None:
+    if not step.back:
+        return None
+    path, n = step.back, program.dimension
+    _, once = path_kernels.stack(step, path.slopes, n, path_kernels.MAX_TERMS)
+    room = _DOUBLE * LANES * (2 * step.coefficients + 6 * n * n + once)
+    if room > 2 * MAX_STACK_BYTES:
+        return None
+    kernels = [*path_kernels.traced(step, path.slopes, path.curvature, program.coordinates), *path_kernels.back(path)]
+    return Traces(
+        tuple(map(LaneKernel, kernels)),
+        with_formulas(operations(kernels)),
+        path.slopes,
+        path_kernels.MAX_TERMS,
+        room > MAX_STACK_BYTES,
+    )
+
+
+def _elapsed(program: Program) -> list[LaneKernel]:
+    """Return the kernel of the time that the steps of a block take, if the solver is monitored."""
+    return [LaneKernel(program.monitor.elapsed)] if program.monitor and program.monitor.elapsed else []
+
+
+def _turns(program: Program) -> list[LaneKernel]:
+    """Return the kernels of the group elements whose products are attitudes."""
+    attitude = program.attitude
+    if attitude is None or attitude.turn is None:
+        return []
+    by_covector = () if attitude.cayley or attitude.exponential is None else (attitude.exponential,)
+    return [LaneKernel(kernel) for kernel in (*by_covector, attitude.turn)]
+
+
+def _packs(program: Program, kernels: Sequence[Kernel], small_argument: tuple[str, ...]) -> Packs | None:
+    """Return packs, if all members have the same coefficients and every function has a vector version."""
+    ops = operations(kernels)
+    states = 2 * PACKS_PER_GROUP * LANES * 3 * program.dimension
+    if program.held or library_calls(ops) or library_powers(kernels) or _DOUBLE * states > MAX_STACK_BYTES:
+        return None
+    return Packs(tuple(kernels), with_formulas(ops), small_argument)
+
+
+def _with_transposes(program: Program, packs: Packs | None, transposes: Sequence[Kernel], stored: int) -> Packs | None:
+    """Return packs with the transposes, if these can be computed in lanes too.
+
+    Their number is the largest whose stored states fit on the stack: ``stored`` bytes for one pack, growing with the
+    square of the number of packs.
+    """
+    transposes = transposes if program.offers("members") else ()
+    ops = operations(transposes)
+    reverse_packs = next((k for k in (PACKS_PER_GROUP, 2, 1) if 2 * k**2 * stored <= MAX_STACK_BYTES), 0)
+    if packs is None or not reverse_packs or library_calls(ops) or library_powers(transposes):
+        return packs
+    return replace(
+        packs, calls=packs.calls | with_formulas(ops), transposes=tuple(transposes), reverse_packs=reverse_packs
+    )
+
+
+def _block(program: Program, more: int = 0, once: int = 0) -> int:
+    """Return the bytes of a block on the stack, with ``more`` values in each lane for each stage, and some ``once``."""
+    n = program.dimension
+    each = program.step.coefficients + 4 * n + 3 * n * n + more
+    return _DOUBLE * LANES * (len(program.fractions) * each + once)
+
+
+def _group(program: Program) -> int:
+    """Return the number of values in each lane that a group of members needs."""
+    n = program.dimension
+    return len(program.fractions) * program.step.coefficients + 7 * n + 3 * n * n
+
+
+def _without(kernel: Kernel, *names: str) -> Kernel:
+    """Return the kernel without these inputs and outputs."""
+    inputs = {name: symbols for name, symbols in kernel.inputs.items() if name not in names}
+    return replace(kernel, inputs=inputs, outputs=tuple(o for o in kernel.outputs if o.name not in names))
+
+
+def _without_matrices(kernel: Kernel) -> Kernel:
+    """Return the kernel of a Newton iteration that uses the matrices of the last one."""
+    outputs = tuple(o for o in kernel.outputs if "jacobian" not in o.name)
+    needed = set(topological([v for o in outputs for v in o.values]))
+    named = tuple((name, value) for name, value in kernel.named if value in needed)
+    return replace(kernel, name="evaluate", outputs=outputs, named=named)

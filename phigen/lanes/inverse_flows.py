@@ -1,0 +1,40 @@
+"""Transposes of flows that recompute the state before a flow from the state after it, by the inverse flow.
+
+The reverse pass of members then stores few states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from phigen.scheme.kernel import Kernel, Output
+from phigen.scheme.lowering import expand_powers, with_numbers_shared
+from phigen.scheme.program import Program
+from phigen.scheme.reversal import EVEN, UNDONE, before, of_coefficients, turned_back
+from phigen.scheme.steps import Splitting
+from phigen.symbolic.expression import ZERO, symbol, symbols_of
+
+
+def recomputing_transposes(program: Program, step: Splitting) -> tuple[Kernel, ...]:
+    """Return the transposes of the flows, which read the state after a flow and output that before, `UNDONE`.
+
+    Empty where forces may damp, or where coefficients over −h differ from those over h by more than signs.
+    """
+    transposes, parities = step.adjoint.steps if step.adjoint else (), of_coefficients(step)
+    coefficients = {s for flow in step.flows for s in symbols_of(*flow.roots)}
+    if program.forced or not all(parities.get(s, EVEN) for s in coefficients):
+        return ()
+    return tuple(
+        _recomputing(flow, kernel, parities) for flow, kernel in zip(step.flows, transposes, strict=bool(transposes))
+    )
+
+
+def _recomputing(flow: Kernel, transpose: Kernel, parities: Mapping[str, int]) -> Kernel:
+    state, changes = flow.inputs["state"], flow.outputs[0].values
+    inverse_changes = dict(zip(state, turned_back(changes, parities), strict=True))
+    nonzero = {s: change for s, change in inverse_changes.items() if not change.is_zero}
+    expressions = before(transpose.roots, nonzero) + [symbol(s) + nonzero[s] if s in nonzero else ZERO for s in state]
+    values = iter(with_numbers_shared(expand_powers(expressions)))
+    outputs = (*transpose.outputs, Output(UNDONE, tuple(ZERO for _ in state)))
+    return replace(transpose, outputs=tuple(replace(o, values=tuple(next(values) for _ in o.values)) for o in outputs))
