@@ -83,8 +83,8 @@ def _of_site(cell: Cell, form: PoissonForm | None, choice: BirealisationChoice) 
     system = build_system(cell.name, cell.fields, cell.parameters, form or MatrixForm(rows), energy)
     realisation = realise(system, choice)
     if realisation.path or not realisation.exact:
-        property_ = "follows paths numerically" if realisation.path else "is approximate"
-        raise refuse(f"scheme series: on lattices α and β are in closed form; {realisation.kind} {property_}")
+        shortcoming = "follows paths numerically" if realisation.path else "is approximate"
+        raise refuse(f"scheme series: on lattices α and β are in closed form; {realisation.kind} {shortcoming}")
     if not realisation.symmetric:
         raise refuse(f"scheme series: on lattices the bi-realisation is symmetric; {realisation.kind} is not")
     displacement, increment = (

@@ -1,9 +1,9 @@
 """The transpose of a step: kernels that pull cotangents back, by reverse accumulation on the kernels of the step.
 
-A cotangent of x' gives that of x and of the coefficients of the step; those of all steps of a run are added up, and
-``prepare`` is pulled back once. *newton*: with a(y) + y = x, x' = x + d(y), J = 1 + a', M = d' and the cotangent λ of
-x', μ = J⁻ᵀ Mᵀ λ gives λ + μ as that of x, and the derivative of λ·d − μ·a along the coefficients as theirs; J and M
-are those of ``linearise``. *explicit* and flows: one reverse sweep. *path*: see `adjoint_path`.
+From the cotangent of x' follow the cotangents of x and of the coefficients of the step. The latter are summed over the
+steps of a run, and ``prepare`` is pulled back once. *newton*: let a(y) + y = x, x' = x + d(y), J = 1 + a' and M = d',
+with J and M of ``linearise``. If λ is the cotangent of x' and μ = J⁻ᵀ Mᵀ λ, the cotangent of x is λ + μ, and that of a
+coefficient is the derivative of λ·d − μ·a along it. *explicit* and flows: one reverse sweep. *path*: `adjoint_path`.
 """
 
 from __future__ import annotations
@@ -40,22 +40,22 @@ def pulled_back(
     along: Mapping[str, Sequence[str]],
     purpose: str,
 ) -> Kernel:
-    """The derivatives of Σ cotangent · value, for the values that have ``seeds``, along some inputs of a kernel.
+    """Return the derivatives of Σ cotangent · value along some inputs of a kernel, for the values that have ``seeds``.
 
     A seed ``bar`` adds an input of that name, the cotangents of its values; an array x in ``along`` gives ``x_bar``.
     """
     value = total(
         symbol(Symbol(seed, i)) * e for seed, values in seeds.items() for i, e in enumerate(values) if not e.is_zero
     )
-    found = gradient(value, [s for symbols in along.values() for s in symbols])
-    slopes = iter(_without_cosines(found, [e for values in seeds.values() for e in values]))
+    plain_slopes = gradient(value, [s for symbols in along.values() for s in symbols])
+    slopes = iter(_without_cosines(plain_slopes, [e for values in seeds.values() for e in values]))
     outputs = tuple(Output(f"{array}_bar", tuple(next(slopes) for _ in symbols)) for array, symbols in along.items())
     inputs = {**kernel.inputs, **{seed: tuple(Symbol(seed, i) for i in range(len(v))) for seed, v in seeds.items()}}
     return Kernel(name, purpose, inputs, outputs)
 
 
 def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression]) -> list[Expression]:
-    """The same with 1 - versin(a) for cos(a) where the values have computed versin(a)."""
+    """Return the slopes with 1 - versin(a) for cos(a) where the values contain versin(a)."""
     known = {e.args[0] for e in topological(values) if e.op == "versin"}
 
     def visit(e: Expression, args: list[Expression]) -> Expression:
@@ -67,7 +67,7 @@ def _without_cosines(slopes: Sequence[Expression], values: Sequence[Expression])
 
 
 def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
-    """The cotangents of coefficients, from λ (``increment_bar``) and −μ (``displacement_bar``)."""
+    """Return the cotangents of coefficients, from λ (``increment_bar``) and −μ (``displacement_bar``)."""
     displacement, increment, *_ = linearise.outputs
     kernel = replace(linearise, inputs={**linearise.inputs, TABLE: coefficients.table})
     return pulled_back(
@@ -80,7 +80,7 @@ def newton_adjoint(linearise: Kernel, coefficients: Coefficients) -> Kernel:
 
 
 def explicit_adjoint(explicit: Kernel, coefficients: Coefficients, name: str = "explicit_adjoint") -> Kernel:
-    """The cotangents of state and coefficients, from that of the increment of a step or a flow."""
+    """Return the cotangents of state and coefficients, from that of the increment of a step or a flow."""
     kernel = replace(explicit, inputs={**explicit.inputs, TABLE: coefficients.table})
     return pulled_back(
         kernel,
@@ -98,51 +98,51 @@ def completed(
     refresh: Kernel | None,
     path: PathAdjoint | None = None,
 ) -> Adjoint:
-    """The transpose of a step, when its table is full and ``prepare`` and ``refresh`` are made."""
-    held = {"params": prepare.inputs["params"]}
+    """Return the transpose of a step, once its table is full and ``prepare`` and ``refresh`` exist."""
+    differentiated = {"params": prepare.inputs["params"]}
     if prepare.inputs.get("gauge") == (LEVEL,):
-        held["gauge"] = (LEVEL,)
-    early = _prepare_adjoint(prepare, held)
-    late = refresh and pulled_back(
+        differentiated["gauge"] = (LEVEL,)
+    prepare_adjoint = _prepare_adjoint(prepare, differentiated)
+    refresh_adjoint = refresh and pulled_back(
         refresh,
         "refresh_adjoint",
         {"now_bar": refresh.outputs[0].values},
         {TABLE: coefficients.slots},
         "cotangents of the coefficients that do not depend on the time, from those of the others",
     )
-    idle = _idle(coefficients, held)
-    return Adjoint(tuple(_without(kernel, idle) for kernel in steps), early, late, path)
+    constant = _constant_coefficients(coefficients, differentiated)
+    return Adjoint(tuple(_without(kernel, constant) for kernel in steps), prepare_adjoint, refresh_adjoint, path)
 
 
-def _prepare_adjoint(prepare: Kernel, held: Mapping[str, Sequence[str]]) -> Kernel:
-    """The transpose of ``prepare``; what is pulled back through matrix exponentials, if any, is an input of its own."""
+def _prepare_adjoint(prepare: Kernel, differentiated: Mapping[str, Sequence[str]]) -> Kernel:
+    """Return the transpose of ``prepare``; cotangents of the arguments of matrix exponentials are a further input."""
     stored = list(prepare.outputs[0].values)
     exponents = [e for start, n in prepare.exponentials for e in stored[start : start + n * n]]
     values = stored[: len(stored) - len(exponents)]
     seeds = {"coef_bar": [*values, *[ZERO] * len(exponents)]}
     purpose = "cotangents of the parameters, from those of the coefficients"
-    if {s for symbols in held.values() for s in symbols}.isdisjoint(symbols_of(*exponents)):
-        return pulled_back(prepare, "prepare_adjoint", seeds, held, purpose)
-    found = pulled_back(prepare, "prepare_adjoint", seeds | {EXPONENTS: exponents}, held, purpose)
-    inner = Kernel(
+    if {s for symbols in differentiated.values() for s in symbols}.isdisjoint(symbols_of(*exponents)):
+        return pulled_back(prepare, "prepare_adjoint", seeds, differentiated, purpose)
+    kernel = pulled_back(prepare, "prepare_adjoint", seeds | {EXPONENTS: exponents}, differentiated, purpose)
+    exponents_kernel = Kernel(
         "exponents",
         "the matrices tA whose exponentials are coefficients",
         prepare.inputs,
         (Output("exponents", tuple(exponents)),),
     )
-    return replace(found, exponentials=prepare.exponentials, exponents=inner)
+    return replace(kernel, exponentials=prepare.exponentials, exponents=exponents_kernel)
 
 
-def _idle(coefficients: Coefficients, held: Mapping[str, Sequence[str]]) -> list[bool]:
-    """Of each coefficient whether it depends on nothing that is differentiated."""
-    names = {s for symbols in held.values() for s in symbols}
+def _constant_coefficients(coefficients: Coefficients, differentiated: Mapping[str, Sequence[str]]) -> list[bool]:
+    """Return for each coefficient whether it depends on no differentiated input."""
+    names = {s for symbols in differentiated.values() for s in symbols}
     return [names.isdisjoint(symbols_of(e)) for e in coefficients.written_out(coefficients.everything)]
 
 
-def _without(kernel: Kernel, idle: Sequence[bool]) -> Kernel:
-    """The kernel, which does not compute cotangents of coefficients that nobody asks for."""
+def _without(kernel: Kernel, constant: Sequence[bool]) -> Kernel:
+    """Return the kernel with zeros for the cotangents of constant coefficients."""
     outputs = [
-        replace(o, values=tuple(ZERO if unused else e for e, unused in zip(o.values, idle, strict=True)))
+        replace(o, values=tuple(ZERO if is_constant else e for e, is_constant in zip(o.values, constant, strict=True)))
         if o.name == f"{TABLE}_bar"
         else o
         for o in kernel.outputs
@@ -151,7 +151,7 @@ def _without(kernel: Kernel, idle: Sequence[bool]) -> Kernel:
 
 
 def level_adjoint(system: System) -> Kernel:
-    """The gradient of H along state and parameters: e = −H(x0) depends on both."""
+    """Return the gradient of H along state and parameters, on which the energy level e = −H(x₀) depends."""
     along = [*system.coordinates, *system.parameter_names]
     slopes = gradient(system.hamiltonian, along)
     n = system.dimension
@@ -164,11 +164,12 @@ def level_adjoint(system: System) -> Kernel:
 
 
 def adjoint_path(system: System, coefficients: Coefficients, curvature: Kernel, slopes: PathSlopes) -> PathAdjoint:
-    """The path traced back from its end with cotangents, see below, and that of the slope along coefficients.
+    """Return the path traced back with cotangents, and the transpose of the slope along coefficients.
 
-    For x' = m(1) and y = ∫ m dt with the cotangents λ and ν, along the path backwards: ȧ = ∂(π(m)p)/∂mᵀ a + ν from
-    a = λ gives that of x in the end, and ∫ π(m)ᵀ a dt that of p, ∫ ∂(a·π(m)p)/∂c dt that of a coefficient c. With
-    p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, and so ω solves a linear equation.
+    Let λ be the cotangent of x' = m(1), and ν that of y = ∫ m dt. Along the path backwards, ȧ = ∂(π(m)p)/∂mᵀ a + ν
+    with the start a = λ. The end value of a is the cotangent of x, ∫ π(m)ᵀ a dt that of p, and ∫ ∂(a·π(m)p)/∂c dt
+    that of a coefficient c. With p = ∇S_h(y), ν = Hess S_hᵀ ω for the cotangent ω of p, which gives a linear equation
+    for ω.
     """
     coordinates = system.coordinates
     p = [symbol(momentum(c)) for c in coordinates]

@@ -1,10 +1,11 @@
 """Splitting methods of any number of parts: compositions of χ_h = φ_m ∘ … ∘ φ_1 and its adjoint χ*_h = φ_1 ∘ … ∘ φ_m.
 
 Φ_h = χ_{α_2s h} ∘ χ*_{α_2s−1 h} ∘ … ∘ χ_{α_2 h} ∘ χ*_{α_1 h} with α_i = α_{2s+1−i} is a symmetric Poisson map if the
-φ_k are exact flows. Coefficients that give an order for two parts, a_1 = α_1, b_1 = α_1 + α_2, a_2 = α_2 + α_3, …, give
-it for any number: R. I. McLachlan, On the numerical integration of ordinary differential equations by symmetric
-composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ and χ* meet, two flows of one part are one flow. Strang's
-splitting is α = (½, ½), and a symmetric composition of it has α = (γ_1/2, γ_1/2, γ_2/2, γ_2/2, …).
+φ_k are exact flows. If the coefficients a_1 = α_1, b_1 = α_1 + α_2, a_2 = α_2 + α_3, … have some order for two parts,
+the α have the same order for any number of parts: R. I. McLachlan, On the numerical integration of ordinary
+differential equations by symmetric composition methods, SIAM J. Sci. Comput. 16 (1995). Where χ and χ* meet, two
+flows of one part are merged. Strang's splitting is α = (½, ½), and a symmetric composition of it has α = (γ_1/2,
+γ_1/2, γ_2/2, γ_2/2, …).
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ _S10 = (
 
 @dataclass(frozen=True)
 class Alternation:
-    """A named method: α_1, …, α_2s, and the order that they give."""
+    """A named method: α_1, …, α_2s, and their order."""
 
     name: str
     order: int
@@ -39,7 +40,7 @@ class Alternation:
 
 
 def _partitioned(name: str, order: int, halves: tuple[str, str]) -> Alternation:
-    """α from a_1, …, and b_1, …, given up to the middle."""
+    """Return the method with the first halves of a_1, … and b_1, …, without their middles."""
     a, b = ([Fraction(v) for v in half.split()] for half in halves)
     a = [*a, 1 - 2 * sum(a, Fraction(0)), *reversed(a)]
     rest = Fraction(1, 2) - sum(b, Fraction(0))
@@ -68,13 +69,16 @@ ALTERNATIONS = (
 
 
 def find(name: str, order: int) -> Alternation | None:
-    """The method of that name (``auto``: the recommended one; ``none``: Strang's splitting) and order, or None."""
-    wanted = {"auto": [a.name for a in ALTERNATIONS], "none": [STRANG.name]}.get(name, [name])
-    return next((a for a in ALTERNATIONS if a.order == order and a.name in wanted), None)
+    """Return the method of this name and order, or None.
+
+    ``auto`` is the recommended method of the order, ``none`` Strang's splitting.
+    """
+    names = {"auto": [a.name for a in ALTERNATIONS], "none": [STRANG.name]}.get(name, [name])
+    return next((a for a in ALTERNATIONS if a.order == order and a.name in names), None)
 
 
 def orders(name: str) -> list[int]:
-    """The orders that a name offers."""
+    """Return the orders of the methods of this name."""
     return sorted({a.order for a in ALTERNATIONS if find(name, a.order)})
 
 
@@ -82,9 +86,9 @@ def orders(name: str) -> list[int]:
 class Schedule:
     """The flows of one step: part 0 for ``times[0]``, then ``stages`` times the ``pattern``.
 
-    The pattern lists parts with the row of ``times`` that each takes, counted from the first row of the stage.
-    Kicks with modified potential have a multiple each, in units of h²: ``multiples`` by row, 0 for other flows. Where H
-    depends on the time, ``moments`` says for each row at which fraction of the step it stands still.
+    The pattern lists parts with the row of ``times`` of each, counted from the first row of the stage. Kicks with
+    modified potential have a multiple in units of h² each: ``multiples`` by row, 0 for other flows. Where H depends
+    on the time, ``moments`` has for each row the fraction of the step at which the time stands still.
     """
 
     times: tuple[float, ...]
@@ -106,10 +110,10 @@ class Schedule:
 
 
 def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
-    """The schedule of ``parts`` flows where the time advances with the part ``carrier``, the first or the last one.
+    """Return the schedule of ``parts`` flows where the time advances with the part ``carrier``, the first or the last.
 
-    The conjugate e of the time, in H + e, belongs to that part: if there is no such flow, it is that of e alone, and is
-    left out. All other parts see the time stand still.
+    The conjugate e of the time, in H + e, belongs to the carrier. Without a flow of this number, the carrier is the
+    flow of e alone, and is left out. In all other parts the time stands still.
     """
     clock, moments = Fraction(0), dict[int, Fraction]()
     for part, row in schedule.flows:
@@ -118,19 +122,19 @@ def with_clock(schedule: Schedule, carrier: int, parts: int) -> Schedule:
         elif moments.setdefault(row, clock) != clock:
             raise ValueError(f"row {row} would need two times")
     pattern = tuple(flow for flow in schedule.pattern if flow[0] < parts)
-    found = tuple(float(moments.get(row, Fraction(0))) for row in range(len(schedule.times)))
-    return replace(schedule, pattern=pattern, moments=found)
+    fractions = tuple(float(moments.get(row, Fraction(0))) for row in range(len(schedule.times)))
+    return replace(schedule, pattern=pattern, moments=fractions)
 
 
 def schedule(method: Alternation, parts: int) -> Schedule:
-    """The flows of a step of a method; one part alone is followed exactly."""
+    """Return the flows of a step of a method; a single part is followed exactly."""
     if parts == 1:
         return Schedule((1.0,), 0, ())
     alpha = [*method.fractions, Fraction(0)]
     times: list[Fraction] = [alpha[0]]
     for k in range(0, 2 * method.stages, 2):
-        early, late, after = alpha[k : k + 3]
-        stage: Sequence[Fraction] = (early, early + late, late, late + after)
+        first, second, next_first = alpha[k : k + 3]
+        stage: Sequence[Fraction] = (first, first + second, second, second + next_first)
         times += stage if parts > 2 else (stage[1], stage[3])
     last, middle = parts - 1, range(1, parts - 1)
     if parts == 2:

@@ -1,4 +1,4 @@
-"""From a system, its bi-realisation and an order to a program: discretisation, staging and kernels put together."""
+"""Assembly of a program: discretisation, staging and kernels from a system, its bi-realisation and an order."""
 
 from __future__ import annotations
 
@@ -46,9 +46,9 @@ from phigen.symbolic.symbols import STEP
 if TYPE_CHECKING:
     from phigen.attitude.group import Group
 
-#: Largest dimension in which paths are followed in lanes. In five and six their derivatives cost what lanes save:
+#: Largest dimension in which paths are followed in lanes. In five and six the cost of derivatives outweighs lanes:
 #: measured, blocks take 0.6 to 1.9 times as long as single steps.
-MOST_IN_LANES = 4
+MAX_PATH_LANE_DIMENSION = 4
 
 
 def build_program(
@@ -61,7 +61,7 @@ def build_program(
     *,
     group: Group | None = None,
 ) -> Program:
-    """The solver of a system as a program. LimitError if a kernel is too large."""
+    """Return the solver of a system as a program. Raises `LimitError` if a kernel is too large."""
     extras, solver = spec.extras, spec.solver
     expect_no_adjoint(system, extras.adjoint)
     gauge, attitude = gauged.gauge, None
@@ -130,7 +130,7 @@ def _step(
     if realisation.path:
         return _path(system, generating, gauge, inner, extras, lanes=lanes)
     coefficients = generating.coefficients
-    # A monitored step keeps its y, by which it tells the time.
+    # A monitored step needs y, from which its duration follows.
     increment = None if gauge.monitor else explicit_kernel(system, realisation, generating, coefficients)
     if increment is None:
         linearise = linearise_kernel(system, realisation, generating, coefficients)
@@ -160,27 +160,27 @@ def _path(
     n, coefficients = system.dimension, generating.coefficients
     recurrences = build_path(system, coefficients)
     generate = generate_kernel(system, generating, coefficients)
-    several, varied, adjoint = None, None, None
+    path_lanes, tangent, adjoint = None, None, None
     if extras.adjoint:
         slopes = build_slopes(system, coefficients, used_by_path(system, coefficients))
-    elif lanes and n <= MOST_IN_LANES:
+    elif lanes and n <= MAX_PATH_LANE_DIMENSION:
         slopes = build_slopes(system, coefficients)
-    if lanes and n <= MOST_IN_LANES:
-        several = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(full(n)))
+    if lanes and n <= MAX_PATH_LANE_DIMENSION:
+        path_lanes = PathLanes(slopes, curvature(system, generating, coefficients), along_mean(n), inverse(full(n)))
     if extras.tangent or extras.adjoint:
-        kernel = several.curvature if several else curvature(system, generating, coefficients)
+        kernel = path_lanes.curvature if path_lanes else curvature(system, generating, coefficients)
     if extras.tangent:
-        varied = PathTangent(tangent_path(system, coefficients), kernel)
+        tangent = PathTangent(tangent_path(system, coefficients), kernel)
     refresh, prepare = coefficients.refresh(**step_inputs(system)), _prepare(system, gauge, coefficients)
     if extras.adjoint:
         adjoint = completed(coefficients, [], prepare, refresh, adjoint_path(system, coefficients, kernel, slopes))
     solver = path_elimination(n)
-    path = Path(prepare, recurrences, generate, inner, solver, several, varied, refresh=refresh, adjoint=adjoint)
+    path = Path(prepare, recurrences, generate, inner, solver, path_lanes, tangent, refresh=refresh, adjoint=adjoint)
     return coefficients.settled(path)
 
 
 def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel:
-    """All coefficients; the last kernel to be made, when the table is full."""
+    """Return the kernel of all coefficients; it is the last to be built, once the table is full."""
     return Kernel(
         "prepare",
         "everything that depends on parameters and step size only",
@@ -192,7 +192,7 @@ def _prepare(system: System, gauge: Gauge, coefficients: Coefficients) -> Kernel
 def _facts(
     system: System, realisation: BiRealisation, scheme: Discretisation, gauge: Gauge, step: Step, order: Order
 ) -> Iterator[str]:
-    """The lines of the header; some may be empty."""
+    """Yield the lines of the header; some may be empty."""
     generating = scheme.generating
     series = "S_1" if scheme.terms == 1 else f"S_1 ... S_{scheme.terms}"
     terms = f", {generating.terms} terms" if generating.terms else ""
@@ -211,7 +211,7 @@ def _facts(
 
 
 def approximation(realisation: BiRealisation) -> list[str]:
-    """The line that labels a solver built on a truncation; none for an exact bi-realisation."""
+    """Return the line that labels a solver built on a truncation; none for an exact bi-realisation."""
     if realisation.exact:
         return []
     degree = realisation.degree

@@ -1,8 +1,9 @@
-"""Which composition a splitting gets: by the order, by what holds for its parts, and by what its flows cost.
+"""Choice of the composition of a splitting: by the order, the brackets of its parts, and the cost of its flows.
 
-Where {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply, with modified kicks
-where these have a flow. Of all that apply the one is taken with the least cost of a step times error^{1/order}: what a
-given accuracy costs. All others take the recommended alternation of the order.
+If {V, {V, {V, T}}} = 0 for one of two parts as V, the methods of `phigen.scheme.nystrom` apply, with modified kicks
+if V + κ{V, {V, T}} has a flow. Among the methods that apply, the choice has the least product of the cost of a step
+and error^{1/order}, to which the cost of a given accuracy is proportional. Other splittings get the recommended
+alternation.
 """
 
 from __future__ import annotations
@@ -27,17 +28,17 @@ from phigen.splitting.statements import bracket
 from phigen.symbolic.expression import gradient, symbols_of
 from phigen.symbolic.verdict import PROVED, decide_zero
 
-#: Operations that a flow costs beside its formulas, for each coordinate that it moves: mostly it waits for the flow
-#: before. Found by timing: of fourteen pairs of methods on seven systems the faster is taken in twelve, and in the
-#: other two one that takes no more than 1.34 times as long.
-OVERHEAD = 12
+#: Operations that a flow costs beyond its formulas, for each coordinate that it updates: mostly the latency of the flow
+#: before. Fitted to timings: of fourteen pairs of methods on seven systems the faster one is chosen in twelve, and in
+#: the other two the chosen one takes at most 1.34 times as long.
+FLOW_LATENCY = 12
 
 
 @dataclass(frozen=True)
 class Choice:
-    """A method with the flows in the order of its steps, kicks modified if it wants that; ``why`` is for the user.
+    """A method with the flows in the order of its steps, including modified kicks; ``why`` is for the user.
 
-    Where H depends on the time, that advances with the flow ``carrier``, or by itself if no flow has that number.
+    Where H depends on the time, the time advances with the flow ``carrier``, or by itself if no flow has that number.
     """
 
     order: Order
@@ -47,7 +48,7 @@ class Choice:
     carrier: int | None = None
 
     def schedule(self) -> Schedule:
-        """The flows of a step."""
+        """Return the flows of a step."""
         count, method = len(self.splitting.flows), self.method
         if self.carrier is None:
             return method.schedule() if isinstance(method, Nystrom) else alternation.schedule(method, count)
@@ -57,50 +58,50 @@ class Choice:
 
 
 class Host(Protocol):
-    """What the parts are of."""
+    """A spec or a system whose parts are composed."""
 
     @property
     def locations(self) -> Mapping[tuple[Any, ...], Location]:
-        """Where its keys are in the spec."""
+        """Places of its keys in the spec."""
         ...
 
 
-def plan(system: System, splitting: Splitting, wanted: int, composition: str) -> Choice:
-    """The method that gives an order; odd orders round up.
+def plan(system: System, splitting: Splitting, requested: int, composition: str) -> Choice:
+    """Return the method that gives an order; odd orders round up.
 
     Raises `SpecError` for orders that the composition lacks, and for parts that it does not apply to.
     """
     if splitting.small is not None and _unsuited(system, splitting, splitting.small):
         splitting = replace(splitting, small=None)
-    if system.forces:  # a force is no part that kicks
-        choice = planned(system, splitting, wanted, composition, lambda: ())
+    if system.forces:  # with forces no part can be V
+        choice = planned(system, splitting, requested, composition, lambda: ())
         return with_carrier(choice, system.time) if system.time else choice
     if not system.time:
-        return planned(system, splitting, wanted, composition, lambda: kicks(system, splitting))
-    choice = planned(system, splitting, wanted, composition, lambda: _kicks_in_time(system, splitting))
+        return planned(system, splitting, requested, composition, lambda: kicks(system, splitting))
+    choice = planned(system, splitting, requested, composition, lambda: _kicks_in_time(system, splitting))
     return with_carrier(choice, system.time)
 
 
 def _unsuited(system: System, splitting: Splitting, small: int) -> bool:
-    """Whether there are forces, or the time is in A, to which its conjugate has to belong."""
+    """Whether there are forces, or A depends on the time; the conjugate of the time must belong to A."""
     return len(splitting.flows) != 2 or (bool(system.time) and is_dated(splitting.flows[1 - small], system.time))
 
 
 def _kicks_in_time(system: System, splitting: Splitting) -> list[Kick]:
-    """The parts that can be V beside T + e: T does not depend on the time, and V commutes with ∂V/∂t."""
-    found = []
+    """Return the parts that can be V beside T + e: T does not depend on the time, and V commutes with ∂V/∂t."""
+    kicks_found = []
     for kick in kicks(system.frozen, splitting):
         drift, v = splitting.flows[1 - kick.part], splitting.flows[kick.part].hamiltonian
         rate = bracket(system, v, gradient(v, system.times)[0])
         if not is_dated(drift, system.time) and decide_zero("", [("", rate)]).verdict == PROVED:
-            found.append(kick)
-    return found
+            kicks_found.append(kick)
+    return kicks_found
 
 
 def with_carrier(choice: Choice, time: str) -> Choice:
-    """The choice with a flow that the time advances with, the first or the last, which does not depend on it.
+    """Return the choice with the flow that carries the time: the first or last, independent of the time.
 
-    Else the time advances by itself, in the place of a last part.
+    Else the time advances by itself, in place of a last part.
     """
     flows = choice.splitting.flows
     if isinstance(choice.method, Nystrom):
@@ -122,27 +123,27 @@ def is_dated(flow: Flow, time: str) -> bool:
 
 
 def planned(
-    system: Host, splitting: Splitting, wanted: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
+    system: Host, splitting: Splitting, requested: int, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> Choice:
-    """`plan` for parts of which ``kicks_of`` tells which can be V."""
-    even = wanted + wanted % 2
-    note = "" if even == wanted else f"order {wanted} was asked for; a symmetric method has even order"
+    """Return the method as `plan` does; ``kicks_of`` returns the parts that can be V."""
+    even = requested + requested % 2
+    note = "" if even == requested else f"order {requested} was asked for; a symmetric method has even order"
     order = Order(even, 0, note)
-    near = near_integrable.find(composition, even)
-    if near and splitting.small is not None:
-        return _near_integrable(splitting, order, near)
-    if composition in near_integrable.NAMES and near:
+    near_method = near_integrable.find(composition, even)
+    if near_method and splitting.small is not None:
+        return _near_integrable(splitting, order, near_method)
+    if composition in near_integrable.NAMES and near_method:
         raise _nothing_small(system, splitting, composition)
-    named = composition in nystrom.NAMES
-    if named or composition == "auto":
-        found = list(_applicable(kicks_of, even, composition))
-        if found:
-            method, kick = min(found, key=lambda pair: _price(splitting, *pair))
+    is_nystrom = composition in nystrom.NAMES
+    if is_nystrom or composition == "auto":
+        applicable = list(_applicable(kicks_of, even, composition))
+        if applicable:
+            method, kick = min(applicable, key=lambda pair: _price(splitting, *pair))
             return chosen(splitting, order, method, kick)
     known = orders(composition)
     if even not in known:
         raise _no_order(system, composition, known, even)
-    if named:
+    if is_nystrom:
         raise _not_applicable(system, splitting, composition, kicks_of)
     recommended = alternation.find(composition, even)
     assert recommended is not None
@@ -150,7 +151,7 @@ def planned(
 
 
 def _near_integrable(splitting: Splitting, order: Order, method: NearIntegrable) -> Choice:
-    """The choice of a method for H = A + εB, with the flow of A first."""
+    """Return the choice of a method for H = A + εB, with the flow of A first."""
     assert splitting.small is not None
     large, small = splitting.flows[1 - splitting.small], splitting.flows[splitting.small]
     why = f"H_2 is small, of size ε: errors {method.errors}"
@@ -158,30 +159,30 @@ def _near_integrable(splitting: Splitting, order: Order, method: NearIntegrable)
 
 
 def _nothing_small(system: Host, splitting: Splitting, composition: str) -> SpecError:
-    """Why a method for near-integrable systems does not apply."""
+    """Return the error for a method for near-integrable systems that does not apply."""
     count = len(splitting.flows)
-    beside = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
-    message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {beside}"
+    situation = "none is known to be small" if count == 2 else f"here {'is one' if count == 1 else f'are {count}'}"
+    message = f"scheme splitting: composition {composition} needs H = A + εB in two parts, B small; {situation}"
     hint = "small: true of a parameter says that what it multiplies is small"
     return SpecError([Diagnostic(message, system.locations.get(("composition",)), hint)])
 
 
 def chosen(splitting: Splitting, order: Order, method: Nystrom, kick: Kick) -> Choice:
-    """The choice of a method of Nyström type."""
+    """Return the choice of a method of Nyström type."""
     return Choice(order, method, _arranged(splitting, method, kick), _why(method))
 
 
 def orders(composition: str) -> list[int]:
-    """The orders that a name offers."""
+    """Return the orders of the methods of this name."""
     if composition in near_integrable.NAMES:
         return near_integrable.orders(composition)
     return nystrom.orders(composition) if composition in nystrom.NAMES else alternation.orders(composition)
 
 
 def arranged(splitting: Splitting) -> Splitting:
-    """The parts in the order in which an alternation is cheapest: the costliest last, since it occurs once in a stage.
+    """Return the parts in the order in which an alternation is cheapest: the costliest last.
 
-    The first occurs once too, and once more in all; those in the middle occur twice.
+    In each stage the last part has one flow, as has the first, with one more in the step; the others have two.
     """
     by_cost = sorted(splitting.flows, key=lambda flow: cost(flow.increment))
     return Splitting((*by_cost[-2:-1], *by_cost[:-2], *by_cost[-1:]))
@@ -196,25 +197,25 @@ def _applicable(kicks_of: Callable[[], Sequence[Kick]], order: int, name: str) -
 
 
 def _price(splitting: Splitting, method: Nystrom, kick: Kick) -> float:
-    """What a step costs, times error^{1/order}: in proportion to the cost of a time at a given accuracy."""
+    """Return the cost of a step times error^{1/order}, proportional to the cost of a time at a given accuracy."""
     first, last = (_cost(flow) for flow in _arranged(splitting, method, kick).flows)
     step = (method.stages + 1) * first + method.stages * last
     return step * math.pow(method.error, 1 / method.order)
 
 
 def _cost(flow: Flow) -> int:
-    return cost(flow.increment) + OVERHEAD * flow.moving
+    return cost(flow.increment) + FLOW_LATENCY * flow.moving
 
 
 def _arranged(splitting: Splitting, method: Nystrom, kick: Kick) -> Splitting:
-    """T and V in the order of the method."""
+    """Return T and V in the order of the method."""
     drift, plain = splitting.flows[1 - kick.part], splitting.flows[kick.part]
     kicking = kick.modified if method.multiples and kick.modified else plain
     return Splitting((kicking, drift), 0) if method.kicks_first else Splitting((drift, kicking), 1)
 
 
 def _why(method: Nystrom) -> str:
-    """What makes a method apply."""
+    """Return the condition under which a method applies."""
     v, t = ("H_1", "H_2") if method.kicks_first else ("H_2", "H_1")
     modified = f" and {v} + κ{{{v}, {{{v}, {t}}}}} has a flow" if method.multiples else ""
     return f"{{{v}, {{{v}, {{{v}, {t}}}}}}} = 0{modified}"
@@ -231,7 +232,7 @@ def _no_order(system: Host, composition: str, known: Sequence[int], order: int) 
 def _not_applicable(
     system: Host, splitting: Splitting, composition: str, kicks_of: Callable[[], Sequence[Kick]]
 ) -> SpecError:
-    """Why a method for kicks does not apply."""
+    """Return the error for a method for kicks that does not apply."""
     count = len(splitting.flows)
     if count != 2:
         reason = f"H = T + V, of two parts; here there {'is one' if count == 1 else f'are {count}'}"

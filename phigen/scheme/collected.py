@@ -28,39 +28,40 @@ class Collected:
 
     @cached_property
     def _moving(self) -> list[list[int]]:
-        """For each coordinate the variables that depend on it."""
+        """The variables that depend on a coordinate, for each coordinate."""
         return [[v for v, row in enumerate(self.slopes) if row[j]] for j in range(len(self.slopes[0]))]
 
     def derivative(self, terms: Terms, j: int) -> Terms:
-        """The total derivative along coordinate j."""
+        """Return the total derivative along coordinate j."""
         result: dict[Monomial, Expression] = {}
         moving = self._moving[j]
         for m, c in terms.items():
             for v in moving:
                 if e := m[v]:
-                    rest = (*m[:v], e - 1, *m[v + 1 :])
+                    lowered = (*m[:v], e - 1, *m[v + 1 :])
                     for k, factor in self.slopes[v][j].items():
-                        key = tuple(a + b for a, b in zip(rest, k, strict=True))
+                        key = tuple(a + b for a, b in zip(lowered, k, strict=True))
                         term = e * c * factor
                         result[key] = result[key] + term if key in result else term
         return {m: c for m, c in result.items() if not c.is_zero}
 
     def cells(self, terms: Terms, j: int) -> int:
-        """The exponents that `derivative` would write: nearly all of its time."""
+        """Return the number of exponents that `derivative` would write, to which its time is proportional."""
         wide = [len(row[j]) for row in self.slopes]
         return sum(wide[v] for m in terms for v in self._moving[j] if m[v]) * len(self.variables)
 
     def expression(self, terms: Terms, coefficients: Coefficients) -> Expression:
-        """The polynomial in nested Horner form, its coefficients put into the table."""
+        """Return the polynomial in nested Horner form, with its coefficients in the table."""
         return horner({m: coefficients.slot(c) for m, c in terms.items()}, self.variables)
 
 
 def collect(
     tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], times: Sequence[str] = ()
 ) -> tuple[Collected, list[Terms]]:
-    """Elements of a tower as collected polynomials, with the ring that differentiates them.
+    """Return elements of a tower as collected polynomials, with the ring that differentiates them.
 
-    Coefficients that depend on ``times`` are polynomials in what does, whose coefficients depend on parameters only.
+    Coefficients that depend on ``times`` are polynomials in the dated variables, whose coefficients depend on
+    parameters only.
     """
     state, dated = _state(tower, coordinates), _state(tower, times)
     static = [i for i in range(len(tower.names)) if i not in state and i not in dated]
@@ -75,21 +76,21 @@ def collect(
         return {key: in_time(parts) for key, parts in sorted(groups.items())}
 
     def in_time(parts: Mapping[Monomial, Mapping[Monomial, Expression]]) -> Expression:
-        found = {when: horner(part, [values[i] for i in static]) for when, part in sorted(parts.items())}
-        return horner(found, [values[i] for i in dated]) if dated else next(iter(found.values()))
+        by_power = {when: horner(part, [values[i] for i in static]) for when, part in sorted(parts.items())}
+        return horner(by_power, [values[i] for i in dated]) if dated else next(iter(by_power.values()))
 
     slopes = tuple(tuple(terms(tower.derivative(tower.gens[i], c)) for c in coordinates) for i in state)
     return Collected(tuple(values[i] for i in state), slopes), [terms(e) for e in elements]
 
 
 def cells(tower: Tower, elements: Sequence[Poly]) -> int:
-    """The exponents that `collect` would write for the elements and for the derivatives of what they contain."""
+    """Return the number of exponents that `collect` would write for the elements and their derivatives."""
     rules = sum(len(rule) for g in tower.generators for rule in g.derivative.values())
     return (sum(map(len, elements)) + rules) * len(tower.names)
 
 
 def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], most: int) -> bool:
-    """Whether the elements, collected, have more than so many monomials together: much faster than to collect them."""
+    """Whether the elements, collected, have more than ``most`` monomials together; much faster than `collect`."""
     state, count = _state(tower, coordinates), 0
     if sum(map(len, elements)) <= most:
         return False
@@ -101,5 +102,5 @@ def exceeds(tower: Tower, elements: Sequence[Poly], coordinates: Sequence[str], 
 
 
 def _state(tower: Tower, coordinates: Sequence[str]) -> list[int]:
-    """The variables of the ring that depend on the coordinates."""
+    """Return the variables of the ring that depend on the coordinates."""
     return [i for i in range(len(tower.names)) if tower.depends_on(tower.gens[i], coordinates)]

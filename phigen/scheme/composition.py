@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-# The first half of each, and the middle coefficient last; the middle follows from Σ γ_i = 1.
+# The first half of each composition; the middle coefficient follows from Σ γ_i = 1.
 _YOSHIDA_6 = (0.78451361047755726381949763, 0.23557321335935813368479318, -1.17767998417887100694641568)
 _KAHAN_LI_6 = (
     0.39216144400731413927925056,
@@ -62,7 +62,7 @@ _SOFRONIOU_SPALETTA_10 = (
 
 @dataclass(frozen=True)
 class Composition:
-    """A named composition: the fractions γ_1 … γ_s of the step, and the order it gives."""
+    """A named composition: the fractions γ_1 … γ_s of the step, and its order."""
 
     name: str
     order: int
@@ -86,10 +86,10 @@ COMPOSITIONS = (
 
 
 def find(name: str, order: int) -> Composition | None:
-    """The composition of that name (``auto``: the recommended one) and order, or None."""
+    """Return the composition of this name (``auto``: the recommended one) and order, or None."""
     return next((c for c in COMPOSITIONS if c.order == order and name in ("auto", c.name)), None)
 
 
 def orders(name: str) -> list[int]:
-    """The orders that a name offers."""
+    """Return the orders of the compositions of this name."""
     return [c.order for c in COMPOSITIONS if name in ("auto", c.name)]

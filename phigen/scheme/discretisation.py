@@ -1,4 +1,4 @@
-"""How an order is reached: the generating function taken directly, or a composition of steps of order 2."""
+"""Discretisation: the generating function of the full order, or a composition of steps of order 2."""
 
 from __future__ import annotations
 
@@ -22,33 +22,33 @@ from phigen.spec.names import FLOW_COMPOSITIONS
 from phigen.symbolic.expression import ZERO, Expression, sparse_derivatives, symbol, total
 from phigen.symbolic.symbols import STEP
 
-#: Most operations in one kernel.
+#: Largest number of operations in one kernel.
 MOST_OPERATIONS = limits.OPERATIONS
 
-#: What else than a lower order makes a series smaller.
-_OTHER = "for scheme: splitting, "
+#: Alternative to a lower order in the hint of an error about size.
+_ALTERNATIVE = "for scheme: splitting, "
 
-#: Below this cost of gradient and Hessian no composition is considered.
-COMPOSE_ABOVE = 2_000
+#: Cost of gradient and Hessian below which the direct series is taken without a comparison: its error is smaller.
+MIN_COST_TO_COMPOSE = 2_000
 
-#: A direct series may cost this many times a composition: its error constant is that much better.
-DIRECT_WORTH = 4
+#: Largest ratio of the costs of a direct series and a composition; the direct series has a smaller error constant.
+MAX_DIRECT_COST_RATIO = 4
 
-#: The graph form is tried up to this many terms, and beyond only if the collected form is too large.
-GRAPH_TERMS = 5
+#: Largest number of terms for which the graph form is tried; with more, only the collected form is.
+MAX_GRAPH_TERMS = 5
 
 
 def formal_alpha(system: System, realisation: BiRealisation, terms: int) -> tuple[Expression, ...]:
-    """The source map from which S_1 … S_terms are computed: for paths, its series to the degree that they need."""
+    """Return the source map for S_1 … S_terms; for paths, its series to the degree that the terms need."""
     return tuple(karasev.series(system, terms - 1)) if realisation.path and terms > 1 else realisation.alpha
 
 
 def hamilton_jacobi(
     system: System, realisation: BiRealisation, most: int, static: Sequence[str] = ()
 ) -> HamiltonJacobi:
-    """The series of a system, whose tower also contains the step size and other ``static`` symbols.
+    """Return the series of a system; its tower contains the step size and other ``static`` symbols too.
 
-    Terms up to S_most will be asked for.
+    The tower is large enough for terms up to S_most.
     """
     return HamiltonJacobi(
         system.hamiltonian,
@@ -64,20 +64,22 @@ def hamilton_jacobi(
 def generating_function(
     system: System, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
 ) -> GeneratingFunction:
-    """∇S_h and Hess S_h in the cheapest form. LimitError if every form is too large.
+    """Return ∇S_h and Hess S_h in the cheapest form. Raises `LimitError` if every form is too large.
 
     The series is that of K if there is a ``monitor``, but with forces that of H.
     """
     if monitor and system.forces:
         return forced_form(system, monitor, series.static)
     candidates, inputs = [], (*series.times, *system.increments)
-    if terms <= GRAPH_TERMS:
+    if terms <= MAX_GRAPH_TERMS:
         with suppress(OverflowError):
             candidates.append(graph_form(series.graph(terms), series.coordinates, series.static, inputs))
-    worth = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
+    least_cost = min((c.cost() for c in candidates), default=MOST_OPERATIONS)
     with suppress(OverflowError):
-        beside = series.times, system.increments
-        collected = collected_form(series.polynomial(terms), series.coordinates, series.static, worth, *beside)
+        inputs_of_step = series.times, system.increments
+        collected = collected_form(
+            series.polynomial(terms), series.coordinates, series.static, least_cost, *inputs_of_step
+        )
         candidates = [*collected, *candidates]
     if not candidates or min(c.cost() for c in candidates) > MOST_OPERATIONS:
         raise too_large(system, f"S_1 … S_{terms} take more than {MOST_OPERATIONS} operations")
@@ -89,7 +91,7 @@ def generating_function(
 
 
 def push(system: System) -> list[Expression]:
-    """What p is beside ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
+    """Return the terms of p besides ∇S_h: hζ of the forces, and Σ ΔW_k σ_k∇g_k of the noise."""
     covector = system.forces.covector if system.forces else [ZERO] * system.dimension
     return [symbol(STEP) * z + e for z, e in zip(covector, _noise(system), strict=True)]
 
@@ -104,7 +106,7 @@ def _noise(system: System) -> list[Expression]:
 
 @dataclass(frozen=True)
 class Discretisation:
-    """How the order is reached: the terms of one stage, and the stages of a step."""
+    """The terms of the series in one stage, and the stages of a step."""
 
     generating: GeneratingFunction
     terms: int
@@ -122,11 +124,11 @@ def discretise(
     *,
     affordable: bool = False,
 ) -> Discretisation:
-    """The direct series, or a symmetric composition of the method of order 2 where that was asked for or is cheaper.
+    """Return the direct series, or a composition of the method of order 2 if the spec asks for it or it is cheaper.
 
-    ``auto`` composes only if the direct series is beyond the budget or costs more than `DIRECT_WORTH` times
-    the stages of a composition, since its error constant is much smaller. ``affordable`` says that `expect_affordable`
-    has been asked.
+    ``auto`` composes only if the direct series is beyond the budget, or costs more than `MAX_DIRECT_COST_RATIO` times
+    the stages of a composition, since its error constant is much smaller. ``affordable`` says that
+    `expect_affordable` has passed already.
     """
     if system.noise:
         expect_noise(system, realisation, order, composition)
@@ -134,37 +136,37 @@ def discretise(
         return _forced(system, realisation, series, order, composition, monitor)
     if not affordable:
         expect_affordable(system, realisation)
-    series.reach(order.order)  # S_{k+1} = 0 is what makes a symmetric method of order k + 1: it will be proved
+    series.reach(order.order)  # S_{k+1} = 0 gives a symmetric method the order k + 1, which will be proved
     if composition not in ("auto", "none"):
         return _composed(system, realisation, series, order, composition)
-    possible = composition == "auto" and series.symmetric and find("auto", order.order) is not None
-    possible = possible and not system.noise
+    can_compose = composition == "auto" and series.symmetric and find("auto", order.order) is not None
+    can_compose = can_compose and not system.noise
     try:
         direct = Discretisation(_afforded(system, realisation, series, order.terms), order.terms)
     except LimitError:
-        if not possible:
+        if not can_compose:
             raise
         return _composed(system, realisation, series, order, "auto")
-    if not possible or direct.generating.cost() < COMPOSE_ABOVE:
+    if not can_compose or direct.generating.cost() < MIN_COST_TO_COMPOSE:
         return direct
     composed = _composed(system, realisation, series, order, "auto")
-    price = DIRECT_WORTH * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
-    return composed if direct.generating.cost() > price else direct
+    limit = MAX_DIRECT_COST_RATIO * len(composed.fractions) * (composed.generating.cost() + system.dimension**2)
+    return composed if direct.generating.cost() > limit else direct
 
 
 def expect_noise(system: System, realisation: BiRealisation, order: Order, composition: str) -> None:
-    """Raise `SpecError` where the increments of a step would have to be divided, or Stratonovich's sense is lost."""
-    found, hint = "", ""
+    """Raise `SpecError` where the noise would be split among stages, or its integral is not Stratonovich's."""
+    reason, hint = "", ""
     if not realisation.symmetric:
-        found = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
+        reason = f"noise needs a symmetric bi-realisation; {realisation.kind} is not"
         hint = "birealisation: auto; in the middle of a step is where Stratonovich's integral takes its values"
     elif composition not in ("auto", "none"):
-        found, hint = "noise: a step is not composed of others, among which some go back", "composition: none"
+        reason, hint = "noise: a step is not composed of others, among which some go back", "composition: none"
     elif system.forces and order.order > 2:
-        found, hint = f"with forces and noise a step has order 2, not {order.order}", "order: 2"
-    if found:
+        reason, hint = f"with forces and noise a step has order 2, not {order.order}", "order: 2"
+    if reason:
         place = system.locations.get(("noise",))
-        raise SpecError([Diagnostic(found, place, hint)])
+        raise SpecError([Diagnostic(reason, place, hint)])
 
 
 def _forced(
@@ -175,7 +177,7 @@ def _forced(
     composition: str,
     monitor: Expression | None,
 ) -> Discretisation:
-    """With forces p = h(∇H + ζ), of order 2 by symmetry; higher orders are compositions."""
+    """Return the discretisation with p = h(∇H + ζ), of order 2 by symmetry; higher orders are compositions."""
     if realisation.path and system.forces and any(not f.is_zero for f in system.forces.vector):
         reason = f"forces: a vector needs a bi-realisation in closed form; {realisation.kind} follows paths"
         place = system.locations.get(("forces", "vector"))
@@ -199,8 +201,8 @@ def _composed(
     name: str,
     monitor: Expression | None = None,
 ) -> Discretisation:
-    found = find(name, order.order)
-    if found is None or not series.symmetric:
+    composition = find(name, order.order)
+    if composition is None or not series.symmetric:
         reason = (
             f"composition {name} composes the parts of a splitting; it needs scheme: splitting"
             if name in FLOW_COMPOSITIONS
@@ -210,17 +212,17 @@ def _composed(
         )
         place = system.locations.get(("composition",)) or system.locations.get(("order",))
         raise SpecError([Diagnostic(reason, place, "composition: none takes the series directly")])
-    note = f"composition: {found.name}, {len(found.fractions)} stages of order 2"
-    return Discretisation(_afforded(system, realisation, series, 1, monitor), 1, found.fractions, note)
+    note = f"composition: {composition.name}, {len(composition.fractions)} stages of order 2"
+    return Discretisation(_afforded(system, realisation, series, 1, monitor), 1, composition.fractions, note)
 
 
 def is_large(system: System) -> bool:
-    """Whether `expect_affordable` may refuse it."""
+    """Whether `expect_affordable` may raise."""
     return may_have(system.dimension, MOST_OPERATIONS)
 
 
 def expect_affordable(system: System, realisation: BiRealisation) -> None:
-    """LimitError if already S_1 = H takes too much, before any other is computed."""
+    """Raise `LimitError` if S_1 = H alone is too large, before any other term is computed."""
     if not is_large(system):
         return
     index = {c: i for i, c in enumerate(system.coordinates)}
@@ -233,12 +235,12 @@ def expect_affordable(system: System, realisation: BiRealisation) -> None:
 def _afforded(
     system: System, realisation: BiRealisation, series: HamiltonJacobi, terms: int, monitor: Expression | None = None
 ) -> GeneratingFunction:
-    """`generating_function`, LimitError if the Newton step is too large with it."""
-    found = generating_function(system, series, terms, monitor)
-    absent = {c for c, slope in zip(system.coordinates, found.slope, strict=True) if slope.is_zero}
-    hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in found.hessian]
+    """Return the `generating_function`; `LimitError` if the Newton step is too large with it."""
+    generating = generating_function(system, series, terms, monitor)
+    absent = {c for c, slope in zip(system.coordinates, generating.slope, strict=True) if slope.is_zero}
+    hessian = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in generating.hessian]
     _expect_few(system, realisation, absent, hessian)
-    return found
+    return generating
 
 
 def _expect_few(
@@ -252,14 +254,14 @@ def _expect_few(
         raise too_large(system, f"the matrices of a step would take more than {MOST_OPERATIONS} operations")
 
 
-def too_large(system: System, reason: str, other: str = _OTHER) -> LimitError:
-    """The error for a program beyond the budget; ``other`` is what else than a lower order may help."""
+def too_large(system: System, reason: str, other: str = _ALTERNATIVE) -> LimitError:
+    """Return the error for a program beyond the budget; ``other`` is an alternative to a lower order."""
     hint = f"ask for a lower order, {other}or for fewer terms in H"
     return LimitError([Diagnostic(reason, system.locations.get(("order",)), hint)])
 
 
-def expect_few(system: System, kernel: Kernel, other: str = _OTHER) -> None:
-    """Raises `LimitError` for a kernel beyond the budget."""
+def expect_few(system: System, kernel: Kernel, other: str = _ALTERNATIVE) -> None:
+    """Raise `LimitError` for a kernel beyond the budget."""
     operations = cost(kernel.roots)
     if operations > MOST_OPERATIONS:
         raise too_large(system, f"{kernel.name} would take {operations} operations, more than {MOST_OPERATIONS}", other)

@@ -1,8 +1,8 @@
 """Gaussian elimination without pivoting, unrolled, for matrices of a known pattern of zeros.
 
-The Newton matrix is I + O(h), so its pivots are near 1; the step watches them and falls back to elimination with
-pivoting. The order of the pivots, all on the diagonal, is that of least degree (Markowitz), which keeps the factors of
-lattices and trees as sparse as the matrix.
+The Newton matrix is I + O(h), so its pivots are near 1; the step checks them and falls back to elimination with
+pivoting. The pivots, all on the diagonal, are ordered by least degree (Markowitz), which preserves the sparsity of
+lattices and trees.
 """
 
 from __future__ import annotations
@@ -16,32 +16,34 @@ from phigen.scheme.lowering import COST
 from phigen.symbolic.expression import ZERO, Expression, symbol, total
 from phigen.symbolic.symbols import Symbol
 
-#: pattern[i][j]: whether entry (i, j) may differ from zero; the diagonal always may.
+#: pattern[i][j]: whether entry (i, j) may differ from zero; diagonal entries always may.
 Pattern = Sequence[Sequence[bool]]
 
 
 def pivot_order(pattern: Pattern) -> list[int]:
-    """The pivots, each the one whose row and column meet the fewest others; ties go to the first."""
+    """Return the pivots, each with the fewest entries in row and column; the first of several equal ones."""
     return [k for k, _ in _pivots(pattern)]
 
 
 def operations(pattern: Pattern) -> int:
-    """The cost (see `phigen.scheme.lowering.cost`) of `factorise` and `Factors.solved`, without making them."""
+    """Return the cost, as in `phigen.scheme.lowering`, of `factorise` and `Factors.solved`, without building them."""
     return sum(price for _, price in _pivots(pattern))
 
 
 def _pivots(pattern: Pattern) -> Iterator[tuple[int, int]]:
-    """The pivots in their order, and what each costs."""
+    """Yield the pivots in their order, with the cost of each."""
     n = len(pattern)
     rows = [{j for j in range(n) if pattern[i][j] and j != i} for i in range(n)]
     columns = [{i for i in range(n) if pattern[i][j] and j != i} for j in range(n)]
-    left = set(range(n))
-    while left:
-        k = min(left, key=lambda k: (len(rows[k]) * len(columns[k]), k))
-        left.remove(k)
+    remaining = set(range(n))
+    while remaining:
+        k = min(remaining, key=lambda k: (len(rows[k]) * len(columns[k]), k))
+        remaining.remove(k)
         below, right = len(columns[k]), len(rows[k])
-        new = sum(len(rows[k] - rows[i] - {i}) for i in columns[k])  # where there was 0, a product and no difference
-        yield k, COST["reciprocal"] + below * (1 + 2 * right) - new + 2 * (below + right) + 1
+        fill_in = sum(
+            len(rows[k] - rows[i] - {i}) for i in columns[k]
+        )  # an entry that was 0 takes a product and no difference
+        yield k, COST["reciprocal"] + below * (1 + 2 * right) - fill_in + 2 * (below + right) + 1
         for i in columns[k]:
             rows[i] = (rows[i] | rows[k]) - {i, k}
         for j in rows[k]:
@@ -63,14 +65,14 @@ class Factors:
         return (*self.reciprocals, *self.lower.values(), *self.upper.values())
 
     def named(self, kind: str) -> Factors:
-        """The same with symbols of that kind for `values`."""
+        """Return the factors with symbols of that kind for `values`."""
         names: Iterator[Expression] = (symbol(Symbol(kind, k)) for k in range(len(self.values)))
         reciprocals = tuple(next(names) for _ in self.reciprocals)
         lower = {place: next(names) for place in self.lower}
         return Factors(self.order, lower, {place: next(names) for place in self.upper}, reciprocals)
 
     def solved(self, side: Sequence[Expression]) -> list[Expression]:
-        """The solution for a right-hand side."""
+        """Return the solution for a right-hand side."""
         b, x = list(side), [ZERO] * len(side)
         rows: list[list[tuple[int, Expression]]] = [[] for _ in side]
         for (k, j), e in self.upper.items():
@@ -82,7 +84,7 @@ class Factors:
         return x
 
     def solved_transposed(self, side: Sequence[Expression]) -> list[Expression]:
-        """The solution for a right-hand side and the transpose of the matrix, P Uᵀ Lᵀ Pᵀ."""
+        """Return the solution for a right-hand side and the transpose of the matrix, P Uᵀ Lᵀ Pᵀ."""
         z, columns = list(side), defaultdict[int, list[tuple[int, Expression]]](list)
         for (k, j), e in self.upper.items():
             columns[j].append((k, e))
@@ -94,7 +96,7 @@ class Factors:
 
 
 def factorise(pattern: Pattern) -> Factors:
-    """The factors of the matrix with entries ``J:i:j`` where the pattern has them."""
+    """Return the factors of the matrix with entries ``J:i:j`` where the pattern has them."""
     n = len(pattern)
     a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
     lower: dict[tuple[int, int], Expression] = {}
@@ -105,29 +107,32 @@ def factorise(pattern: Pattern) -> Factors:
         for running.done, k in enumerate(order, 1):
             later = order[running.done :]
             reciprocals[k] = 1 / a[k][k]
-            filled = [j for j in later if not a[k][j].is_zero]
-            upper |= {(k, j): a[k][j] for j in filled}
+            columns = [j for j in later if not a[k][j].is_zero]
+            upper |= {(k, j): a[k][j] for j in columns}
             for i in (i for i in later if not a[i][k].is_zero):
                 factor = lower[i, k] = a[i][k] * reciprocals[k]
-                for j in filled:
+                for j in columns:
                     a[i][j] = a[i][j] - factor * a[k][j]
     return Factors(tuple(order), lower, upper, tuple(reciprocals))
 
 
 def elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """The solution for the right-hand side ``r:i``, and the reciprocal pivots."""
+    """Return the solution for the right-hand side ``r:i``, and the reciprocal pivots."""
     factors = factorise(pattern)
     return factors.solved([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
 def transposed_elimination(pattern: Pattern) -> tuple[list[Expression], tuple[Expression, ...]]:
-    """As `elimination`, for the transpose of the matrix: its zeros are elsewhere, its pivots are the same."""
+    """Return the solution for the transpose of the matrix, and the reciprocal pivots, which are the same."""
     factors = factorise(pattern)
     return factors.solved_transposed([symbol(Symbol("r", i)) for i in range(len(pattern))]), factors.reciprocals
 
 
 def inversion(pattern: Pattern) -> tuple[list[Expression], list[Expression]]:
-    """J⁻¹, row by row, by Gauss–Jordan elimination, and the reciprocal pivots; symbols ``J:i:j`` by the pattern."""
+    """Return J⁻¹, row by row, by Gauss–Jordan elimination, and the reciprocal pivots.
+
+    The symbols ``J:i:j`` follow the pattern.
+    """
     n = len(pattern)
     a = [[symbol(Symbol("J", i, j)) if pattern[i][j] or i == j else ZERO for j in range(n)] for i in range(n)]
     reciprocals: list[Expression] = []

@@ -1,7 +1,8 @@
-"""What products of matrices of expressions cost, counted before they are made.
+"""Operation counts of products of matrices of expressions, before the products are built.
 
-A matrix a' = ∂_xα + ∂_pα · Hess S_h of a large system is nearly all of its step, and a node of an expression takes some
-fifty times as long to make as to count. Here a node is its number: the same for equal operations on equal operands.
+The matrix a' = ∂_xα + ∂_pα · Hess S_h is nearly all of the step of a large system. To build a node of an expression
+takes some fifty times as long as to count it. Here a node is a number, the same for equal operations on equal
+operands.
 """
 
 from __future__ import annotations
@@ -15,53 +16,53 @@ from phigen.scheme.lowering import cost
 from phigen.symbolic.expression import ZERO, Expression, fold, sparse_derivatives, substitute
 from phigen.symbolic.symbols import momentum
 
-#: Rows of a matrix that are looked at first.
+#: Rows of a matrix that are counted first; a matrix far beyond the limit is recognised by a few rows.
 FIRST_ROWS = 8
 
-#: A row of a matrix, without zeros.
+#: The nonzero entries of a row of a matrix, by column.
 SparseRow = Mapping[int, Expression]
 
 
 def newton_operations(
     realisation: BiRealisation, absent: Collection[str], hessian: Sequence[SparseRow], most: int
 ) -> int:
-    """Operations of the matrices of a Newton step, see `phigen.scheme.step`; ``most`` + 1 if there are more.
+    """Return the operations of the matrices of a Newton step, see `phigen.scheme.step`; ``most`` + 1 if there are more.
 
-    ``absent`` are the coordinates on which S_h does not depend, so that their momenta are 0. It is an estimate from
-    below: the making of the Hessian is left out, which is little where H is a polynomial of low degree. Small systems,
-    whose matrices cannot have so many, are not looked at.
+    ``absent`` are the coordinates that S_h does not depend on, so their momenta are 0. The count is a lower bound: it
+    leaves out the computation of the Hessian, which is small where H is a polynomial of low degree. Small systems,
+    whose matrices are below the limit in any case, count as 0.
     """
     names, momenta = realisation.coordinates, realisation.covector
     if realisation.path or not may_have(len(names), most):
         return 0
-    both = [*realisation.displacement, *realisation.increment]
+    expressions = [*realisation.displacement, *realisation.increment]
     if absent:
-        both = substitute(both, {momentum(c): ZERO for c in absent})
+        expressions = substitute(expressions, {momentum(c): ZERO for c in absent})
     index = {name: k for k, name in enumerate(momenta)}
     state = {*names, *momenta}
     count = OperationCount(most, lambda name: name not in state)
-    left: list[SparseRow] = []
+    rows_so_far: list[SparseRow] = []
     try:
-        while len(left) < len(both):  # more and more rows at once: of far too many, few are looked at
-            rows = sparse_derivatives(both[len(left) : 4 * len(left) + FIRST_ROWS], momenta)
-            new = [{index[p]: e for p, e in row.items()} for row in rows]
-            left += new
-            count.matrix(new, hessian)
-            own = cost([e for row in left for e in row.values()])
-            if count.operations + own > most:
+        while len(rows_so_far) < len(expressions):  # batches grow, so few rows of a huge matrix are counted
+            rows = sparse_derivatives(expressions[len(rows_so_far) : 4 * len(rows_so_far) + FIRST_ROWS], momenta)
+            new_rows = [{index[p]: e for p, e in row.items()} for row in rows]
+            rows_so_far += new_rows
+            count.matrix(new_rows, hessian)
+            entry_cost = cost([e for row in rows_so_far for e in row.values()])
+            if count.operations + entry_cost > most:
                 return most + 1
     except TooManyError:
         return most + 1
-    return count.operations + own
+    return count.operations + entry_cost
 
 
 def may_have(dimension: int, most: int) -> bool:
-    """Whether the matrices of a step may have more than so many operations, for all that the dimension says."""
+    """Whether the dimension allows the matrices of a step more than ``most`` operations."""
     return 4 * dimension**3 > most
 
 
 def path_operations(system: System, hessian: Sequence[SparseRow], most: int) -> int:
-    """Operations of Hess S_h · π, of which a step along paths has need; ``most`` + 1 if there are more."""
+    """Return the operations of Hess S_h · π, needed by a step along paths; ``most`` + 1 if there are more."""
     tensor = [{j: e for j, e in enumerate(row) if not e.is_zero} for row in system.poisson]
     count = OperationCount(most, lambda name: name not in system.coordinates)
     try:
@@ -71,14 +72,14 @@ def path_operations(system: System, hessian: Sequence[SparseRow], most: int) -> 
 
 
 class TooManyError(Exception):
-    """There are more operations than were asked for."""
+    """There are more operations than the limit."""
 
 
 class OperationCount:
-    """The operations of products of matrices whose sums are those of `total_at`.
+    """The operations of products of matrices with sums as in `total_at`.
 
-    What depends on ``fixed`` symbols only costs nothing: it is computed elsewhere. Raises `TooManyError` as soon as
-    there are more than ``most``.
+    Expressions in ``fixed`` symbols only cost nothing, since they are computed once. Raises `TooManyError` as soon as
+    there are more than ``most`` operations.
     """
 
     def __init__(self, most: int, fixed: Callable[[str], bool]) -> None:
@@ -88,7 +89,7 @@ class OperationCount:
         self._leaves: dict[int, int] = {}
 
     def matrix(self, left: Sequence[SparseRow], right: Sequence[SparseRow]) -> int:
-        """The operations of left · right beyond those that were counted before."""
+        """Return the operations of left · right beyond those counted before."""
         before = self.operations
         self._know([e for row in (*left, *right) for e in row.values()])
         columns = self._different([{j: self._leaves[id(e)] for j, e in row.items()} for row in right])
@@ -109,13 +110,13 @@ class OperationCount:
 
     @staticmethod
     def _different(rows: Sequence[Mapping[int, int]]) -> list[dict[int, int]]:
-        """The rows without columns that are there before: equal ones make equal nodes."""
+        """Return the rows without repeated columns: equal columns make equal nodes."""
         columns: dict[int, list[tuple[int, int]]] = {}
         for k, row in enumerate(rows):
             for j, leaf in row.items():
                 columns.setdefault(j, []).append((k, leaf))
-        kept = set({tuple(column): j for j, column in columns.items()}.values())
-        return [{j: leaf for j, leaf in row.items() if j in kept} for row in rows]
+        distinct = set({tuple(column): j for j, column in columns.items()}.values())
+        return [{j: leaf for j, leaf in row.items() if j in distinct} for row in rows]
 
     def _know(self, leaves: Sequence[Expression]) -> None:
         def visit(node: Expression, args: list[bool]) -> bool:
@@ -137,13 +138,13 @@ class OperationCount:
 
     def _node(self, kind: int, a: int, b: int) -> int:
         key = (kind, a, b) if a < b else (kind, b, a)
-        found = self._nodes.get(key)
-        if found is None:
-            found = self._nodes[key] = len(self._nodes) + 1
+        node = self._nodes.get(key)
+        if node is None:
+            node = self._nodes[key] = len(self._nodes) + 1
             if a in self._fixed and b in self._fixed:
-                self._fixed.add(found)
+                self._fixed.add(node)
             else:
                 self.operations += 1
                 if self.operations > self._most:
                     raise TooManyError
-        return found
+        return node
