@@ -10,7 +10,7 @@ from support import BODY, COMMAND, RawC, compiled
 
 from phigen.compiler import emit
 from phigen.lanes.in_lanes import Blocks, in_lanes
-from phigen.scheme.assemble import MOST_IN_LANES
+from phigen.scheme.assemble import MAX_PATH_LANE_DIMENSION
 
 POLE = "coordinates: [x, y]\npoisson: {brackets: {x: {y: x**2}}}\nhamiltonian: y + x*y/9\n"
 LOGARITHM = "coordinates: [x, y]\npoisson: {brackets: {x: {y: log(x)}}}\nhamiltonian: y - x*y\n"
@@ -88,7 +88,7 @@ def test_members_that_fail_leave_their_group_as_they_would_alone(name, members):
 def test_paths_of_few_coordinates_are_followed_in_lanes():
     for name, few in (("nambu_pendulum", True), ("charged_particle", False)):
         program = compiled(name).program
-        assert (program.dimension <= MOST_IN_LANES) == few
+        assert (program.dimension <= MAX_PATH_LANE_DIMENSION) == few
         assert isinstance(in_lanes(program), Blocks) == few
 
 

@@ -7,7 +7,7 @@ from support import BODY, NAMES, compile_anew, compile_text, compiled, series_of
 from phigen.errors import LimitError
 from phigen.scheme import discretisation
 from phigen.scheme.collected import collect
-from phigen.scheme.discretisation import GRAPH_TERMS, generating_function, hamilton_jacobi
+from phigen.scheme.discretisation import MAX_GRAPH_TERMS, generating_function, hamilton_jacobi
 from phigen.scheme.generating import STEP, collected_form, graph_form
 from phigen.scheme.order import Order, plan_order
 from phigen.scheme.staging import Coefficients
@@ -58,7 +58,7 @@ def test_generating_function_is_the_cheapest_of_its_forms_and_all_are_equal(name
     coordinates, series = system.coordinates, hamilton_jacobi(system, realisation, terms)
     chosen = generating_function(system, series, terms)
     forms = list(collected_form(series.polynomial(terms), coordinates, series.static, 10**6))
-    if terms <= GRAPH_TERMS:
+    if terms <= MAX_GRAPH_TERMS:
         symmetric = realisation.symmetric
         graph = graph_series(system.hamiltonian, realisation.alpha, coordinates, terms, symmetric=symmetric)
         forms.append(graph_form(graph, coordinates, series.static))
