@@ -8,8 +8,13 @@ from phigen.compilation import CompiledSplitting
 from phigen.notation import parts
 from phigen.scheme.steps import Splitting, Step
 from phigen.splitting.flow import Flow
-from phigen.symbolic.expression import Expression, symbol
+from phigen.splitting.matrices import MatrixExponential
+from phigen.symbolic.expression import Expression, substitute, symbol
 from phigen.symbolic.readable import readable
+from phigen.symbolic.symbols import Symbol, plain
+
+#: Letters of a matrix and of its exponential less 1. Where there are several, numbers follow.
+RATES, EXPONENTIAL = "A", "E"
 
 
 def method(compilation: CompiledSplitting) -> str:
@@ -19,9 +24,36 @@ def method(compilation: CompiledSplitting) -> str:
     return f"order {compilation.order.order}, {count} part{'s' * (count > 1)} with exact flows{note}"
 
 
-def images(flow: Flow, coordinates: Sequence[str]) -> dict[str, Expression]:
-    """Images of the coordinates that a flow changes, after the time ``h:``."""
-    return {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
+def images(compilation: CompiledSplitting, flow: Flow) -> dict[str, Expression]:
+    """Images of the coordinates that a flow changes, after the time ``h:``.
+
+    Entries of matrix exponentials have the names of `matrices`.
+    """
+    entries: dict[str, Expression] = {}
+    for number, matrix in matrices(compilation):
+        places = [_place(matrix, k) for k in range(len(matrix.rates))]
+        entries |= {
+            e: symbol(Symbol(f"{EXPONENTIAL}{number}", at)) for e, at in zip(matrix.symbols, places, strict=True)
+        }
+    coordinates = compilation.system.coordinates
+    moved = {c: symbol(c) + e for c, e in zip(coordinates, flow.increment, strict=True) if not e.is_zero}
+    return dict(zip(moved, substitute(list(moved.values()), entries), strict=True))
+
+
+def matrices(compilation: CompiledSplitting) -> list[tuple[str, MatrixExponential]]:
+    """The matrix exponentials of all flows, each once, with a number, empty if there is one."""
+    listed = list(dict.fromkeys(e for flow in compilation.splitting.flows for e in flow.exponentials))
+    return [(str(k) if len(listed) > 1 else "", e) for k, e in enumerate(listed, 1)]
+
+
+def rates(number: str, matrix: MatrixExponential) -> dict[Symbol, Expression]:
+    """The non-zero entries of A, for exp(hA) − 1, by their names."""
+    return {Symbol(f"{RATES}{number}", _place(matrix, k)): e for k, e in enumerate(matrix.rates) if not e.is_zero}
+
+
+def _place(matrix: MatrixExponential, k: int) -> str:
+    """The row and the column of an entry, from 1: ``12``, or ``1_12`` of matrices of ten rows or more."""
+    return ("_" * (matrix.size > 9)).join(str(i + 1) for i in divmod(k, matrix.size))
 
 
 def definitions(flow: Flow, coordinates: Sequence[str]) -> list[tuple[str, Expression]]:
@@ -38,11 +70,15 @@ def formulas(compilation: CompiledSplitting, most: int | None) -> list[tuple[str
     """
     listed: list[tuple[str, str]] = []
     for k, flow in enumerate(compilation.splitting.flows, 1):
-        moved = images(flow, compilation.system.coordinates)
+        moved = images(compilation, flow)
         named = [f"{flow.letter}_{k}{': ' * bool(c)}{c}" for c, _ in definitions(flow, compilation.system.coordinates)]
         local = [e for _, e in definitions(flow, compilation.system.coordinates)]
         listed += zip(named, readable(local, most), strict=True)
         listed += [(f"Φ_{k}: {name}", text) for name, text in parts.texts(moved, most)]
+    for number, matrix in matrices(compilation):
+        listed.append((f"{EXPONENTIAL}{number}", f"exp(h*{RATES}{number}) - 1"))
+        entries = rates(number, matrix)
+        listed += zip(map(plain, entries), readable(list(entries.values()), most), strict=True)
     return listed
 
 
@@ -54,14 +90,26 @@ def schedule(step: Step) -> list[tuple[int, float]]:
 
 
 def described(compilation: CompiledSplitting) -> dict[str, object]:
-    """The parts, and the flows of a step as pairs of a part, counted from 1, and a fraction of the step."""
+    """The parts, and the flows of a step as pairs of a part, counted from 1, and a fraction of the step.
+
+    ``generators`` are the matrices A of exponentials E = exp(hA) − 1, row by row.
+    """
     parts = []
     for flow in compilation.splitting.flows:
-        moved = images(flow, compilation.system.coordinates)
+        moved = images(compilation, flow)
         local = definitions(flow, compilation.system.coordinates)
         texts = readable([*(e for _, e in local), *moved.values()], None)
         force = {c: t for (c, _), t in zip(local, texts, strict=False)}
         part: dict[str, object] = {"force": force} if flow.force else {"hamiltonian": texts[0]}
         parts.append(part | {"flow": dict(zip(moved, texts[len(local) :], strict=True)), "manner": flow.manner})
     steps = [[part + 1, time] for part, time in schedule(compilation.program.step)]
-    return {"scheme": "splitting", "parts": parts, "flows": steps}
+    generators = {
+        f"{EXPONENTIAL}{number}": [
+            texts[i : i + matrix.size]
+            for texts in [readable(list(matrix.rates), None)]
+            for i in range(0, len(texts), matrix.size)
+        ]
+        for number, matrix in matrices(compilation)
+    }
+    said: dict[str, object] = {"generators": generators} if generators else {}
+    return {"scheme": "splitting", "parts": parts, **said, "flows": steps}

@@ -10,6 +10,7 @@ from phigen.geometry.system import System
 from phigen.notation import flows, mathml, parts
 from phigen.notation.generating import modified_formulas, series_formulas
 from phigen.notation.typesetting import INDENT, LINE, latex, lines, width
+from phigen.splitting.matrices import MatrixExponential
 from phigen.symbolic.expression import Expression
 from phigen.symbolic.readable import SHOWN, Formula
 
@@ -44,7 +45,7 @@ def document(compilation: Compilation, modified: int = 0, most: int | None = SHO
     blocks = system_blocks(compilation.system)
     blocks += compilation.by_kind(
         lambda series: [*_maps(series), aligned(_series(series, most))],
-        lambda splitting: [_flow(splitting, k) for k in range(1, len(splitting.splitting.flows) + 1)],
+        _flows,
         lambda gauss: [_COLLOCATION],
     )
     if listed := modified_formulas(compilation, modified, most):
@@ -76,14 +77,26 @@ def _tensor(system: System) -> str:
     return aligned(_equations(left, [system.poisson[i][j] for i, j in pairs]))
 
 
+def _flows(compilation: CompiledSplitting) -> list[str]:
+    """The parts of H with their flows, then the matrices whose exponentials are in these."""
+    parts = [_flow(compilation, k) for k in range(1, len(compilation.splitting.flows) + 1)]
+    return [*parts, *(_exponential(number, matrix) for number, matrix in flows.matrices(compilation))]
+
+
 def _flow(compilation: CompiledSplitting, k: int) -> str:
     """A part of H, and the images of the coordinates that its flow changes, after the time h."""
     flow = compilation.splitting.flows[k - 1]
-    moved = flows.images(flow, compilation.system.coordinates)
+    moved = flows.images(compilation, flow)
     pulled = f"<msubsup><mi>Φ</mi><mn>{k}</mn><mi>∗</mi></msubsup>{_TIMES}"
     local = flows.definitions(flow, compilation.system.coordinates)
     left = [*(mathml.component(flow.letter, k, c) for c, _ in local), *(pulled + mathml.name(c) for c in moved)]
     return aligned(_equations(left, [*(e for _, e in local), *moved.values()]))
+
+
+def _exponential(number: str, matrix: MatrixExponential) -> str:
+    """A matrix exponential less 1, and the entries of its matrix that are not 0."""
+    entries = flows.rates(number, matrix)
+    return aligned([mathml.exponential(number), *_equations([mathml.name(s) for s in entries], list(entries.values()))])
 
 
 def _maps(compilation: CompiledSeries) -> Iterator[str]:

@@ -323,6 +323,12 @@ def _one(factor: Factor) -> Sum:
     return (Term(Fraction(1), (factor,)),)
 
 
+def exponential(number: str) -> tuple[str, list[str]]:
+    """The two sides of E = exp(hA) − 1, with the number of the matrix."""
+    left, rates = (f"<mi>{letter}{number}</mi>" for letter in "EA")
+    return left, [f"<msup><mi>e</mi><mrow><mi>h</mi>{_TIMES}{rates}</mrow></msup>", "<mo>−</mo><mn>1</mn>"]
+
+
 def _name(identifier: str) -> Factor:
     key = natural_key(identifier)
     if isinstance(identifier, Symbol):

@@ -90,11 +90,16 @@ def _splitting(compilation: CompiledSplitting) -> list[Markup]:
     blocks.append(page.equations([[mathml.math(f"<mi>H</mi><mo>=</mo>{sum_of_parts}")]]))
     for k, flow in enumerate(parts, 1):
         blocks += _flow(compilation, k, flow)
+    for number, matrix in flows.matrices(compilation):
+        entries = flows.rates(number, matrix)
+        left, (first, *rest) = mathml.exponential(number)
+        blocks.append(page.equations([[mathml.math(f"{left}<mo>=</mo>{first}"), *map(mathml.math, rest)]]))
+        blocks.append(group([mathml.name(s) for s in entries], list(entries.values()), "The matrix of an exponential"))
     return [*blocks, _schedule(compilation.program.step, [flow.letter for flow in parts])]
 
 
 def _flow(compilation: CompiledSplitting, k: int, flow: Flow) -> list[Markup]:
-    moved = flows.images(flow, compilation.system.coordinates)
+    moved = flows.images(compilation, flow)
     left = [mathml.name(c) for c in moved]
     local = flows.definitions(flow, compilation.system.coordinates)
     part = page.equations([equation(mathml.component(flow.letter, k, c), e) for c, e in local])

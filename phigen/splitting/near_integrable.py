@@ -41,13 +41,14 @@ def with_motions(ring: Ring, terms: Sequence[Term]) -> list[Term] | None:
 def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> int | None:
     """The index of the part εB of a near-integrable H = A + εB, None if H is no such sum of two parts.
 
-    Small is what has a factor that is declared to be small. Without such a declaration it is what stands beside Kepler
-    motions, if its coefficients are small.
+    Small is what has a factor that is declared to be small. Without such a declaration, and where A is divided by the
+    small parameter as p²/2m is by a small mass, it is what stands beside Kepler motions, if its coefficients are small.
     """
     if len(parts) != 2:
         return None
-    declared = [ring.tower.names.index(p.name) for p in system.parameters if p.small and p.name in ring.tower.names]
-    if declared:
+    names = [p.name for p in system.parameters if p.small and p.name in ring.tower.names]
+    declared = [ring.tower.names.index(name) for name in names]
+    if declared and not any(_divided_by(ring, term, names) for part in parts for term in part):
         small = [all(_vanishes_with(ring, term, declared) for term in part) for part in parts]
         return small.index(True) if sum(small) == 1 else None
     beside = [k for k, part in enumerate(parts) if not any(term.motion for term in part)]
@@ -60,6 +61,13 @@ def small_part(system: System, ring: Ring, parts: Sequence[Sequence[Term]]) -> i
 def _vanishes_with(ring: Ring, term: Term, variables: Sequence[int]) -> bool:
     """Whether every monomial of a term has one of these variables as a factor."""
     return all(any(exponents[v] for v in variables) for exponents in term.element.to_dict())
+
+
+def _divided_by(ring: Ring, term: Term, names: Sequence[str]) -> bool:
+    """Whether a term has a function of these parameters as a denominator."""
+    powers = term.element.degrees()[len(ring.tower.symbols) :]
+    used = (g for g, degree in zip(ring.tower.generators, powers, strict=True) if degree > 0)
+    return any(g.kind == "reciprocal" and ring.tower.depends_on(g.arguments[0], names) for g in used)
 
 
 def size_of(system: System, ring: Ring, terms: Sequence[Term]) -> float:

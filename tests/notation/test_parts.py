@@ -36,11 +36,10 @@ def damped_spin():
 
 def test_long_flows_are_written_by_what_they_share(damped_spin):
     """In lines that a reader can take in, which together are the flow: each name by those before it."""
-    names = damped_spin.system.coordinates
     listed = flows.formulas(damped_spin, None)
     for k, flow in enumerate(damped_spin.splitting.flows, 1):
         lines = [(name.removeprefix(f"Φ_{k}: "), text) for name, text in listed if name.startswith(f"Φ_{k}: ")]
-        images = flows.images(flow, names)
+        images = flows.images(damped_spin, flow)
         assert max(len(text) for _, text in lines) < 160
         assert [name for name, _ in lines[: len(images)]] == [*images]
         known = dict(POINT)

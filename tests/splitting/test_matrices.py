@@ -9,6 +9,7 @@ from support import TARGETS, compile_text, javascript, solver
 
 from phigen.errors import SpecError
 from phigen.geometry.system import hamiltonian_vector_field
+from phigen.notation import flows, latex
 from phigen.splitting import enclosures
 from phigen.splitting.matrices import MatrixExponential, exponential_less_one
 from phigen.splitting.statements import check
@@ -157,6 +158,23 @@ def test_javascript_computes_the_same_numbers():
     x = [0.4, -0.3, 0.8, 0.5]
     there = javascript(found, f"x0: {x}", "s.integrate(3.5, 2)", "Array.from(s.x)")
     assert there == pytest.approx(solver(found, "c").integrate(x, 3.5, 2).x[-1], rel=1e-14)
+
+
+def test_printed_formulas_are_the_flow():
+    """The printed entries of A give the exponential whose entries move the coordinates."""
+    made = without_adjoint(LINEAR["a saddle and a field"])
+    listed = dict(flows.formulas(made, None))
+    values = {"k": 0.7, "c": 1.3, "q1": 0.3, "q2": -0.2, "p1": 0.5, "p2": 0.1}
+    entries = {name: eval(text, {}, dict(values)) for name, text in listed.items() if name.startswith("A_")}
+    size = max(int(name[-1]) for name in entries)
+    a = np.array([[entries.get(f"A_{i}{j}", 0.0) for j in range(1, size + 1)] for i in range(1, size + 1)])
+    e = expm(0.4 * a) - np.eye(size)
+    known = values | {f"E_{i + 1}{j + 1}": e[i, j] for i in range(size) for j in range(size)}
+    end = solver(made, "numpy").integrate([values[c] for c in made.system.coordinates], 0.4, 1).x[-1]
+    assert [eval(listed[f"Φ_1: {c}"], {}, known) for c in made.system.coordinates] == pytest.approx(end, abs=1e-14)
+    assert listed["E"] == "exp(h*A) - 1"
+    assert "E_{12}" in latex.document(made)
+    assert "A_{41}" in latex.document(made)
 
 
 def test_a_wrong_row_and_wrong_numbers_are_refuted(monkeypatch):

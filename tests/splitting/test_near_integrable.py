@@ -120,7 +120,7 @@ def test_without_a_small_part_the_names_are_errors_at_their_place(case):
     assert "small: true" in diagnostic.hint
 
 
-def planets(count):
+def planets(count, mass="0.00001"):
     """Planets about a star of mass 1 in democratic heliocentric coordinates."""
     bodies = range(1, count + 1)
     alone = " + ".join(f"(px{i}**2 + py{i}**2)/(2*m{i}) - m{i}/sqrt(x{i}**2 + y{i}**2)" for i in bodies)
@@ -128,14 +128,18 @@ def planets(count):
     pairs = [f"m{i}*m{j}/sqrt((x{i} - x{j})**2 + (y{i} - y{j})**2)" for i in bodies for j in range(1, i)]
     q, p = ([f"{a}{i}" for i in bodies for a in axes] for axes in (("x", "y"), ("px", "py")))
     return (
-        f"coordinates: [{', '.join([*q, *p])}]\nparameters: {{{', '.join(f'm{i}: 0.00001' for i in bodies)}}}\n"
+        f"coordinates: [{', '.join([*q, *p])}]\nparameters: {{{', '.join(f'm{i}: {mass}' for i in bodies)}}}\n"
         f"poisson: {{canonical: {{q: [{', '.join(q)}], p: [{', '.join(p)}]}}}}\n"
         f"hamiltonian: {alone} + {star} - {' - '.join(pairs)}\nscheme: splitting\n"
     )
 
 
-def test_planets_about_a_star_are_motions_and_a_perturbation_that_is_one_part():
-    """The kinetic energy of the star, a square of the sum of momenta, is left whole: it commutes with distances."""
-    made = compile_text(planets(3), 4)
+@pytest.mark.parametrize("mass", ["0.00001", "{value: 0.00001, small: true}"])
+def test_planets_about_a_star_are_motions_and_a_perturbation_that_is_one_part(mass):
+    """The kinetic energy of the star, a square of the sum of momenta, is left whole: it commutes with distances.
+
+    A mass that is declared to be small divides p²/2m, so the potential of the star is no small part beside it.
+    """
+    made = compile_text(planets(3, mass), 4)
     assert [len(flow.pieces) for flow in made.splitting.flows] == [3, 0]
     assert made.program.step.composition == "aba-10-6-4"
